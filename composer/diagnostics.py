@@ -1,0 +1,112 @@
+"""Findings: what is wrong, where, what was expected, and which rule says so (DESIGN: Findings)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+from enum import Enum
+
+from composer.source import Span
+
+
+class Severity(Enum):
+    """How much a finding weighs. Only errors keep a system from running."""
+
+    ERROR = "error"
+    WARNING = "warning"
+    INFO = "info"
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One thing that can be wrong, with all that ``compose rule`` and the catalogue say of it.
+
+    ``code`` never changes its meaning and is never used again. Bands: 0xx reading, 1xx schema,
+    2xx names and references, 3xx types, QoS and wiring, 4xx lifecycle, timers, parameters and
+    behaviours, 5xx style, 9xx internal.
+    """
+
+    code: str
+    name: str
+    severity: Severity
+    summary: str
+    why: str
+    bad: str
+    good: str
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """A second place that belongs to a finding, and what it has to do with it."""
+
+    span: Span
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One finding. ``hint`` says how to mend it, in the imperative."""
+
+    rule: Rule
+    message: str
+    primary: Span
+    related: tuple[Label, ...] = ()
+    hint: str | None = None
+
+    @property
+    def severity(self) -> Severity:
+        """The severity of the rule behind the finding."""
+        return self.rule.severity
+
+    @property
+    def sort_key(self) -> tuple[str, int, int, str, str]:
+        """File, line, column; then code and message, so that any order is reproducible."""
+        span = self.primary
+        return (span.file.path, span.line, span.column, self.rule.code, self.message)
+
+
+_rules: dict[str, Rule] = {}
+
+
+def register(rule: Rule) -> Rule:
+    """Add ``rule`` to the catalogue and return it. Raises ValueError when code or name is taken."""
+    for known in _rules.values():
+        if rule.code == known.code or rule.name == known.name:
+            raise ValueError(f"rule {rule.code} {rule.name!r} repeats {known.code} {known.name!r}")
+    _rules[rule.code] = rule
+    return rule
+
+
+def registered_rules() -> Iterator[Rule]:
+    """Yield the rules of every module imported so far, by code."""
+    yield from (_rules[code] for code in sorted(_rules))
+
+
+def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Return the findings sorted by place, each once."""
+    return sorted(dict.fromkeys(diagnostics), key=lambda diagnostic: diagnostic.sort_key)
+
+
+def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
+    """Say whether any finding is an error."""
+    return any(diagnostic.severity is Severity.ERROR for diagnostic in diagnostics)
+
+
+def nearest(name: str, candidates: Iterable[str]) -> str | None:
+    """Return the candidate that ``name`` was most likely meant to be, or None."""
+    by_folded = {candidate.casefold(): candidate for candidate in sorted(candidates, reverse=True)}
+    matches = get_close_matches(name.casefold(), by_folded, n=1, cutoff=0.6)
+    return by_folded[matches[0]] if matches else None
+
+
+def suggestion(name: str, candidates: Iterable[str], *, limit: int = 8) -> str | None:
+    """Return a hint: the nearest candidate, else a short list of all, else None."""
+    known = sorted(set(candidates))
+    close = nearest(name, known)
+    if close is not None:
+        return f"did you mean '{close}'?"
+    if not known:
+        return None
+    listed = ", ".join(known[:limit])
+    return f"valid here: {listed}" + (", ..." if len(known) > limit else "")

@@ -1,0 +1,73 @@
+"""The system model: what a YAML file declares, resolved as far as it can be, every value located.
+
+The model judges nothing. A reference to something that does not exist stays in it as it was
+written; the checks say what is wrong with it.
+"""
+
+from composer.model.ports import (
+    ChannelKind,
+    Event,
+    FeedbackSteps,
+    LogLevel,
+    Parameter,
+    ParameterType,
+    Period,
+    PeriodUnit,
+    Port,
+    PortKind,
+    Qos,
+    Reaction,
+    Send,
+    Timer,
+)
+from composer.model.system import (
+    BehaviorReference,
+    Channel,
+    Connection,
+    Dependency,
+    Endpoint,
+    Executor,
+    ExecutorKind,
+    NamedQos,
+    Node,
+    PortOfNode,
+    PrimaryState,
+    QosReference,
+    Remapping,
+    System,
+    UnknownKey,
+    channels,
+)
+
+__all__ = [
+    "BehaviorReference",
+    "Channel",
+    "ChannelKind",
+    "Connection",
+    "Dependency",
+    "Endpoint",
+    "Event",
+    "Executor",
+    "ExecutorKind",
+    "FeedbackSteps",
+    "LogLevel",
+    "NamedQos",
+    "Node",
+    "Parameter",
+    "ParameterType",
+    "Period",
+    "PeriodUnit",
+    "Port",
+    "PortKind",
+    "PortOfNode",
+    "PrimaryState",
+    "Qos",
+    "QosReference",
+    "Reaction",
+    "Remapping",
+    "Send",
+    "System",
+    "Timer",
+    "UnknownKey",
+    "channels",
+]

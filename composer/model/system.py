@@ -1,0 +1,246 @@
+"""A system: its nodes, how they are joined, and what runs them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+from composer.model.ports import (
+    ChannelKind,
+    Event,
+    Parameter,
+    Port,
+    PortKind,
+    Qos,
+    Reaction,
+    Timer,
+)
+from composer.source import Located, SourceFile, Span
+from composer.tree import Plain
+
+
+@dataclass(frozen=True, slots=True)
+class Remapping:
+    """``from`` (a name as the node's type declares it) becomes ``to``."""
+
+    source: Located[str]
+    target: Located[str]
+
+
+class PrimaryState(StrEnum):
+    """The lifecycle states a node may be asked to start in or to wait for."""
+
+    UNCONFIGURED = "unconfigured"
+    INACTIVE = "inactive"
+    ACTIVE = "active"
+
+
+@dataclass(frozen=True, slots=True)
+class Dependency:
+    """Another node that must have reached ``state`` before this one goes there."""
+
+    node: Located[str]
+    state: PrimaryState = PrimaryState.ACTIVE
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviorReference:
+    """``module:Class``: Python beside the YAML file, or installed."""
+
+    text: Located[str]
+    folder: Path  # where the YAML file that names it lives; looked in first
+
+    @property
+    def module(self) -> str:
+        """The part before the colon."""
+        return self.text.value.partition(":")[0]
+
+    @property
+    def class_name(self) -> str:
+        """The part behind the colon; empty when there is none."""
+        return self.text.value.partition(":")[2]
+
+
+@dataclass(frozen=True, slots=True)
+class UnknownKey:
+    """A key of an instance that refines something its node type does not have."""
+
+    section: str  # "parameters", "publishers", "timers", ...
+    name: Located[str]
+    known: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One node of a system, merged from its type (where it has one) and its own entry."""
+
+    name: Located[str]
+    namespace: Located[str]  # absolute
+    span: Span = field(compare=False)
+    type_name: Located[str] | None = None
+    type_found: bool = True
+    description: str = ""
+    behavior: BehaviorReference | None = None
+    parameters: tuple[Parameter, ...] = ()
+    ports: tuple[Port, ...] = ()
+    timers: tuple[Timer, ...] = ()
+    state: tuple[tuple[Located[str], Plain], ...] = ()
+    reactions: tuple[tuple[Event, Reaction], ...] = ()
+    remappings: tuple[Remapping, ...] = ()
+    executor: Located[str] | None = None
+    depends_on: tuple[Dependency, ...] = ()
+    autostart: Located[PrimaryState] | None = None
+    unknown: tuple[UnknownKey, ...] = ()
+
+    @property
+    def full_name(self) -> str:
+        """The name ROS knows the node by."""
+        return f"{self.namespace.value.rstrip('/')}/{self.name.value}"
+
+    def port(self, name: str) -> Port | None:
+        """Return the port called ``name``, or None."""
+        return next((port for port in self.ports if port.name.value == name), None)
+
+    def ports_of(self, *kinds: PortKind) -> tuple[Port, ...]:
+        """Return the ports of the given kinds, in order."""
+        return tuple(port for port in self.ports if port.kind in kinds)
+
+    def parameter(self, name: str) -> Parameter | None:
+        """Return the parameter called ``name``, or None."""
+        return next((item for item in self.parameters if item.name.value == name), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """``node.port`` as a connection names it."""
+
+    text: Located[str]
+
+    @property
+    def node(self) -> str:
+        """The part before the last dot."""
+        return self.text.value.rpartition(".")[0]
+
+    @property
+    def port(self) -> str:
+        """The part behind the last dot."""
+        return self.text.value.rpartition(".")[2]
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """A topic, service or action and the ports joined to it. ``sources`` are publishers or
+    servers, ``sinks`` subscriptions or clients."""
+
+    kind: ChannelKind
+    name: Located[str]
+    sources: tuple[Endpoint, ...]
+    sinks: tuple[Endpoint, ...]
+    span: Span = field(compare=False)
+    qos: Located[str] | None = None  # the profile's name, where it is named
+
+
+class ExecutorKind(StrEnum):
+    """Who calls the callbacks."""
+
+    EVENTS = "events"
+    SINGLE_THREADED = "single_threaded"
+    MULTI_THREADED = "multi_threaded"
+
+
+@dataclass(frozen=True, slots=True)
+class Executor:
+    """A group of nodes that share a loop. ``threads`` counts for multi_threaded only."""
+
+    name: Located[str]
+    kind: ExecutorKind
+    span: Span = field(compare=False)
+    threads: int = 2
+
+
+@dataclass(frozen=True, slots=True)
+class NamedQos:
+    """A profile of the system's own ``qos_profiles``."""
+
+    name: Located[str]
+    qos: Qos
+    extends: Located[str] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class QosReference:
+    """A use of a profile by name, known or not; for 'unknown profile' and 'unused profile'."""
+
+    name: Located[str]
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """Everything one file declares. A node type validated alone is a system of that one node,
+    with ``node_type`` true: nothing outside it is known then."""
+
+    name: Located[str]
+    source: SourceFile
+    nodes: tuple[Node, ...]
+    span: Span = field(compare=False)
+    description: str = ""
+    connections: tuple[Connection, ...] = ()
+    qos_profiles: tuple[NamedQos, ...] = ()
+    qos_references: tuple[QosReference, ...] = ()
+    executors: tuple[Executor, ...] = ()
+    autostart: PrimaryState = PrimaryState.ACTIVE
+    node_type: bool = False
+
+    def node(self, name: str) -> Node | None:
+        """Return the node with the given key in ``nodes``, or None."""
+        return next((node for node in self.nodes if node.name.value == name), None)
+
+    def port(self, endpoint: Endpoint) -> Port | None:
+        """Return the port a connection's end names, or None."""
+        node = self.node(endpoint.node)
+        return node.port(endpoint.port) if node is not None else None
+
+
+@dataclass(frozen=True, slots=True)
+class PortOfNode:
+    """A port together with the node that has it."""
+
+    node: Node
+    port: Port
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A topic, service or action with every port of the system that meets on it."""
+
+    kind: ChannelKind
+    name: str
+    sources: tuple[PortOfNode, ...]  # publishers or servers
+    sinks: tuple[PortOfNode, ...]  # subscriptions or clients
+
+    @property
+    def ends(self) -> tuple[PortOfNode, ...]:
+        """All ports on the channel, sources first."""
+        return self.sources + self.sinks
+
+
+_SOURCES = (PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER)
+
+
+def channels(nodes: Iterable[Node]) -> tuple[Channel, ...]:
+    """Return every topic, service and action the nodes use, sorted by kind and name."""
+    ends: dict[tuple[ChannelKind, str], list[PortOfNode]] = {}
+    for node in nodes:
+        for port in node.ports:
+            ends.setdefault((port.kind.channel, port.full_name), []).append(PortOfNode(node, port))
+    return tuple(
+        Channel(
+            kind,
+            name,
+            tuple(end for end in joined if end.port.kind in _SOURCES),
+            tuple(end for end in joined if end.port.kind not in _SOURCES),
+        )
+        for (kind, name), joined in sorted(ends.items())
+    )

@@ -1,0 +1,86 @@
+"""The located tree: what a YAML text says, every key and value with the place it stands at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from composer.source import Span
+
+#: A YAML 1.2 core-schema scalar.
+ScalarValue: TypeAlias = "None | bool | int | float | str"
+#: Plain Python data: what JSON could say.
+Plain: TypeAlias = "ScalarValue | list[Plain] | dict[str, Plain]"
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """A single value. ``verbatim`` is true when the text in the file is the value, character by
+    character (no escapes, no folding), so that a part of the value has a place of its own.
+    ``content_offset`` is 1 for quoted scalars: the span includes the quote.
+    """
+
+    value: ScalarValue
+    span: Span = field(compare=False)
+    verbatim: bool = field(default=True, compare=False)
+    content_offset: int = field(default=0, compare=False)
+
+    def part(self, start: int, length: int) -> Span:
+        """Return the place of a part of the value; of the whole where parts have none."""
+        return self.span.part(start + self.content_offset, length) if self.verbatim else self.span
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """A list. Its span is its first character or, in block style, its first item."""
+
+    items: tuple[Tree, ...]
+    span: Span = field(compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A key and its value."""
+
+    key: Scalar
+    value: Tree
+
+    @property
+    def name(self) -> str:
+        """The key as text; every key of a document is text."""
+        return str(self.key.value)
+
+
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    """A map with unique text keys, in the order they were written."""
+
+    entries: tuple[Entry, ...]
+    span: Span = field(compare=False)
+
+    def entry(self, name: str) -> Entry | None:
+        """Return the entry called ``name``, or None."""
+        return next((entry for entry in self.entries if entry.name == name), None)
+
+    def get(self, name: str) -> Tree | None:
+        """Return the value under ``name``, or None."""
+        entry = self.entry(name)
+        return entry.value if entry is not None else None
+
+    def __iter__(self) -> Iterator[Entry]:
+        return iter(self.entries)
+
+
+Tree: TypeAlias = "Scalar | Sequence | Mapping"
+
+
+def plain(tree: Tree) -> Plain:
+    """Return the tree as plain Python data, without places."""
+    match tree:
+        case Scalar():
+            return tree.value
+        case Sequence():
+            return [plain(item) for item in tree.items]
+        case Mapping():
+            return {entry.name: plain(entry.value) for entry in tree}
