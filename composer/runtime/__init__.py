@@ -1,0 +1,1 @@
+"""The running system. The only part of the composer that imports rclpy."""

@@ -1,0 +1,93 @@
+"""The seam between the nodes and whoever calls their callbacks.
+
+Nodes know a :class:`Loop` and nothing of executors. There are two kinds: the composer's own event
+loop, and rclpy's wait-set executors for people who ask for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from typing import Any, Protocol, TypeVar
+
+from rclpy.action import ActionClient, ActionServer
+from rclpy.client import Client
+from rclpy.node import Node
+from rclpy.service import Service
+from rclpy.subscription import Subscription
+
+from composer.runtime.tasks import Future
+
+T = TypeVar("T")
+
+#: Called with (what was running, the exception). Loops report here and go on.
+ExceptionHandler = Callable[[str, BaseException], None]
+
+Reply = Callable[[Any], None]
+
+
+class Timer(Protocol):
+    """Something that will be called. Cancelling twice is harmless."""
+
+    def cancel(self) -> None:
+        """Never call again."""
+
+
+class Loop(Protocol):
+    """Calls callbacks, one thread or several. Methods may be called from any thread."""
+
+    @property
+    def name(self) -> str:
+        """The name of the executor in YAML."""
+
+    def add_node(self, node: Node) -> None:
+        """Serve what every node brings along: parameter, lifecycle and logger services."""
+
+    def remove_node(self, node: Node) -> None:
+        """Stop serving the node and everything of it. To be called before it is destroyed."""
+
+    def add_subscription(
+        self, subscription: Subscription, callback: Callable[[Any], None]
+    ) -> None:
+        """Call ``callback(message)`` for each message."""
+
+    def add_service(self, service: Service, callback: Callable[[Any, Reply], None]) -> None:
+        """Call ``callback(request, reply)``; ``reply(response)`` answers, now or later."""
+
+    def add_client(self, client: Client) -> None:
+        """Complete the futures of ``client.call_async``."""
+
+    def add_action_server(self, server: ActionServer) -> None:
+        """Run the server's goal, cancel and result requests."""
+
+    def add_action_client(self, client: ActionClient) -> None:
+        """Complete the futures of the client and deliver its feedback."""
+
+    def remove(self, entity: object) -> None:
+        """Stop serving one entity. To be called before it is destroyed."""
+
+    def call_soon(self, callback: Callable[[], None]) -> None:
+        """Call ``callback`` on the loop as soon as it is free."""
+
+    def call_later(self, delay_s: float, callback: Callable[[], None]) -> Timer:
+        """Call ``callback`` once, ``delay_s`` seconds from now."""
+
+    def call_every(self, period_s: float, callback: Callable[[], None]) -> Timer:
+        """Call ``callback`` each ``period_s`` seconds; a late call does not shift the next."""
+
+    def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
+        """Run a coroutine; the future is its outcome. Cancelling the future closes it."""
+
+    def run(self, function: Callable[[], T], timeout_s: float | None = None) -> T:
+        """Call ``function`` on the loop and wait for it (at once when already there).
+
+        Raises what ``function`` raises, and TimeoutError when it takes longer.
+        """
+
+    def start(self) -> None:
+        """Begin to call, on threads of the loop's own."""
+
+    def stop(self, timeout_s: float) -> bool:
+        """End the threads; false when a callback did not return in time."""
+
+    def where(self) -> str:
+        """Return the Python stack of the callback that runs now; empty when none does."""
