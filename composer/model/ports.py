@@ -91,11 +91,13 @@ class Send:
 class Reaction:
     """What is done, in YAML, when something happens. Carried out in the order of the fields:
     nothing at all unless ``when`` is true; then the new ``state`` (all values worked out from the
-    old one), the log line, the messages, the calls and goals, the response.
+    old one), the log line, the messages, the calls and goals, the response. ``when_span`` is the
+    place of the expression's text, so that a finding can point into it.
     """
 
     span: Span = field(compare=False)
     when: Expression | None = None
+    when_span: Span | None = field(default=None, compare=False)
     state: tuple[tuple[Located[str], Template], ...] = ()
     log: Template | None = None
     log_level: LogLevel = LogLevel.INFO
@@ -142,6 +144,7 @@ class Port:
     reactions: tuple[tuple[Event, Reaction], ...] = ()
     timeout_ms: Located[float] | None = None  # clients
     accept: Expression | None = None  # action servers: which goals are taken
+    accept_span: Span | None = field(default=None, compare=False)
     feedback: FeedbackSteps | None = None  # action servers
     result: Template | None = None  # action servers
     reentrant: bool = False
