@@ -1,0 +1,67 @@
+"""The command line: it parses, calls and prints. Whatever decides lives below.
+
+stdout is data, stderr is everything else. Exit codes: 0 clean, 1 findings or a node failed,
+2 usage, 3 a fault of the composer itself.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+from composer.cli.failure import Failure
+
+INTERNAL = 3
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command that ``arguments`` (those of the process unless given) name.
+
+    Returns the exit code; nothing is raised.
+    """
+    from composer.cli.app import app  # noqa: PLC0415 - building the commands takes a moment
+
+    try:
+        app(args=arguments, prog_name="compose")
+    except SystemExit as end:
+        return _exit_code(end)
+    except Failure as failure:
+        print(failure.text(), file=sys.stderr)
+        return failure.exit_code
+    except Exception as error:
+        return _internal_error(error)
+    finally:
+        _flush()
+    return 0
+
+
+def _exit_code(end: SystemExit) -> int:
+    if end.code is None:
+        return 0
+    return end.code if isinstance(end.code, int) else 1
+
+
+def _internal_error(error: Exception) -> int:
+    """Say shortly that this is our fault; the traceback is for who asks for it."""
+    if os.environ.get("COMPOSE_DEBUG"):
+        import traceback  # noqa: PLC0415
+
+        traceback.print_exception(error)
+    print(f"compose: internal error: {type(error).__name__}: {error}", file=sys.stderr)
+    print(
+        "  This is a fault of compose, not of your files. Please report it with the output of\n"
+        "  the same command with --debug in front (compose --debug ...) and of compose --version.",
+        file=sys.stderr,
+    )
+    return INTERNAL
+
+
+def _flush() -> None:
+    """Write out what is buffered now: at interpreter exit a closed pipe would be a traceback."""
+    from composer.cli.terminal import drop_stdout  # noqa: PLC0415
+
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        drop_stdout()

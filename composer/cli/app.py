@@ -1,0 +1,67 @@
+"""The commands of ``compose``, put together. A new command is a file here and a line below."""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated
+
+import typer
+
+from composer.cli.terminal import write
+
+HELP = """Declare, prove and run a ROS 2 system.
+
+YAML says what the system is; compose checks it before anything starts, runs it as real lifecycle
+nodes in one process, and lets any ROS 2 tool see it.
+
+\b
+Examples:
+  compose run pipeline                        run an example system
+  compose run systems/pipeline.yaml           validate, bring up, keep up, tear down
+  compose validate systems nodes              every finding in one run
+  compose lifecycle set planner deactivate    from another terminal
+  compose graph systems/pipeline.yaml         a diagram, as Mermaid text
+
+\b
+Exit codes: 0 clean, 1 findings or a node failed, 2 usage, 3 internal error.
+"""
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        from composer.cli.version import composer_version  # noqa: PLC0415 - only when asked for
+
+        write(f"compose {composer_version()}")
+        raise typer.Exit
+
+
+def _set_debug(asked: bool) -> None:
+    if asked:
+        os.environ["COMPOSE_DEBUG"] = "1"
+
+
+@app.callback(help=HELP)
+def compose(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, help="Print the version and exit."
+        ),
+    ] = False,
+    debug: Annotated[
+        bool,
+        typer.Option(
+            "--debug",
+            callback=_set_debug,
+            help="Show the traceback of an internal error (also: COMPOSE_DEBUG=1).",
+        ),
+    ] = False,
+) -> None:
+    """Take what stands before the command; the callbacks of the options do the work."""

@@ -1,0 +1,56 @@
+"""The terminal: data to stdout, talk to stderr, colours only where they can be seen."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import NoReturn, TextIO
+
+#: What a shell reports for a program that wrote into a closed pipe (128 + SIGPIPE).
+CLOSED_PIPE = 141
+
+
+def write(text: str) -> None:
+    """Print ``text``, which is data, and a newline. Ends the process quietly when nobody reads."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        _end_quietly()
+
+
+def write_raw(text: str) -> None:
+    """Like :func:`write`, but exactly ``text``."""
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _end_quietly()
+
+
+def say(text: str) -> None:
+    """Print ``text``, which is for the person and no data, to stderr."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def use_color(stream: TextIO) -> bool:
+    """Say whether ``stream`` shows colours: NO_COLOR and FORCE_COLOR decide, else a terminal.
+
+    See https://no-color.org and https://force-color.org.
+    """
+    if os.environ.get("NO_COLOR"):
+        return False
+    if os.environ.get("FORCE_COLOR"):
+        return True
+    return stream.isatty() and os.environ.get("TERM") != "dumb"
+
+
+def drop_stdout() -> None:
+    """Let stdout lead nowhere, so that nothing fails on a closed pipe any more."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
+
+
+def _end_quietly() -> NoReturn:
+    drop_stdout()
+    raise SystemExit(CLOSED_PIPE)
