@@ -1,0 +1,153 @@
+"""Follows planned paths in closed loop."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+
+from composer.behavior import Behavior, CallError, Goal
+from composer_interfaces.action import Navigate
+from composer_interfaces.srv import PlanTrajectory
+from geometry_msgs.msg import Point, Twist
+from nav_msgs.msg import Odometry, Path
+
+
+class MotorController(Behavior):
+    """Steers the robot to where the path wants it now: the path's velocity plus a correction."""
+
+    def on_activate(self) -> None:
+        """Begin with the first waypoint."""
+        self.position: Point | None = None
+        self.reference: Reference | None = None
+        self.navigating: Goal | None = None
+        self.next_waypoint = 0
+        self.distance_traveled = 0.0
+
+    def on_sensor_data(self, message: Odometry) -> None:
+        """Keep the position and count the way."""
+        position = message.pose.pose.position
+        if self.position is not None:
+            self.distance_traveled += _distance(self.position, position)
+        self.position = position
+
+    def on_control(self) -> None:
+        """Send the velocity that keeps the robot on the path; none when there is no path."""
+        command = Twist()
+        if self.reference is not None and self.position is not None:
+            command.linear.x, command.linear.y = self._velocity(self.reference, self.position)
+        self.publishers.motor_commands.publish(command)
+
+    async def on_plan(self) -> None:
+        """Ask for a path to the next waypoint once the last one is reached."""
+        waypoints = self.parameters.waypoints
+        if self.navigating is not None or self.position is None or len(waypoints) < 2:
+            return
+        if self.reference is not None:
+            if not self._arrived(self.reference):
+                return
+            self.next_waypoint += 1
+        index = self.next_waypoint % (len(waypoints) // 2)
+        goal = Point(x=waypoints[2 * index], y=waypoints[2 * index + 1])
+        reference, reason = await self._plan(goal, self.parameters.max_velocity)
+        if self.navigating is not None:
+            return  # a goal came while the planner was thinking
+        self.reference = reference
+        if reference is None:
+            self.log.warn(f"no path to ({goal.x:.2f}, {goal.y:.2f}): {reason}")
+        else:
+            self.log.info(f"driving to ({goal.x:.2f}, {goal.y:.2f}): {reason}")
+
+    def accept_navigate(self, request: Navigate.Goal) -> bool:
+        """Take one goal at a time, and only one that can be driven to."""
+        target = request.target
+        finite = all(math.isfinite(value) for value in (target.x, target.y, target.z))
+        return self.navigating is None and request.max_velocity > 0.0 and finite
+
+    async def on_navigate(self, goal: Goal) -> Navigate.Result:
+        """Drive to the target, telling ten times a second how far along the robot is."""
+        self.navigating = goal
+        try:
+            return await self._navigate(goal)
+        finally:
+            self.navigating = None
+            self.reference = None
+
+    async def _navigate(self, goal: Goal) -> Navigate.Result:
+        target: Point = goal.request.target
+        started_at_m = self.distance_traveled
+        self.reference, reason = await self._plan(target, goal.request.max_velocity)
+        if self.reference is None:
+            goal.abort()
+            return Navigate.Result(message=reason)
+        length = max(_distance(self.position, target), self.parameters.tolerance)
+        while not goal.is_cancel_requested and not self._arrived(self.reference):
+            share = 1.0 - _distance(self.position, target) / length
+            goal.publish_feedback(
+                Navigate.Feedback(
+                    progress_percent=100.0 * min(max(share, 0.0), 1.0),
+                    current_position=self.position,
+                )
+            )
+            await self.clock.sleep(0.1)
+        traveled = self.distance_traveled - started_at_m
+        if goal.is_cancel_requested:
+            goal.canceled()
+            return Navigate.Result(message="canceled on the way", distance_traveled=traveled)
+        return Navigate.Result(success=True, message="arrived", distance_traveled=traveled)
+
+    async def _plan(self, goal: Point, max_velocity: float) -> tuple[Reference | None, str]:
+        if self.position is None:
+            return None, "no odometry yet"
+        limit = min(max_velocity, self.parameters.max_velocity)
+        cruise = self.parameters.cruise_share * limit
+        request = PlanTrajectory.Request(start=self.position, goal=goal, max_velocity=cruise)
+        try:
+            response = await self.clients.plan_trajectory.call(request)
+        except CallError as error:
+            return None, str(error)
+        if not response.success:
+            return None, response.message
+        return Reference(response.path, limit), response.message
+
+    def _velocity(self, reference: Reference, position: Point) -> tuple[float, float]:
+        wanted, velocity_x, velocity_y = reference.at(self.clock.now())
+        gain = self.parameters.position_gain
+        velocity_x += gain * (wanted.x - position.x)
+        velocity_y += gain * (wanted.y - position.y)
+        excess = math.hypot(velocity_x, velocity_y) / reference.max_velocity
+        if excess > 1.0:
+            velocity_x, velocity_y = velocity_x / excess, velocity_y / excess
+        return velocity_x, velocity_y
+
+    def _arrived(self, reference: Reference) -> bool:
+        return _distance(self.position, reference.end) <= self.parameters.tolerance
+
+
+class Reference:
+    """Where the robot should be, and how fast, at any time of a planned path."""
+
+    def __init__(self, path: Path, max_velocity: float) -> None:
+        self.points = [pose.pose.position for pose in path.poses]
+        self.times_s = [
+            pose.header.stamp.sec + pose.header.stamp.nanosec * 1e-9 for pose in path.poses
+        ]
+        self.end = self.points[-1]
+        self.max_velocity = max_velocity
+
+    def at(self, time_s: float) -> tuple[Point, float, float]:
+        """Return the wanted position and velocity (x, y, in m/s) at ``time_s``."""
+        index = bisect_right(self.times_s, time_s)
+        if index == 0:
+            return self.points[0], 0.0, 0.0
+        if index == len(self.points):
+            return self.end, 0.0, 0.0
+        before, after = self.points[index - 1], self.points[index]
+        period_s = self.times_s[index] - self.times_s[index - 1]
+        share = (time_s - self.times_s[index - 1]) / period_s
+        step_x, step_y = after.x - before.x, after.y - before.y
+        wanted = Point(x=before.x + share * step_x, y=before.y + share * step_y)
+        return wanted, step_x / period_s, step_y / period_s
+
+
+def _distance(first: Point, second: Point) -> float:
+    return math.hypot(second.x - first.x, second.y - first.y)

@@ -1,0 +1,46 @@
+"""An action server: a point that travels to where it is told."""
+
+from __future__ import annotations
+
+import math
+
+from composer.behavior import Behavior, Goal
+from composer_interfaces.action import Navigate
+from geometry_msgs.msg import Point
+
+
+class Navigator(Behavior):
+    """Moves at the goal's velocity, says so after each step, and stops when told to."""
+
+    def on_activate(self) -> None:
+        """Stand at the origin."""
+        self.position = Point()
+
+    def accept_navigate(self, request: Navigate.Goal) -> bool:
+        """Take a goal that is near enough, at a velocity that leads there."""
+        distance = _distance(self.position, request.target)
+        return request.max_velocity > 0.0 and distance <= self.parameters.max_distance
+
+    async def on_navigate(self, goal: Goal) -> Navigate.Result:
+        """Travel in equal steps; the time they take follows from the velocity."""
+        start, target = self.position, goal.request.target
+        distance = _distance(start, target)
+        steps = self.parameters.steps
+        for step in range(1, steps + 1):
+            await self.clock.sleep(distance / goal.request.max_velocity / steps)
+            if goal.is_cancel_requested:
+                goal.canceled()
+                traveled = _distance(start, self.position)
+                return Navigate.Result(message="canceled on the way", distance_traveled=traveled)
+            share = step / steps
+            self.position = Point(
+                x=start.x + share * (target.x - start.x), y=start.y + share * (target.y - start.y)
+            )
+            goal.publish_feedback(
+                Navigate.Feedback(progress_percent=100.0 * share, current_position=self.position)
+            )
+        return Navigate.Result(success=True, message="arrived", distance_traveled=distance)
+
+
+def _distance(first: Point, second: Point) -> float:
+    return math.hypot(second.x - first.x, second.y - first.y)

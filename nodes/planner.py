@@ -1,0 +1,81 @@
+"""A straight-line planner."""
+
+from __future__ import annotations
+
+import math
+
+from builtin_interfaces.msg import Time
+from composer.behavior import Behavior
+from composer_interfaces.srv import PlanTrajectory
+from geometry_msgs.msg import Point, PoseStamped
+from nav_msgs.msg import Odometry, Path
+
+NANOSECONDS = 1_000_000_000
+
+
+class Planner(Behavior):
+    """Samples the line from start to goal, evenly in time, at the highest velocity allowed."""
+
+    def on_activate(self) -> None:
+        """Forget what was known of the robot before."""
+        self.odometry: Odometry | None = None
+
+    def on_sensor_data(self, message: Odometry) -> None:
+        """Keep the latest odometry."""
+        self.odometry = message
+
+    def on_plan_trajectory(
+        self, request: PlanTrajectory.Request, response: PlanTrajectory.Response
+    ) -> PlanTrajectory.Response:
+        """Answer with a path, or with the reason why there is none."""
+        reason = self._refusal(request)
+        if reason is None:
+            response.path = self._path(request)
+            response.success = True
+            response.message = f"{len(response.path.poses)} points"
+        else:
+            response.message = reason
+        return response
+
+    def _refusal(self, request: PlanTrajectory.Request) -> str | None:
+        if self.odometry is None:
+            return "no odometry yet: the frame of the path is not known"
+        if not request.max_velocity > 0.0:
+            return f"max_velocity must be above 0 m/s, not {request.max_velocity}"
+        ends = (request.start, request.goal)
+        if not all(math.isfinite(value) for end in ends for value in (end.x, end.y, end.z)):
+            return "start and goal must be finite"
+        return None
+
+    def _path(self, request: PlanTrajectory.Request) -> Path:
+        start, goal = request.start, request.goal
+        velocity = min(request.max_velocity, self.parameters.max_velocity)
+        period_s = self.parameters.sample_period_ms / 1000.0
+        length = math.dist((start.x, start.y, start.z), (goal.x, goal.y, goal.z))
+        steps = max(1, math.ceil(length / (velocity * period_s)))
+        yaw = math.atan2(goal.y - start.y, goal.x - start.x)
+        path = Path()
+        path.header.frame_id = self.odometry.header.frame_id
+        path.header.stamp = self.clock.stamp()
+        for step in range(steps + 1):
+            pose = PoseStamped()
+            pose.header.frame_id = path.header.frame_id
+            pose.header.stamp = _later(path.header.stamp, step * period_s)
+            pose.pose.position = _between(start, goal, step / steps)
+            pose.pose.orientation.z = math.sin(yaw / 2.0)
+            pose.pose.orientation.w = math.cos(yaw / 2.0)
+            path.poses.append(pose)
+        return path
+
+
+def _between(start: Point, goal: Point, share: float) -> Point:
+    return Point(
+        x=start.x + share * (goal.x - start.x),
+        y=start.y + share * (goal.y - start.y),
+        z=start.z + share * (goal.z - start.z),
+    )
+
+
+def _later(stamp: Time, seconds: float) -> Time:
+    nanoseconds = stamp.sec * NANOSECONDS + stamp.nanosec + round(seconds * NANOSECONDS)
+    return Time(sec=nanoseconds // NANOSECONDS, nanosec=nanoseconds % NANOSECONDS)
