@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import threading
 
-from composer.behavior import Behavior
 from std_msgs.msg import String
+
+from composer.behavior import Behavior
 
 
 class ControlLoop(Behavior):

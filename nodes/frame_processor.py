@@ -6,8 +6,9 @@ import os
 import threading
 import zlib
 
-from composer.behavior import Behavior
 from std_msgs.msg import String
+
+from composer.behavior import Behavior
 
 
 class FrameProcessor(Behavior):

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 
-from composer.behavior import Behavior, CallError, Goal
 from composer_interfaces.action import Navigate
 from composer_interfaces.srv import PlanTrajectory
 from geometry_msgs.msg import Point, Twist
 from nav_msgs.msg import Odometry, Path
+
+from composer.behavior import Behavior, CallError, Goal
 
 
 class MotorController(Behavior):

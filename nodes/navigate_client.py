@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from composer.behavior import Behavior, CallError, GoalRejected, SentGoal
 from composer_interfaces.action import Navigate
 from geometry_msgs.msg import Point
 from std_msgs.msg import String
+
+from composer.behavior import Behavior, CallError, GoalRejected, SentGoal
 
 
 class NavigateClient(Behavior):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from composer.behavior import Behavior, Goal
 from composer_interfaces.action import Navigate
 from geometry_msgs.msg import Point
+
+from composer.behavior import Behavior, Goal
 
 
 class Navigator(Behavior):

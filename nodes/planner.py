@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 from builtin_interfaces.msg import Time
-from composer.behavior import Behavior
 from composer_interfaces.srv import PlanTrajectory
 from geometry_msgs.msg import Point, PoseStamped
 from nav_msgs.msg import Odometry, Path
+
+from composer.behavior import Behavior
 
 NANOSECONDS = 1_000_000_000
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from composer.behavior import Behavior
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
+
+from composer.behavior import Behavior
 
 
 class SensorSimulator(Behavior):
