@@ -205,7 +205,10 @@ class ParameterType(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A declared parameter and the value it starts with; ``value`` is None when none is given."""
+    """A declared parameter and the value it starts with.
+
+    ``value`` is what the system gives; else it is the very ``default``; None without either.
+    """
 
     name: Located[str]
     type: Located[str]  # a ParameterType; other text is kept for the finding

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
+from typing import Protocol, TypeVar
 
 from composer.model.ports import (
     ChannelKind,
@@ -19,6 +20,22 @@ from composer.model.ports import (
 )
 from composer.source import Located, SourceFile, Span
 from composer.tree import Plain
+
+
+class _Named(Protocol):
+    @property
+    def name(self) -> Located[str]: ...
+
+
+N = TypeVar("N", bound=_Named)
+
+
+def _by_name(items: Iterable[N]) -> dict[str, N]:
+    """Return the items by name; of two that share one, the first."""
+    found: dict[str, N] = {}
+    for item in items:
+        found.setdefault(item.name.value, item)
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +110,11 @@ class Node:
     depends_on: tuple[Dependency, ...] = ()
     autostart: Located[PrimaryState] | None = None
     unknown: tuple[UnknownKey, ...] = ()
+    complete: bool = True  # False: its type is unknown or unreadable, so what it has is not known
+    _ports: dict[str, Port] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_ports", _by_name(self.ports))
 
     @property
     def full_name(self) -> str:
@@ -101,7 +123,7 @@ class Node:
 
     def port(self, name: str) -> Port | None:
         """Return the port called ``name``, or None."""
-        return next((port for port in self.ports if port.name.value == name), None)
+        return self._ports.get(name)
 
     def ports_of(self, *kinds: PortKind) -> tuple[Port, ...]:
         """Return the ports of the given kinds, in order."""
@@ -192,10 +214,15 @@ class System:
     executors: tuple[Executor, ...] = ()
     autostart: PrimaryState = PrimaryState.ACTIVE
     node_type: bool = False
+    unknown: tuple[UnknownKey, ...] = ()  # what the command line names and the system lacks
+    _nodes: dict[str, Node] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_nodes", _by_name(self.nodes))
 
     def node(self, name: str) -> Node | None:
         """Return the node with the given key in ``nodes``, or None."""
-        return next((node for node in self.nodes if node.name.value == name), None)
+        return self._nodes.get(name)
 
     def port(self, endpoint: Endpoint) -> Port | None:
         """Return the port a connection's end names, or None."""
