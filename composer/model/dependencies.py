@@ -1,0 +1,184 @@
+"""Which node waits for which: declared, implied by services and actions, and what is a cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+
+from composer.model.ports import ChannelKind
+from composer.model.system import System, channels
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """``node`` waits for ``on``. Both are keys of ``System.nodes``.
+
+    ``serves`` is the name of the service or action that ``on`` serves to ``node``; it is empty
+    where the system itself says ``depends_on``.
+    """
+
+    node: str
+    on: str
+    serves: str = ""
+
+    @property
+    def implied(self) -> bool:
+        """True when nobody wrote it down: servers start before their clients."""
+        return bool(self.serves)
+
+
+def declared_edges(system: System) -> Iterator[Edge]:
+    """Yield what ``depends_on`` says, in order. Names of no node of the system are left out."""
+    for node in system.nodes:
+        for dependency in node.depends_on:
+            if system.node(dependency.node.value) is not None:
+                yield Edge(node.name.value, dependency.node.value)
+
+
+def implied_edges(system: System) -> Iterator[Edge]:
+    """Yield an edge from every client of a service or action to the node that serves it.
+
+    That is the first one, if there are several: checks refuse a second.
+    """
+    for channel in channels(system.nodes):
+        if channel.kind is ChannelKind.TOPIC or not channel.sources:
+            continue
+        server = channel.sources[0].node.name.value
+        for client in dict.fromkeys(end.node.name.value for end in channel.sinks):
+            if client != server:
+                yield Edge(client, server, serves=channel.name)
+
+
+def dependency_edges(system: System) -> tuple[Edge, ...]:
+    """Return all declared edges, then the implied ones that are on no cycle.
+
+    Two nodes that serve each other have no first; what the system says goes before what follows
+    from its wiring.
+    """
+    declared = tuple(declared_edges(system))
+    implied = tuple(implied_edges(system))
+    group = {
+        name: number
+        for number, names in enumerate(_strong_groups(_graph(system, declared + implied)))
+        for name in names
+    }
+    return declared + tuple(edge for edge in implied if group[edge.node] != group[edge.on])
+
+
+def dependency_cycles(system: System) -> tuple[tuple[str, ...], ...]:
+    """Return one shortest cycle of ``depends_on`` for every set of nodes that wait for each other.
+
+    ``("a", "b")`` reads: a depends on b, which depends on a. Cycles start at the node declared
+    first and come in the order of their first nodes.
+    """
+    graph = _graph(system, declared_edges(system))
+    rank = {name: index for index, name in enumerate(graph)}
+    cycles = []
+    for names in _strong_groups(graph):
+        first = min(names, key=rank.__getitem__)
+        if len(names) > 1 or first in graph[first]:
+            cycles.append(_shortest_cycle(graph, first, set(names)))
+    return tuple(sorted(cycles, key=lambda cycle: rank[cycle[0]]))
+
+
+def in_dependency_order(system: System, edges: Sequence[Edge]) -> tuple[str, ...]:
+    """Return the names of all nodes, each behind those it waits for, else as declared.
+
+    A cycle is broken at the node declared first: checks refuse it, and this must end anyway.
+    """
+    graph = _graph(system, edges)
+    names = list(graph)
+    rank = {name: index for index, name in enumerate(names)}
+    waiting = {name: len(needed) for name, needed in graph.items()}
+    dependents: dict[str, list[str]] = {name: [] for name in names}
+    for name, needed in graph.items():
+        for other in needed:
+            dependents[other].append(name)
+    ready = [rank[name] for name in names if not waiting[name]]
+    placed: dict[str, None] = {}
+    undecided = iter(names)
+    while len(placed) < len(names):
+        name = names[heappop(ready)] if ready else next(undecided)
+        if name in placed:
+            continue
+        placed[name] = None
+        for dependent in dependents[name]:
+            waiting[dependent] -= 1
+            if not waiting[dependent]:
+                heappush(ready, rank[dependent])
+    return tuple(placed)
+
+
+Graph = Mapping[str, Mapping[str, None]]
+
+
+def _graph(system: System, edges: Sequence[Edge] | Iterator[Edge]) -> dict[str, dict[str, None]]:
+    """Return for every node, in order, the nodes it waits for, in order and each once."""
+    graph: dict[str, dict[str, None]] = {node.name.value: {} for node in system.nodes}
+    for edge in edges:
+        graph[edge.node][edge.on] = None
+    return graph
+
+
+def _strong_groups(graph: Graph) -> Iterator[tuple[str, ...]]:
+    """Yield the strongly connected components (Tarjan), without recursion: chains may be long."""
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    open_names: dict[str, None] = {}
+    for root in graph:
+        if root in index:
+            continue
+        index[root] = low[root] = len(index)
+        open_names[root] = None
+        path = [(root, iter(graph[root]))]
+        while path:
+            name, rest = path[-1]
+            successor = next(rest, None)
+            if successor is None:
+                path.pop()
+                if path:
+                    parent = path[-1][0]
+                    low[parent] = min(low[parent], low[name])
+                if low[name] == index[name]:
+                    yield _close(open_names, name)
+            elif successor not in index:
+                index[successor] = low[successor] = len(index)
+                open_names[successor] = None
+                path.append((successor, iter(graph[successor])))
+            elif successor in open_names:
+                low[name] = min(low[name], index[successor])
+
+
+def _close(open_names: dict[str, None], name: str) -> tuple[str, ...]:
+    """Take ``name`` and everything opened after it out of ``open_names``."""
+    group = []
+    while True:
+        last, _ = open_names.popitem()
+        group.append(last)
+        if last == name:
+            return tuple(group)
+
+
+def _shortest_cycle(graph: Graph, start: str, allowed: set[str]) -> tuple[str, ...]:
+    """Return the shortest way from ``start`` back to itself within a component."""
+    came_from: dict[str, str] = {}
+    frontier = [start]
+    while frontier:
+        reached = []
+        for name in frontier:
+            for other in graph[name]:
+                if other == start:
+                    return _way_back(came_from, start, name)
+                if other in allowed and other not in came_from:
+                    came_from[other] = name
+                    reached.append(other)
+        frontier = reached
+    return (start,)
+
+
+def _way_back(came_from: Mapping[str, str], start: str, last: str) -> tuple[str, ...]:
+    way = [last]
+    while way[-1] != start:
+        way.append(came_from[way[-1]])
+    return tuple(reversed(way))
