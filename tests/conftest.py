@@ -1,0 +1,81 @@
+"""What every test process gets: a DDS domain of its own, and honest skips where ROS is absent."""
+
+from __future__ import annotations
+
+import fcntl
+import importlib.util
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TextIO
+
+import pytest
+
+TESTS_WITH_ROS = Path(__file__).parent / "ros"
+NO_ROS = "rclpy cannot be imported"
+# Domain 0 is where people's robots are; above 101 the ports meet Linux' ephemeral ones.
+DOMAIN_IDS = range(1, 102)
+
+
+def _may_skip() -> bool:
+    """Tell whether tests with ROS may be left out: never in CI, where green must mean tested."""
+    return importlib.util.find_spec("rclpy") is None and os.environ.get("CI") != "true"
+
+
+class _SkippedModule(pytest.Module):
+    """A test file that is reported as skipped without being imported."""
+
+    def collect(self) -> list[pytest.Item | pytest.Collector]:
+        pytest.skip(NO_ROS, allow_module_level=True)
+
+
+def pytest_pycollect_makemodule(
+    module_path: Path, parent: pytest.Collector
+) -> pytest.Module | None:
+    if _may_skip() and module_path.is_relative_to(TESTS_WITH_ROS):
+        return _SkippedModule.from_parent(parent, path=module_path)
+    return None
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    may_skip = _may_skip()
+    for item in items:
+        if item.path.is_relative_to(TESTS_WITH_ROS):
+            item.add_marker(pytest.mark.ros)
+        if may_skip and item.get_closest_marker("ros"):
+            item.add_marker(pytest.mark.skip(reason=NO_ROS))
+
+
+def _hold_domain_id() -> tuple[int, TextIO]:
+    """Take a domain id that no other test process on this machine has.
+
+    The lock lasts as long as the returned file is open, however the process ends.
+    """
+    locks = Path(tempfile.gettempdir()) / f"ros2-composer-domain-ids-{os.getuid()}"
+    locks.mkdir(exist_ok=True)
+    # Processes started one after another begin in different places: what a killed one left on
+    # the network does not meet the next.
+    start = os.getpid() % len(DOMAIN_IDS)
+    for domain_id in (*DOMAIN_IDS[start:], *DOMAIN_IDS[:start]):
+        lock = (locks / str(domain_id)).open("w", encoding="ascii")
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.close()
+        else:
+            return domain_id, lock
+    pytest.exit(f"all {len(DOMAIN_IDS)} domain ids are taken by other test processes", 3)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def ros_domain_id() -> Iterator[int]:
+    """The domain id of this test process, set for it and for every process it starts."""
+    domain_id, lock = _hold_domain_id()
+    with pytest.MonkeyPatch.context() as environment, lock:
+        environment.setenv("ROS_DOMAIN_ID", str(domain_id))
+        environment.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        if "AMENT_PREFIX_PATH" not in os.environ:  # the wheels do not set it, a sourced ROS does
+            environment.setenv("AMENT_PREFIX_PATH", sys.prefix)
+        yield domain_id
