@@ -6,7 +6,8 @@ Policies and values are spelled as rclpy spells them; durations are in milliseco
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 
 
@@ -50,3 +51,113 @@ class QosProfile:
     lifespan_ms: float | None = None
     liveliness: Liveliness = Liveliness.AUTOMATIC
     liveliness_lease_duration_ms: float | None = None
+
+
+#: The profiles that can be named without being declared.
+#:
+#: ``sensor_data``, ``services_default`` and ``parameters`` are those of rmw/qos_profiles.h.
+#: ``command`` and ``state`` are the other two patterns of ROS 2 practice: orders that must arrive,
+#: and a latest value that late joiners get. ``system_default`` leaves the choice to the middleware
+#: in ROS; a declared system says what it means, so here it is ROS's own default for topics.
+PRESETS: Mapping[str, QosProfile] = {
+    "sensor_data": QosProfile(depth=5, reliability=Reliability.BEST_EFFORT),
+    "command": QosProfile(),
+    "state": QosProfile(depth=1, durability=Durability.TRANSIENT_LOCAL),
+    "services_default": QosProfile(),
+    "parameters": QosProfile(depth=1000),
+    "system_default": QosProfile(),
+}
+
+#: The names of the policies, as they are written in YAML.
+POLICIES: tuple[str, ...] = tuple(policy.name for policy in fields(QosProfile))
+
+_VALUES: Mapping[str, type[StrEnum]] = {
+    "history": History,
+    "reliability": Reliability,
+    "durability": Durability,
+    "liveliness": Liveliness,
+}
+
+
+def override(profile: QosProfile, policies: Mapping[str, str | int | float | None]) -> QosProfile:
+    """Return ``profile`` with the given policies changed; the rest stays as it is.
+
+    Raises ValueError for a policy or a value that does not exist.
+    """
+    for name in policies:
+        if name not in POLICIES:
+            raise ValueError(f"there is no policy '{name}'")
+    changes = {
+        name: _VALUES[name](value) if name in _VALUES else value for name, value in policies.items()
+    }
+    return replace(profile, **changes)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, slots=True)
+class Incompatibility:
+    """A policy in which an offer is weaker than a request, so that the two ends never match."""
+
+    policy: str
+    offered: str
+    requested: str
+    reason: str
+
+
+def incompatibilities(offered: QosProfile, requested: QosProfile) -> tuple[Incompatibility, ...]:
+    """Return every policy that keeps a publisher and a subscription (or a server and a client)
+    apart; none when they match.
+
+    The rule is that of DDS (OMG DDS 1.4, 2.2.3) as ``rmw_qos_profile_check_compatible`` states it:
+    the offer must be at least as strong as the request. History, depth and lifespan never matter.
+    """
+    return tuple(_incompatibilities(offered, requested))
+
+
+def _incompatibilities(offered: QosProfile, requested: QosProfile) -> Iterator[Incompatibility]:
+    if (offered.reliability, requested.reliability) == (
+        Reliability.BEST_EFFORT,
+        Reliability.RELIABLE,
+    ):
+        reason = "the publisher does not send lost messages again"
+        yield _incompatibility("reliability", offered.reliability, requested.reliability, reason)
+    if (offered.durability, requested.durability) == (
+        Durability.VOLATILE,
+        Durability.TRANSIENT_LOCAL,
+    ):
+        reason = "the publisher keeps nothing for late joiners"
+        yield _incompatibility("durability", offered.durability, requested.durability, reason)
+    if _is_longer(offered.deadline_ms, requested.deadline_ms):
+        reason = "the publisher promises messages less often than the subscription asks for"
+        yield _incompatibility("deadline_ms", offered.deadline_ms, requested.deadline_ms, reason)
+    if (offered.liveliness, requested.liveliness) == (
+        Liveliness.AUTOMATIC,
+        Liveliness.MANUAL_BY_TOPIC,
+    ):
+        reason = "the publisher does not assert its liveliness by hand"
+        yield _incompatibility("liveliness", offered.liveliness, requested.liveliness, reason)
+    if _is_longer(offered.liveliness_lease_duration_ms, requested.liveliness_lease_duration_ms):
+        reason = "the publisher may be silent for longer than the subscription allows"
+        yield _incompatibility(
+            "liveliness_lease_duration_ms",
+            offered.liveliness_lease_duration_ms,
+            requested.liveliness_lease_duration_ms,
+            reason,
+        )
+
+
+def _is_longer(offered_ms: float | None, requested_ms: float | None) -> bool:
+    if requested_ms is None:
+        return False
+    return offered_ms is None or offered_ms > requested_ms
+
+
+def _incompatibility(
+    policy: str, offered: str | float | None, requested: str | float | None, reason: str
+) -> Incompatibility:
+    return Incompatibility(policy, _shown(offered), _shown(requested), reason)
+
+
+def _shown(value: str | float | None) -> str:
+    if value is None:
+        return "no limit"
+    return value if isinstance(value, str) else f"{value:g} ms"

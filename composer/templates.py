@@ -1,13 +1,30 @@
-"""Values that are worked out at run time: constants, ``{expressions}``, text and maps of them."""
+"""Values that are worked out at run time: constants, ``{expressions}``, text and maps of them.
+
+In a text ``{expression}`` is replaced by its value and ``{expression:.2f}`` by its value in a
+format of Python's mini-language (flags, at most two digits of width and precision, one type
+letter); ``{{`` and ``}}`` are braces. A text that is nothing but one ``{expression}`` keeps the
+type of the value. A text with a ``${variable}`` that has no value yet is left alone.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
-from composer.expressions import Expression
+from composer import tree
+from composer.expressions import (
+    EvaluationError,
+    Expression,
+    ExpressionError,
+    compile_expression,
+)
 from composer.source import Located, Span
-from composer.tree import ScalarValue
+from composer.tree import ScalarValue, Tree
+
+_FORMAT = re.compile(r"[<>^]?[-+ ]?#?0?\d{0,2},?(\.\d{1,2})?[bdeEfFgGoxX%s]?", re.ASCII)
+_FORMAT_HINT = "a format is like .2f, 5d, >10 or x"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +49,7 @@ class Formatted:
 
     expression: Expression
     format: str
+    span: Span = field(compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,3 +77,175 @@ class Items:
 
 
 Template: TypeAlias = "Constant | Computed | Text | Record | Items"
+
+
+@dataclass(frozen=True, slots=True)
+class TemplateProblem:
+    """What is wrong in a template as it is written."""
+
+    message: str
+    span: Span
+    hint: str | None = None
+
+
+def compile_template(value: Tree) -> tuple[Template | None, list[TemplateProblem]]:
+    """Return the template that ``value`` describes, or None and all that is wrong with it."""
+    problems: list[TemplateProblem] = []
+    template = _compile(value, problems)
+    return (None, problems) if problems else (template, [])
+
+
+def evaluate(template: Template, scope: Mapping[str, Any]) -> Any:
+    """Return the value of the template with the names in ``scope``: a Record becomes a dict, Items
+    a list. Raises EvaluationError."""
+    match template:
+        case Constant(value=value):
+            return value
+        case Computed(expression=expression):
+            return expression.evaluate(scope)
+        case Text(parts=parts):
+            return "".join(_text(part, scope) for part in parts)
+        case Record(fields=fields):
+            return {name.value: evaluate(content, scope) for name, content in fields}
+        case Items(items=items):
+            return [evaluate(item, scope) for item in items]
+
+
+def expressions_in(template: Template) -> Iterator[tuple[Expression, Span]]:
+    """Yield every expression of the template with the place of its text (without braces)."""
+    match template:
+        case Computed(expression=expression, span=span):
+            yield expression, span
+        case Text(parts=parts):
+            for part in parts:
+                if isinstance(part, Formatted):
+                    yield part.expression, part.span
+        case Record(fields=fields):
+            for _, content in fields:
+                yield from expressions_in(content)
+        case Items(items=items):
+            for item in items:
+                yield from expressions_in(item)
+
+
+def _text(part: str | Formatted, scope: Mapping[str, Any]) -> str:
+    if isinstance(part, str):
+        return part
+    value = part.expression.evaluate(scope)
+    if not part.format:
+        return str(value)
+    try:
+        return format(value, part.format)
+    except (TypeError, ValueError, OverflowError):
+        kind = type(value).__name__
+        message = f"'{part.expression}': a {kind} cannot be written as '{part.format}'"
+        raise EvaluationError(message) from None
+
+
+def _compile(value: Tree, problems: list[TemplateProblem]) -> Template:
+    match value:
+        case tree.Mapping():
+            fields = tuple(
+                (Located(entry.name, entry.key.span), _compile(entry.value, problems))
+                for entry in value
+            )
+            return Record(fields, value.span)
+        case tree.Sequence():
+            return Items(tuple(_compile(item, problems) for item in value.items), value.span)
+        case tree.Scalar(value=str() as text) if "${" not in text:
+            return _compile_text(value, text, problems)
+        case tree.Scalar():
+            return Constant(value.value, value.span)
+
+
+def _compile_text(scalar: tree.Scalar, text: str, problems: list[TemplateProblem]) -> Template:
+    parts: list[str | Formatted] = []
+    for offset, piece in _pieces(text):
+        if piece in ("{{", "}}"):
+            parts.append(piece[0])
+        elif piece.startswith("{"):
+            parts.extend(_compile_braces(scalar, offset, piece, problems))
+        elif piece == "}":
+            span = scalar.part(offset, 1)
+            problems.append(TemplateProblem("'}' closes nothing", span, "write '}}' for a brace"))
+        else:
+            parts.append(piece)
+    match parts:
+        case []:
+            return Constant(text, scalar.span)
+        case [Formatted(expression=expression, format="", span=span)]:
+            return Computed(expression, span)
+        case _ if any(isinstance(part, Formatted) for part in parts):
+            return Text(tuple(parts), scalar.span)
+        case _:
+            return Constant("".join(str(part) for part in parts), scalar.span)
+
+
+def _pieces(text: str) -> Iterator[tuple[int, str]]:
+    """Yield offset and text of: plain stretches, ``{{``, ``}}``, ``{...}``, a lone brace."""
+    offset = 0
+    while offset < len(text):
+        end = _piece_end(text, offset)
+        yield offset, text[offset:end]
+        offset = end
+
+
+def _piece_end(text: str, start: int) -> int:
+    if text.startswith(("{{", "}}"), start):
+        return start + 2
+    if text[start] == "{":
+        return _closing_brace(text, start) + 1
+    if text[start] == "}":
+        return start + 1
+    return next((at for at in range(start, len(text)) if text[at] in "{}"), len(text))
+
+
+def _closing_brace(text: str, start: int) -> int:
+    """Return where the brace at ``start`` is closed, quotes respected; the end where it is not."""
+    quote = ""
+    for at in range(start + 1, len(text)):
+        character = text[at]
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "'\"":
+            quote = character
+        elif character == "}":
+            return at
+    return len(text)
+
+
+def _compile_braces(
+    scalar: tree.Scalar, offset: int, piece: str, problems: list[TemplateProblem]
+) -> list[str | Formatted]:
+    if not piece.endswith("}"):
+        span = scalar.part(offset, 1)
+        problems.append(TemplateProblem("'{' is not closed", span, "write '{{' for a brace"))
+        return []
+    inside = piece[1:-1]
+    source, layout = _split_format(inside)
+    source_offset = offset + 1 + len(source) - len(source.lstrip())
+    source = source.strip()
+    if layout is not None and not (layout and _FORMAT.fullmatch(layout)):
+        span = scalar.part(offset + piece.index(":" + layout) + 1, len(layout))
+        problems.append(TemplateProblem(f"'{layout}' is not a format", span, _FORMAT_HINT))
+        return []
+    try:
+        expression = compile_expression(source)
+    except ExpressionError as error:
+        span = scalar.part(source_offset + error.offset, error.length)
+        problems.append(TemplateProblem(error.message, span, error.hint))
+        return []
+    return [Formatted(expression, layout or "", scalar.part(source_offset, len(source)))]
+
+
+def _split_format(inside: str) -> tuple[str, str | None]:
+    """Return the expression and the format behind the first colon that is not in quotes."""
+    quote = ""
+    for at, character in enumerate(inside):
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "'\"":
+            quote = character
+        elif character == ":":
+            return inside[:at], inside[at + 1 :]
+    return inside, None

@@ -1,0 +1,29 @@
+"""The language of ``{...}`` and ``when:``, small enough to be safe and compiled to be fast.
+
+An expression reads fields (``message.twist.linear.x``, ``message.poses[-1].pose``), compares,
+combines with ``and``, ``or``, ``not``, calculates with ``+ - * / // %`` on numbers, chooses with
+``a if condition else b``, tests ``x in ('a', 'b')`` and calls the functions in
+``operations.FUNCTIONS``. There is nothing else: what is not listed is refused when it is compiled.
+
+How safety is kept: ``tokens`` lets through ASCII names, numbers, texts and a few operators only;
+``compiler`` builds a *new* syntax tree that calls nothing but the functions of ``operations``;
+those look at the type of a value before they touch it and bound every number.
+"""
+
+from composer.expressions.compiler import MAXIMUM_LENGTH, MAXIMUM_NODES, compile_expression
+from composer.expressions.errors import EvaluationError, ExpressionError
+from composer.expressions.expression import Expression, FieldPath, Result
+from composer.expressions.operations import CONSTANTS, FUNCTIONS
+
+__all__ = [
+    "CONSTANTS",
+    "FUNCTIONS",
+    "MAXIMUM_LENGTH",
+    "MAXIMUM_NODES",
+    "EvaluationError",
+    "Expression",
+    "ExpressionError",
+    "FieldPath",
+    "Result",
+    "compile_expression",
+]

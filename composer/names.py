@@ -1,0 +1,136 @@
+"""ROS names: which are valid, and what they become in a node.
+
+The rules are those of design.ros2.org "Topic and Service name mapping" as rcl and rmw check them
+(``rcl_validate_topic_name``, ``rmw_validate_namespace``, ``rmw_validate_node_name``). Functions that
+end in ``_problem`` return None for a valid name, else what is wrong with it, to be read after the
+name ("contains a space").
+"""
+
+from __future__ import annotations
+
+import re
+
+#: rmw's limits in characters: what DDS leaves of its 255 after the prefixes ROS adds.
+MAXIMUM_NODE_NAME_LENGTH = 255
+MAXIMUM_NAMESPACE_LENGTH = 245
+MAXIMUM_TOPIC_NAME_LENGTH = 247
+
+_NAME_CHARACTER = re.compile(r"[A-Za-z0-9_]", re.ASCII)
+_SUBSTITUTION = re.compile(r"\{([^{}]*)\}")
+
+
+def node_name_problem(name: str) -> str | None:
+    """Return what keeps ``name`` from being a node's base name, or None."""
+    return (
+        _empty_problem(name)
+        or _character_problem(name)
+        or ("begins with a digit" if name[0].isdigit() else None)
+        or _length_problem(name, MAXIMUM_NODE_NAME_LENGTH)
+    )
+
+
+def namespace_problem(name: str) -> str | None:
+    """Return what keeps ``name`` from being a namespace, absolute or relative, or None."""
+    if name == "/":
+        return None
+    return (
+        _empty_problem(name)
+        or ("begins with '~', which has no meaning in a namespace" if name[0] == "~" else None)
+        or _path_problem(name.removeprefix("/"))
+        or _length_problem(name, MAXIMUM_NAMESPACE_LENGTH)
+    )
+
+
+def topic_name_problem(name: str) -> str | None:
+    """Return what keeps ``name`` from naming a topic, service or action, or None.
+
+    The name may be relative (``scan``), private (``~/scan``, ``~``) or absolute (``/scan``).
+    """
+    if name == "~":
+        return None
+    return (
+        _empty_problem(name)
+        or ("has no '/' behind '~'" if re.match(r"~[^/]", name) else None)
+        or _path_problem(name.removeprefix("~").removeprefix("/"))
+        or _length_problem(name, MAXIMUM_TOPIC_NAME_LENGTH)
+    )
+
+
+def parameter_name_problem(name: str) -> str | None:
+    """Return what keeps ``name`` from being a parameter's name, or None.
+
+    rcl takes any text that is not empty; this asks for words joined by dots, since parameter
+    files and expressions cannot name anything else.
+    """
+    if not name:
+        return "is empty"
+    for token in name.split("."):
+        if not token:
+            return "has an empty part between dots"
+        problem = _character_problem(token) or (
+            f"has a part that begins with a digit: '{token}'" if token[0].isdigit() else None
+        )
+        if problem is not None:
+            return problem
+    return None
+
+
+def expand_name(name: str, node_name: str, namespace: str) -> str:
+    """Return the absolute name that ``name`` has in a node, as ``rcl_expand_topic_name`` does.
+
+    ``{node}``, ``{ns}`` and ``{namespace}`` are not substituted: braces are expressions here.
+    """
+    if name.startswith("/"):
+        return name
+    if name == "~" or name.startswith("~/"):
+        return join(join(namespace, node_name), name[2:])
+    return join(namespace, name)
+
+
+def join(namespace: str, relative: str) -> str:
+    """Return ``relative`` below ``namespace``; an absolute name is returned as it is."""
+    if relative.startswith("/"):
+        return relative
+    base = "/" + namespace.strip("/")
+    return f"{base.rstrip('/')}/{relative}" if relative else base
+
+
+def is_hidden(name: str) -> bool:
+    """Say whether ROS tools leave ``name`` out unless asked: a part begins with an underscore."""
+    return any(token.startswith("_") for token in name.split("/"))
+
+
+def _empty_problem(name: str) -> str | None:
+    return "is empty" if not name else None
+
+
+def _length_problem(name: str, maximum: int) -> str | None:
+    return f"has {len(name)} characters, more than {maximum}" if len(name) > maximum else None
+
+
+def _character_problem(text: str) -> str | None:
+    for character in text:
+        if not _NAME_CHARACTER.match(character):
+            return f"contains {_shown(character)}; letters, digits and '_' are allowed"
+    return None
+
+
+def _path_problem(path: str) -> str | None:
+    """Judge the parts between slashes."""
+    if path.endswith("/"):
+        return "ends with '/'"
+    for token in path.split("/"):
+        if not token:
+            return "has nothing between two '/'"
+        problem = _character_problem(token)
+        if problem is not None:
+            return problem
+        if token[0].isdigit():
+            return f"has a part that begins with a digit: '{token}'"
+    return "contains '__'" if "__" in path else None
+
+
+def _shown(character: str) -> str:
+    if character == " ":
+        return "a space"
+    return f"'{character}'" if character.isprintable() else f"U+{ord(character):04X}"
