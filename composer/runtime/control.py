@@ -1,0 +1,161 @@
+"""The lifecycle of nodes in other processes, whoever wrote them: for the command line.
+
+Everything goes through the standard services (lifecycle_msgs), so hand-written nodes answer as
+ours do. A transition is sent only when the node says it is legal: sent at the wrong moment it would
+end the process of a hand-written rclpy node.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from lifecycle_msgs.msg import Transition as TransitionMessage
+from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
+
+from composer.diagnostics import suggestion
+from composer.runtime.session import MISSING_S, Deadline, NoAnswer, Session
+
+_STATE_SERVICE = "/get_state"
+_STATE_TYPE = "lifecycle_msgs/srv/GetState"
+
+
+class ControlError(Exception):
+    """Something asked of a lifecycle node came to nothing; ``hint`` says what would not."""
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+class UnknownNode(ControlError):
+    """No lifecycle node of that name, or more than one, is in the graph."""
+
+
+class TransitionRefused(ControlError):
+    """The transition is not legal in the node's state, or the node did not carry it out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """A transition that is legal now and the state it leads through."""
+
+    id: int
+    label: str
+    goal: str
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """The primary states before and after a transition."""
+
+    node: str
+    before: str
+    after: str
+
+
+class Control:
+    """Asks lifecycle nodes things, all within one time limit."""
+
+    def __init__(self, session: Session, deadline: Deadline) -> None:
+        self._session = session
+        self._deadline = deadline
+
+    def nodes(self) -> tuple[str, ...]:
+        """Return the full names of all lifecycle nodes, once discovery stands still."""
+        return self._session.wait_until_still(self._known, self._deadline)
+
+    def find(self, name: str) -> str:
+        """Return the full name of the node that ``name`` means.
+
+        That is a full name, or the last part (or parts) of just one. Raises UnknownNode.
+        """
+        patience = Deadline(min(MISSING_S, self._deadline.left_s))
+        found = self._session.wait_for(lambda: _matches(name, self._known()) or None, patience)
+        if found is None:
+            raise UnknownNode(
+                f"no lifecycle node is called '{name}'", _nodes_there(name, self._known())
+            )
+        if name not in found:  # a part of a name: are there others with the same part?
+            found = _matches(name, self.nodes())
+        if len(found) > 1:
+            raise UnknownNode(f"'{name}' is more than one node", "say which: " + ", ".join(found))
+        return found[0]
+
+    def state(self, node: str) -> str:
+        """Return the label of the node's state. Raises NoAnswer."""
+        response = self._call(node, GetState, "get_state", GetState.Request())
+        return str(response.current_state.label)
+
+    def transitions(self, node: str) -> tuple[Transition, ...]:
+        """Return what is legal now. Raises NoAnswer."""
+        request = GetAvailableTransitions.Request()
+        response = self._call(node, GetAvailableTransitions, "get_available_transitions", request)
+        return tuple(
+            Transition(item.transition.id, item.transition.label, item.goal_state.label)
+            for item in response.available_transitions
+        )
+
+    def change(self, node: str, label: str) -> Change:
+        """Take the node through the transition ``label``.
+
+        Raises TransitionRefused, with the state and what is legal in it; NoAnswer.
+        """
+        before = self.state(node)
+        legal = self.transitions(node)
+        wanted = next((transition for transition in legal if transition.label == label), None)
+        if wanted is None:
+            raise TransitionRefused(
+                f"'{label}' is not possible: {node} is {before}", _possible(legal)
+            )
+        # With the label, a state that has changed since is a refusal and not a fault in the node.
+        message = TransitionMessage(id=wanted.id, label=wanted.label)
+        request = ChangeState.Request(transition=message)
+        response = self._call(node, ChangeState, "change_state", request)
+        after = self.state(node)
+        if not response.success:
+            raise TransitionRefused(
+                f"{node} refused '{label}': it is {after} now", "its log says why"
+            )
+        return Change(node, before, after)
+
+    def _known(self) -> tuple[str, ...]:
+        services = self._session.node.get_service_names_and_types()
+        return tuple(
+            sorted(
+                name.removesuffix(_STATE_SERVICE)
+                for name, types in services
+                if name.endswith(_STATE_SERVICE) and _STATE_TYPE in types
+            )
+        )
+
+    def _call(self, node: str, service: Any, name: str, request: Any) -> Any:
+        try:
+            return self._session.call(service, f"{node}/{name}", request, self._deadline)
+        except NoAnswer as error:
+            raise ControlError(
+                f"{node} did not answer within {self._deadline.timeout_s:g} s",
+                f"{error}; its process may be busy or gone. --timeout gives it longer",
+            ) from error
+
+
+def _matches(name: str, known: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the nodes with that full name, else those whose name ends with it."""
+    if name in known:
+        return (name,)
+    return tuple(node for node in known if node.endswith(f"/{name.lstrip('/')}"))
+
+
+def _nodes_there(name: str, known: tuple[str, ...]) -> str:
+    if not known:
+        return (
+            "no lifecycle node was found at all: is the system running, with the same"
+            " ROS_DOMAIN_ID and discovery range?"
+        )
+    last_parts = {node.rpartition("/")[2]: node for node in known}
+    return suggestion(name.rpartition("/")[2], last_parts) or ", ".join(known)
+
+
+def _possible(legal: tuple[Transition, ...]) -> str:
+    names = ", ".join(dict.fromkeys(transition.label for transition in legal))
+    return f"possible now: {names or 'nothing, this state is final'}"
