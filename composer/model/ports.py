@@ -142,7 +142,8 @@ class Port:
     qos: Qos
     span: Span = field(compare=False)
     reactions: tuple[tuple[Event, Reaction], ...] = ()
-    timeout_ms: Located[float] | None = None  # clients
+    timeout_ms: Located[float] | None = None  # clients: for the server and its (first) answer
+    result_timeout_ms: Located[float] | None = None  # action clients; None waits for ever
     accept: Expression | None = None  # action servers: which goals are taken
     accept_span: Span | None = field(default=None, compare=False)
     feedback: FeedbackSteps | None = None  # action servers
