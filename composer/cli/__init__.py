@@ -20,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns the exit code; nothing is raised.
     """
-    from composer.cli.app import app  # noqa: PLC0415 - building the commands takes a moment
+    from composer.cli.app import app
 
     try:
         app(args=arguments, prog_name="compose")
@@ -45,7 +45,7 @@ def _exit_code(end: SystemExit) -> int:
 def _internal_error(error: Exception) -> int:
     """Say shortly that this is our fault; the traceback is for who asks for it."""
     if os.environ.get("COMPOSE_DEBUG"):
-        import traceback  # noqa: PLC0415
+        import traceback
 
         traceback.print_exception(error)
     print(f"compose: internal error: {type(error).__name__}: {error}", file=sys.stderr)
@@ -59,7 +59,7 @@ def _internal_error(error: Exception) -> int:
 
 def _flush() -> None:
     """Write out what is buffered now: at interpreter exit a closed pipe would be a traceback."""
-    from composer.cli.terminal import drop_stdout  # noqa: PLC0415
+    from composer.cli.terminal import drop_stdout
 
     try:
         sys.stdout.flush()

@@ -7,24 +7,9 @@ from typing import Annotated
 
 import typer
 
+from composer.cli import lifecycle
+from composer.cli.help import examples
 from composer.cli.terminal import write
-
-HELP = """Declare, prove and run a ROS 2 system.
-
-YAML says what the system is; compose checks it before anything starts, runs it as real lifecycle
-nodes in one process, and lets any ROS 2 tool see it.
-
-\b
-Examples:
-  compose run pipeline                        run an example system
-  compose run systems/pipeline.yaml           validate, bring up, keep up, tear down
-  compose validate systems nodes              every finding in one run
-  compose lifecycle set planner deactivate    from another terminal
-  compose graph systems/pipeline.yaml         a diagram, as Mermaid text
-
-\b
-Exit codes: 0 clean, 1 findings or a node failed, 2 usage, 3 internal error.
-"""
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -36,7 +21,7 @@ app = typer.Typer(
 
 def _show_version(asked: bool) -> None:
     if asked:
-        from composer.cli.version import composer_version  # noqa: PLC0415 - only when asked for
+        from composer.cli.version import composer_version
 
         write(f"compose {composer_version()}")
         raise typer.Exit
@@ -47,7 +32,15 @@ def _set_debug(asked: bool) -> None:
         os.environ["COMPOSE_DEBUG"] = "1"
 
 
-@app.callback(help=HELP)
+@app.callback(
+    epilog=examples(
+        "compose run pipeline                        run an example system",
+        "compose run systems/pipeline.yaml           validate, bring up, keep up, tear down",
+        "compose validate systems nodes              every finding in one run",
+        "compose lifecycle set planner deactivate    from another terminal",
+        "compose graph systems/pipeline.yaml         a diagram, as Mermaid text",
+    )
+)
 def compose(
     version: Annotated[
         bool,
@@ -64,4 +57,13 @@ def compose(
         ),
     ] = False,
 ) -> None:
-    """Take what stands before the command; the callbacks of the options do the work."""
+    """Declare, prove and run a ROS 2 system.
+
+    YAML says what the system is; compose checks it before anything starts, runs it as real
+    lifecycle nodes in one process, and lets any ROS 2 tool see it.
+
+    Exit codes: 0 clean, 1 findings or a node failed, 2 usage, 3 internal error.
+    """
+
+
+app.add_typer(lifecycle.app, name="lifecycle")

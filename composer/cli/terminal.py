@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from typing import NoReturn, TextIO
 
 #: What a shell reports for a program that wrote into a closed pipe (128 + SIGPIPE).
@@ -30,6 +31,15 @@ def write_raw(text: str) -> None:
 def say(text: str) -> None:
     """Print ``text``, which is for the person and no data, to stderr."""
     print(text, file=sys.stderr, flush=True)
+
+
+def columns(rows: Sequence[Sequence[str]]) -> str:
+    """Return the rows as lines with their cells aligned, two spaces apart."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    )
 
 
 def use_color(stream: TextIO) -> bool:

@@ -7,32 +7,25 @@ end the process of a hand-written rclpy node.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from lifecycle_msgs.msg import Transition as TransitionMessage
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 
-from composer.diagnostics import suggestion
-from composer.runtime.session import MISSING_S, Deadline, NoAnswer, Session
+from composer.diagnostics import nearest
+from composer.runtime.session import MISSING_S, Deadline, NoAnswer, RosError, Session
 
 _STATE_SERVICE = "/get_state"
 _STATE_TYPE = "lifecycle_msgs/srv/GetState"
 
 
-class ControlError(Exception):
-    """Something asked of a lifecycle node came to nothing; ``hint`` says what would not."""
-
-    def __init__(self, message: str, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.hint = hint
-
-
-class UnknownNode(ControlError):
+class UnknownNode(RosError):
     """No lifecycle node of that name, or more than one, is in the graph."""
 
 
-class TransitionRefused(ControlError):
+class TransitionRefused(RosError):
     """The transition is not legal in the node's state, or the node did not carry it out."""
 
 
@@ -87,6 +80,15 @@ class Control:
         response = self._call(node, GetState, "get_state", GetState.Request())
         return str(response.current_state.label)
 
+    def states(self, nodes: Iterable[str]) -> dict[str, str | None]:
+        """Return the label of each node's state; None for a node that did not answer in time."""
+        services = {f"{node}/get_state": node for node in nodes}
+        responses = self._session.call_each(GetState, services, GetState.Request(), self._deadline)
+        return {
+            node: None if response is None else str(response.current_state.label)
+            for node, response in zip(services.values(), responses.values(), strict=True)
+        }
+
     def transitions(self, node: str) -> tuple[Transition, ...]:
         """Return what is legal now. Raises NoAnswer."""
         request = GetAvailableTransitions.Request()
@@ -133,7 +135,7 @@ class Control:
         try:
             return self._session.call(service, f"{node}/{name}", request, self._deadline)
         except NoAnswer as error:
-            raise ControlError(
+            raise NoAnswer(
                 f"{node} did not answer within {self._deadline.timeout_s:g} s",
                 f"{error}; its process may be busy or gone. --timeout gives it longer",
             ) from error
@@ -143,7 +145,9 @@ def _matches(name: str, known: tuple[str, ...]) -> tuple[str, ...]:
     """Return the nodes with that full name, else those whose name ends with it."""
     if name in known:
         return (name,)
-    return tuple(node for node in known if node.endswith(f"/{name.lstrip('/')}"))
+    if name.startswith("/"):
+        return ()
+    return tuple(node for node in known if node.endswith(f"/{name}"))
 
 
 def _nodes_there(name: str, known: tuple[str, ...]) -> str:
@@ -152,8 +156,11 @@ def _nodes_there(name: str, known: tuple[str, ...]) -> str:
             "no lifecycle node was found at all: is the system running, with the same"
             " ROS_DOMAIN_ID and discovery range?"
         )
-    last_parts = {node.rpartition("/")[2]: node for node in known}
-    return suggestion(name.rpartition("/")[2], last_parts) or ", ".join(known)
+    by_last_part = {node.rpartition("/")[2]: node for node in known}
+    close = nearest(name.rpartition("/")[2], by_last_part)
+    if close is not None:
+        return f"did you mean '{by_last_part[close]}'?"
+    return "there are: " + ", ".join(known)
 
 
 def _possible(legal: tuple[Transition, ...]) -> str:

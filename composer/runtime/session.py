@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
@@ -28,7 +28,15 @@ QUIET_S = 0.5
 MISSING_S = 3.0
 
 
-class NoAnswer(Exception):
+class RosError(Exception):
+    """Something asked of the ROS graph came to nothing; ``hint`` says what would not."""
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+class NoAnswer(RosError):
     """A node or a service of it did not do its part within the time limit."""
 
 
@@ -80,13 +88,17 @@ class Session:
         self.node.destroy_node()
         self.context.try_shutdown()
 
+    def spin_once(self, deadline: Deadline) -> None:
+        """Wait for something to come in, for a moment and not beyond the deadline."""
+        self._executor.spin_once(timeout_sec=min(_STEP_S, deadline.left_s))
+
     def wait_for(self, look: Callable[[], T | None], deadline: Deadline) -> T | None:
         """Return what ``look`` finds as soon as it finds something; None at the deadline."""
         while True:
             found = look()
             if found is not None or deadline.passed:
                 return found
-            self._executor.spin_once(timeout_sec=min(_STEP_S, deadline.left_s))
+            self.spin_once(deadline)
 
     def wait_until_still(self, look: Callable[[], H], deadline: Deadline) -> H:
         """Return what ``look`` finds once it stays the same for a moment, or at the deadline.
@@ -96,7 +108,7 @@ class Session:
         seen = look()
         changed_s = time.monotonic()
         while not deadline.passed:
-            self._executor.spin_once(timeout_sec=min(_STEP_S, deadline.left_s))
+            self.spin_once(deadline)
             now = look()
             if now != seen:
                 seen, changed_s = now, time.monotonic()
@@ -107,13 +119,39 @@ class Session:
 
     def call(self, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
         """Call a service and return its response. Raises NoAnswer at the deadline."""
-        client: Client = self.node.create_client(service, name)
+        response = self.call_each(service, [name], request, deadline)[name]
+        if response is None:
+            raise NoAnswer(f"service '{name}' did not answer within {deadline.timeout_s:g} s")
+        return response
+
+    def call_each(
+        self, service: Any, names: Iterable[str], request: Any, deadline: Deadline
+    ) -> dict[str, Any]:
+        """Call services of one type at once; None for those without an answer at the deadline."""
+        calls = {name: _Call(self.node.create_client(service, name)) for name in names}
         try:
-            if not self.wait_for(lambda: client.service_is_ready() or None, deadline):
-                raise NoAnswer(f"service '{name}' was not there within {deadline.timeout_s:g} s")
-            future: Future = client.call_async(request)
-            if not self.wait_for(lambda: future.done() or None, deadline):
-                raise NoAnswer(f"service '{name}' did not answer within {deadline.timeout_s:g} s")
-            return future.result()
+            open_calls = list(calls.values())
+            while open_calls and not deadline.passed:
+                open_calls = [call for call in open_calls if not call.advance(request)]
+                self.spin_once(deadline)
+            return {name: call.response for name, call in calls.items()}
         finally:
-            self.node.destroy_client(client)
+            for call in calls.values():
+                self.node.destroy_client(call.client)
+
+
+class _Call:
+    """A service call that is sent as soon as the server is there."""
+
+    def __init__(self, client: Client) -> None:
+        self.client = client
+        self.response: Any = None
+        self._future: Future | None = None
+
+    def advance(self, request: Any) -> bool:
+        """Do what can be done now; true once the response is there."""
+        if self._future is None and self.client.service_is_ready():
+            self._future = self.client.call_async(request)
+        if self._future is not None and self._future.done():
+            self.response = self._future.result()
+        return self.response is not None

@@ -1,0 +1,49 @@
+"""Commands that need ROS: what they say where it is missing, and what they share."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.failure import Failure
+
+if TYPE_CHECKING:
+    from composer.runtime.session import Deadline, Session
+
+#: How long a command waits, all in all, for other processes.
+Timeout = Annotated[
+    float,
+    typer.Option("--timeout", metavar="SECONDS", min=0.0, help="How long to wait, all in all."),
+]
+DEFAULT_TIMEOUT_S = 5.0
+
+
+def require_ros(command: str) -> None:
+    """Raise a Failure that says how to get ROS where rclpy cannot be imported."""
+    if find_spec("rclpy") is None:
+        raise Failure(
+            f"'{command}' needs ROS 2, and rclpy is not installed in this Python",
+            hint='pip install "ros2-composer[ros]"   or: source /opt/ros/jazzy/setup.bash',
+        )
+    # The ROS wheels lay a whole ROS prefix into the environment, but do not say so.
+    os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
+
+
+@contextmanager
+def ros_session(command: str, timeout_s: float) -> Iterator[tuple[Session, Deadline]]:
+    """Join the ROS graph for the length of a ``with`` block; errors of ROS become Failures."""
+    require_ros(command)
+    from composer.runtime.session import Deadline, RosError, Session
+
+    deadline = Deadline(timeout_s)
+    try:
+        with Session() as session:
+            yield session, deadline
+    except RosError as error:
+        raise Failure(str(error), hint=error.hint) from error
