@@ -114,6 +114,7 @@ class Qos:
     span: Span = field(compare=False)
     explicit: bool = True
     policy_spans: tuple[tuple[str, Span], ...] = field(default=(), compare=False)
+    known: bool = True  # False: it builds on a name that is no profile, so the values are a guess
 
     def policy_span(self, policy: str) -> Span:
         """Return where ``policy`` was decided; where the whole profile was, if nowhere closer."""
@@ -150,7 +151,7 @@ class Port:
     result: Template | None = None  # action servers
     reentrant: bool = False
     external: bool = False  # the other end is outside this system
-    required: bool = True
+    required: bool | None = None  # whether an other end must be there; None: nobody said
     description: str = ""
 
     def reaction(self, event: Event) -> Reaction | None:
