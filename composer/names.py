@@ -1,9 +1,9 @@
 """ROS names: which are valid, and what they become in a node.
 
 The rules are those of design.ros2.org "Topic and Service name mapping" as rcl and rmw check them
-(``rcl_validate_topic_name``, ``rmw_validate_namespace``, ``rmw_validate_node_name``). Functions that
-end in ``_problem`` return None for a valid name, else what is wrong with it, to be read after the
-name ("contains a space").
+(``rcl_validate_topic_name``, ``rmw_validate_namespace``, ``rmw_validate_node_name``). Functions
+that end in ``_problem`` return None for a valid name, else what is wrong with it, to be read
+after the name ("contains a space").
 """
 
 from __future__ import annotations

@@ -1,0 +1,41 @@
+"""Message, service and action definitions, without rclpy.
+
+``Interfaces.load(folders)`` knows, in this order: the interface packages among a project's sources,
+the installed ones (``AMENT_PREFIX_PATH``, then the prefix of this Python), and a snapshot of
+Jazzy's own (``jazzy.json``, made by ``tools/bundle_interfaces.py``).
+"""
+
+from composer.interfaces.catalogue import Interfaces, InvalidDefinition
+from composer.interfaces.definitions import (
+    FLOATS,
+    INTEGER_RANGES,
+    PRIMITIVES,
+    TEXTS,
+    Action,
+    Constant,
+    Field,
+    FieldType,
+    Interface,
+    Message,
+    Service,
+)
+from composer.interfaces.parser import DefinitionError, parse_definition, split_name
+
+__all__ = [
+    "FLOATS",
+    "INTEGER_RANGES",
+    "PRIMITIVES",
+    "TEXTS",
+    "Action",
+    "Constant",
+    "DefinitionError",
+    "Field",
+    "FieldType",
+    "Interface",
+    "Interfaces",
+    "InvalidDefinition",
+    "Message",
+    "Service",
+    "parse_definition",
+    "split_name",
+]

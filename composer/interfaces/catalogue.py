@@ -1,0 +1,97 @@
+"""The catalogue of interfaces: finds a definition by its name and reads it once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from composer.interfaces.definitions import Action, Interface, Message, Service
+from composer.interfaces.parser import DefinitionError, parse_definition, split_name
+from composer.interfaces.share_json import read_description
+from composer.interfaces.sources import (
+    Bundle,
+    Definition,
+    Source,
+    find_packages,
+    installed_prefixes,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class InvalidDefinition:
+    """A definition that was found but cannot be read."""
+
+    name: str
+    path: str
+    line: int
+    message: str
+
+
+class Interfaces:
+    """All interfaces known here. A definition is read when it is first asked for."""
+
+    def __init__(self, sources: Iterable[Source]) -> None:
+        self._sources = tuple(sources)
+        self._found: dict[str, Interface | InvalidDefinition | None] = {}
+
+    @classmethod
+    def load(cls, folders: Iterable[Path] = ()) -> Interfaces:
+        """Return the catalogue of the packages in ``folders``, what is installed, and the snapshot.
+
+        The first that has a definition wins: a project's own packages are about to be built and
+        installed; an installed package is what will run; the snapshot stands in where ROS is not
+        installed.
+        """
+        return cls((find_packages(folders), *installed_prefixes(), Bundle()))
+
+    def find(self, name: str) -> Message | Service | Action | None:
+        """Return the interface ``package/msg/Name`` (or srv, action); None when there is none.
+
+        None too for a definition that cannot be read: ``problem`` says why.
+        """
+        found = self._look_up(name)
+        return None if isinstance(found, InvalidDefinition) else found
+
+    def message(self, name: str) -> Message | None:
+        """Return the message ``package/msg/Name``, or None."""
+        found = self.find(name)
+        return found if isinstance(found, Message) else None
+
+    def problem(self, name: str) -> InvalidDefinition | None:
+        """Return what is wrong with the definition of ``name``, or None."""
+        found = self._look_up(name)
+        return found if isinstance(found, InvalidDefinition) else None
+
+    def packages(self) -> frozenset[str]:
+        """Return the packages that define interfaces."""
+        return frozenset().union(*(source.packages() for source in self._sources))
+
+    def names(self, folder: str) -> tuple[str, ...]:
+        """Return the names of all interfaces in ``folder`` (msg, srv or action), sorted."""
+        return tuple(sorted({name for source in self._sources for name in source.names(folder)}))
+
+    def _look_up(self, name: str) -> Interface | InvalidDefinition | None:
+        if name not in self._found:
+            self._found[name] = self._read(name)
+        return self._found[name]
+
+    def _read(self, name: str) -> Interface | InvalidDefinition | None:
+        if split_name(name) is None:
+            return None
+        for source in self._sources:
+            definition = source.read(name)
+            if definition is not None:
+                return _parse(name, definition)
+        return None
+
+
+def _parse(name: str, definition: Definition) -> Interface | InvalidDefinition:
+    try:
+        if definition.is_json:
+            return read_description(name, definition.text)
+        return parse_definition(name, definition.text)
+    except DefinitionError as error:
+        return InvalidDefinition(name, definition.path, error.line, error.message)
+    except ValueError as error:
+        return InvalidDefinition(name, definition.path, 1, str(error))

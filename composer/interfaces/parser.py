@@ -1,0 +1,256 @@
+"""Reads ``.msg``, ``.srv`` and ``.action`` text.
+
+The language is that of docs.ros.org "About ROS 2 interfaces"; where the page is silent this does
+what rosidl_adapter, ROS's own parser, does: a ``#`` begins a comment even within quotes, and a
+line with an ``=`` behind the name is a constant.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+
+from composer.interfaces.definitions import (
+    FLOATS,
+    INTEGER_RANGES,
+    PRIMITIVES,
+    TEXTS,
+    Action,
+    Constant,
+    Field,
+    FieldType,
+    Interface,
+    Message,
+    Service,
+)
+from composer.tree import Plain, ScalarValue
+
+_INTERFACE_NAME = re.compile(
+    r"(?P<package>[a-z][a-z0-9_]*)/(?P<folder>msg|srv|action)/(?P<name>[A-Z][A-Za-z0-9]*)",
+    re.ASCII,
+)
+_TYPE = re.compile(
+    r"(?P<name>[A-Za-z][A-Za-z0-9_/]*?)(?:<=(?P<string_bound>\d{1,9}))?"
+    r"(?P<array>\[(?P<limit>(?:<=)?\d{1,9})?\])?",
+    re.ASCII,
+)
+_MESSAGE_TYPE = re.compile(
+    r"(?:(?P<package>[a-z][a-z0-9_]*)/(?:msg/)?)?(?P<name>[A-Z][A-Za-z0-9]*)", re.ASCII
+)
+_FIELD_NAME = re.compile(r"(?!.*__)(?!.*_$)[a-z][a-z0-9_]*", re.ASCII)
+_CONSTANT_NAME = re.compile(r"(?!.*__)(?!.*_$)[A-Z][A-Z0-9_]*", re.ASCII)
+_SEPARATOR = "---"
+_QUOTES = ("'", '"')
+_BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
+_Lines = list[tuple[int, str]]
+
+
+class DefinitionError(Exception):
+    """A definition that ROS would not build. ``line`` counts from 1."""
+
+    def __init__(self, message: str, line: int) -> None:
+        super().__init__(message)
+        self.message = message
+        self.line = line
+
+
+def split_name(name: str) -> tuple[str, str, str] | None:
+    """Return package, folder and type of ``package/msg/Type``; None when it is no such name."""
+    match = _INTERFACE_NAME.fullmatch(name)
+    return (match["package"], match["folder"], match["name"]) if match else None
+
+
+def parse_definition(name: str, text: str) -> Interface:
+    """Return the interface ``name`` (``package/msg/Type``) that ``text`` defines.
+
+    Raises DefinitionError, and ValueError when ``name`` is not the name of an interface.
+    """
+    names = split_name(name)
+    if names is None:
+        raise ValueError(f"'{name}' is not the name of an interface")
+    package, folder, _ = names
+    parts = _parts(text)
+    wanted = {"msg": 1, "srv": 2, "action": 3}[folder]
+    if len(parts) != wanted:
+        line = len(text.splitlines()) or 1
+        message = (
+            f"a .{folder} file has {wanted - 1} lines with '{_SEPARATOR}', not {len(parts) - 1}"
+        )
+        raise DefinitionError(message, line)
+    match parts:
+        case [lines]:
+            return _message(name, package, lines)
+        case [request, response]:
+            return Service(
+                name,
+                _message(f"{name}_Request", package, request),
+                _message(f"{name}_Response", package, response),
+            )
+        case [goal, result, feedback]:
+            return Action(
+                name,
+                _message(f"{name}_Goal", package, goal),
+                _message(f"{name}_Result", package, result),
+                _message(f"{name}_Feedback", package, feedback),
+            )
+        case _:
+            raise AssertionError(folder)
+
+
+def without_comments(text: str) -> str:
+    """Return the definition with nothing in it but what it defines."""
+    return ("\n" + _SEPARATOR + "\n").join(
+        "\n".join(" ".join(line.split(None, 1)) for _, line in lines) for lines in _parts(text)
+    )
+
+
+def _parts(text: str) -> list[_Lines]:
+    """Return the lines that define something, with their numbers, between the separators."""
+    parts: list[_Lines] = [[]]
+    for number, line in enumerate(text.splitlines(), start=1):
+        content = line.partition("#")[0].replace("\t", " ").strip()
+        if content == _SEPARATOR:
+            parts.append([])
+        elif content:
+            parts[-1].append((number, content))
+    return parts
+
+
+def _message(name: str, package: str, lines: _Lines) -> Message:
+    fields: list[Field] = []
+    constants: list[Constant] = []
+    for number, line in lines:
+        try:
+            item = _member(line, package)
+        except ValueError as error:
+            raise DefinitionError(str(error), number) from None
+        known: Iterable[Field | Constant] = (*fields, *constants)
+        if any(item.name == other.name for other in known):
+            raise DefinitionError(f"'{item.name}' is defined twice", number)
+        if isinstance(item, Field):
+            fields.append(item)
+        else:
+            constants.append(item)
+    return Message(name, tuple(fields), tuple(constants))
+
+
+def _member(line: str, package: str) -> Field | Constant:
+    type_text, _, rest = line.partition(" ")
+    rest = rest.strip()
+    if not rest:
+        raise ValueError(f"'{line}' has no name behind the type")
+    type_ = _type(type_text, package)
+    if "=" in rest:
+        name, _, value = rest.partition("=")
+        return _constant(type_, name.strip(), value.strip())
+    name, _, default = rest.partition(" ")
+    if not _FIELD_NAME.fullmatch(name):
+        raise ValueError(f"'{name}' is not a field name: lower case letters, digits, single '_'")
+    return Field(name, type_, _default(type_, default.strip()) if default.strip() else None)
+
+
+def _constant(type_: FieldType, name: str, value: str) -> Constant:
+    if type_.is_array or not type_.is_primitive:
+        raise ValueError(f"a constant has a primitive type, not {type_}")
+    if not _CONSTANT_NAME.fullmatch(name):
+        raise ValueError(f"'{name}' is not a constant's name: upper case letters, digits, '_'")
+    return Constant(name, type_, _value(type_, value))
+
+
+def _type(text: str, package: str) -> FieldType:
+    match = _TYPE.fullmatch(text)
+    if match is None:
+        raise ValueError(f"'{text}' is not a type")
+    name, limit = match["name"], match["limit"] or ""
+    string_bound = int(match["string_bound"]) if match["string_bound"] else None
+    if string_bound is not None and name not in TEXTS:
+        raise ValueError(f"only texts have a greatest length, not '{name}'")
+    count = int(limit.removeprefix("<=")) if limit else None
+    if count == 0 or string_bound == 0:
+        raise ValueError(f"'{text}' has room for nothing")
+    bounded = limit.startswith("<=")
+    return FieldType(
+        _type_name(name, package),
+        is_array=match["array"] is not None,
+        array_size=None if bounded else count,
+        array_bound=count if bounded else None,
+        string_bound=string_bound,
+    )
+
+
+def _type_name(name: str, package: str) -> str:
+    if name == "char":
+        return "uint8"
+    if name in PRIMITIVES:
+        return name
+    match = _MESSAGE_TYPE.fullmatch(name)
+    if match is None:
+        raise ValueError(f"'{name}' is neither a primitive type nor a message")
+    return f"{match['package'] or package}/msg/{match['name']}"
+
+
+def _default(type_: FieldType, text: str) -> Plain:
+    if not type_.is_primitive:
+        raise ValueError(f"a field of type {type_} has no default of its own")
+    if not type_.is_array:
+        return _value(type_, text)
+    if not (text.startswith("[") and text.endswith("]")):
+        raise ValueError(f"the default of an array is a list in brackets, not {text}")
+    values: list[Plain] = [_value(type_.element, item) for item in _items(text[1:-1])]
+    too_many = type_.array_bound is not None and len(values) > type_.array_bound
+    if too_many or type_.array_size not in (None, len(values)):
+        raise ValueError(f"{len(values)} values do not fit {type_}")
+    return values
+
+
+def _items(text: str) -> list[str]:
+    """Return what stands between commas that are not in quotes."""
+    quoted = r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\""""
+    items = re.findall(rf"\s*((?:{quoted}|[^,])+)", text)
+    return [item.strip() for item in items if item.strip()]
+
+
+def _value(type_: FieldType, text: str) -> ScalarValue:
+    name = type_.name
+    if name == "bool" and text.lower() in _BOOLEANS:
+        return _BOOLEANS[text.lower()]
+    if name in INTEGER_RANGES:
+        return _integer(name, text)
+    if name in FLOATS:
+        return _float(name, text)
+    if name in TEXTS:
+        return _text(type_, text)
+    raise ValueError(f"'{text}' is not a value of type {type_}")
+
+
+def _integer(name: str, text: str) -> int:
+    low, high = INTEGER_RANGES[name]
+    try:
+        value = int(text) if text.lstrip("+-").isdigit() else int(text, 0)
+    except ValueError:
+        raise ValueError(f"'{text}' is not an integer") from None
+    if not low <= value <= high:
+        raise ValueError(f"{value} is outside the range of {name}, {low} to {high}")
+    return value
+
+
+def _float(name: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise ValueError(f"'{text}' is not a number") from None
+    if not math.isfinite(value):
+        raise ValueError(f"'{text}' is not a finite {name}")
+    return value
+
+
+def _text(type_: FieldType, text: str) -> str:
+    if len(text) >= 2 and text[0] in _QUOTES and text[0] == text[-1]:
+        quote, text = text[0], text[1:-1]
+        if re.search(rf"(?<!\\){quote}", text):
+            raise ValueError(f"a {quote} within the text is written \\{quote}")
+        text = text.replace("\\" + quote, quote)
+    if type_.string_bound is not None and len(text) > type_.string_bound:
+        raise ValueError(f"{len(text)} characters do not fit {type_}")
+    return text

@@ -1,0 +1,186 @@
+"""Where definitions are: packages in the project, installed packages, the bundled snapshot.
+
+A source finds the text of a definition by name. Names come from user files, so they are split and
+checked before they become part of a path.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Protocol
+
+from composer.interfaces.parser import split_name
+
+FOLDERS = ("msg", "srv", "action")
+_MAXIMUM_BYTES = 1_000_000
+_MAXIMUM_DEPTH = 4
+_PACKAGE_NAME = re.compile(r"<name>\s*([a-z][a-z0-9_]*)\s*</name>", re.ASCII)
+#: Folders that never hold sources: what colcon, Python and JavaScript make.
+_SKIPPED = frozenset(("build", "install", "log", "node_modules", "site-packages", "__pycache__"))
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """The text of a definition. ``path`` is empty for the bundled ones."""
+
+    text: str
+    path: str = ""
+    is_json: bool = False
+
+
+class Source(Protocol):
+    """A place that definitions come from."""
+
+    def packages(self) -> frozenset[str]:
+        """Return the packages that have interfaces here."""
+
+    def names(self, folder: str) -> Iterator[str]:
+        """Yield the full names of all messages, services or actions here."""
+
+    def read(self, name: str) -> Definition | None:
+        """Return the definition called ``name``, or None. Raises OSError, UnicodeDecodeError."""
+
+
+@dataclass(frozen=True, slots=True)
+class Packages:
+    """Packages by name, each with the folder that holds its ``msg``, ``srv`` and ``action``."""
+
+    folders: Mapping[str, Path]
+
+    def packages(self) -> frozenset[str]:
+        """Return the names of the packages."""
+        return frozenset(self.folders)
+
+    def names(self, folder: str) -> Iterator[str]:
+        """Yield what the folders of the packages hold."""
+        for package, base in self.folders.items():
+            for path in sorted((base / folder).glob(f"*.{folder}")):
+                yield f"{package}/{folder}/{path.stem}"
+
+    def read(self, name: str) -> Definition | None:
+        """Return the text of a definition; its type description where there is no text."""
+        package, folder, type_name = split_name(name) or ("", "", "")
+        base = self.folders.get(package)
+        return _read(base / folder, type_name, folder) if base is not None else None
+
+
+@dataclass(frozen=True, slots=True)
+class Prefix:
+    """An installation prefix, as ``AMENT_PREFIX_PATH`` lists them."""
+
+    root: Path
+
+    def packages(self) -> frozenset[str]:
+        """Return the packages that have registered interfaces in the ament index."""
+        index = self.root / "share" / "ament_index" / "resource_index" / "rosidl_interfaces"
+        return frozenset(_listed(index))
+
+    def names(self, folder: str) -> Iterator[str]:
+        """Yield what the packages of the prefix have installed."""
+        for package in sorted(self.packages()):
+            names = _listed(self.root / "share" / package / folder)
+            stems = {Path(name).stem for name in names if name.endswith((f".{folder}", ".json"))}
+            yield from (f"{package}/{folder}/{stem}" for stem in sorted(stems))
+
+    def read(self, name: str) -> Definition | None:
+        """Return the text of a definition; its type description where there is no text."""
+        package, folder, type_name = split_name(name) or ("", "", "")
+        return _read(self.root / "share" / package / folder, type_name, folder) if folder else None
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """The snapshot of ROS 2 Jazzy's message packages that comes with the composer."""
+
+    def packages(self) -> frozenset[str]:
+        """Return the packages in the snapshot."""
+        return frozenset(name.split("/")[0] for name in _snapshot())
+
+    def names(self, folder: str) -> Iterator[str]:
+        """Yield the names in the snapshot."""
+        return (name for name in _snapshot() if name.split("/")[1] == folder)
+
+    def read(self, name: str) -> Definition | None:
+        """Return a definition of the snapshot."""
+        text = _snapshot().get(name)
+        return Definition(text) if text is not None else None
+
+
+def installed_prefixes() -> tuple[Prefix, ...]:
+    """Return the prefixes ROS looks into: ``AMENT_PREFIX_PATH``, then this Python's own."""
+    listed = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    roots = dict.fromkeys((*(entry for entry in listed if entry), sys.prefix))
+    return tuple(Prefix(Path(root)) for root in roots)
+
+
+def find_packages(folders: Iterable[Path]) -> Packages:
+    """Return the interface packages in and below ``folders``: those with a ``package.xml``."""
+    found: dict[str, Path] = {}
+    for folder in folders:
+        for manifest in _manifests(folder, _MAXIMUM_DEPTH):
+            name = _package_name(manifest)
+            has_interfaces = any((manifest.parent / kind).is_dir() for kind in FOLDERS)
+            if name is not None and has_interfaces:
+                found.setdefault(name, manifest.parent)
+    return Packages(found)
+
+
+def _manifests(folder: Path, depth: int) -> Iterator[Path]:
+    """Yield every package.xml; not below one, and not through symbolic links."""
+    manifest = folder / "package.xml"
+    if manifest.is_file():
+        yield manifest
+        return
+    if depth == 0:
+        return
+    for name in sorted(_listed(folder)):
+        below = folder / name
+        hidden = name.startswith(".") or name in _SKIPPED
+        if not hidden and below.is_dir() and not below.is_symlink():
+            yield from _manifests(below, depth - 1)
+
+
+def _package_name(manifest: Path) -> str | None:
+    text = _text(manifest)
+    match = _PACKAGE_NAME.search(text) if text is not None else None
+    return match[1] if match else None
+
+
+def _listed(folder: Path) -> list[str]:
+    try:
+        return [path.name for path in folder.iterdir()]
+    except OSError:
+        return []
+
+
+def _read(folder: Path, type_name: str, extension: str) -> Definition | None:
+    for suffix in (extension, "json"):
+        path = folder / f"{type_name}.{suffix}"
+        text = _text(path)
+        if text is not None:
+            return Definition(text, str(path), is_json=suffix == "json")
+    return None
+
+
+def _text(path: Path) -> str | None:
+    """Return the text of a regular file of sensible size; None for everything else."""
+    try:
+        if not path.is_file() or path.stat().st_size > _MAXIMUM_BYTES:
+            return None
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+
+
+@lru_cache(maxsize=1)
+def _snapshot() -> Mapping[str, str]:
+    text = Path(__file__).with_name("jazzy.json").read_text(encoding="utf-8")
+    definitions: Mapping[str, str] = json.loads(text)
+    return definitions
