@@ -45,9 +45,7 @@ class Loop(Protocol):
     def remove_node(self, node: Node) -> None:
         """Stop serving the node and everything of it. To be called before it is destroyed."""
 
-    def add_subscription(
-        self, subscription: Subscription, callback: Callable[[Any], None]
-    ) -> None:
+    def add_subscription(self, subscription: Subscription, callback: Callable[[Any], None]) -> None:
         """Call ``callback(message)`` for each message."""
 
     def add_service(self, service: Service, callback: Callable[[Any, Reply], None]) -> None:
@@ -65,13 +63,13 @@ class Loop(Protocol):
     def remove(self, entity: object) -> None:
         """Stop serving one entity. To be called before it is destroyed."""
 
-    def call_soon(self, callback: Callable[[], None]) -> None:
+    def call_soon(self, callback: Callable[[], object]) -> None:
         """Call ``callback`` on the loop as soon as it is free."""
 
-    def call_later(self, delay_s: float, callback: Callable[[], None]) -> Timer:
+    def call_later(self, delay_s: float, callback: Callable[[], object]) -> Timer:
         """Call ``callback`` once, ``delay_s`` seconds from now."""
 
-    def call_every(self, period_s: float, callback: Callable[[], None]) -> Timer:
+    def call_every(self, period_s: float, callback: Callable[[], object]) -> Timer:
         """Call ``callback`` each ``period_s`` seconds; a late call does not shift the next."""
 
     def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:

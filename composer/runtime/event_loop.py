@@ -1,0 +1,156 @@
+"""The loop of ``kind: events``: the composer's scheduler, serving ROS entities."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.action import ActionClient, ActionServer
+from rclpy.client import Client
+from rclpy.event_handler import EventHandler
+from rclpy.node import Node
+from rclpy.service import Service
+from rclpy.subscription import Subscription
+
+from composer.runtime import sources
+from composer.runtime.loop import ExceptionHandler, Reply
+from composer.runtime.node_executor import NodeExecutor
+from composer.runtime.scheduler import Scheduler
+from composer.runtime.slots import Slot
+from composer.runtime.sources import Source
+
+_EXPIRY_PERIOD_S = 1.0  # how often action servers drop the results that nobody fetched
+
+
+class EventLoop(Scheduler):
+    """A :class:`~composer.runtime.loop.Loop` of one thread."""
+
+    def __init__(self, name: str, on_exception: ExceptionHandler) -> None:
+        super().__init__(name, on_exception)
+        self._slots_of: dict[object, Slot] = {}  # by the entity that was added
+        self._nodes: dict[Node, _NodeEntities] = {}
+        self._futures = NodeExecutor(self, lambda: None)
+
+    def add_node(self, node: Node) -> None:
+        """Serve what every node brings along: its services, its clients, its QoS events."""
+        self._nodes[node] = _NodeEntities(self, node)
+
+    def remove_node(self, node: Node) -> None:
+        """Stop serving the node and everything of it."""
+        entities = self._nodes.pop(node, None)
+        if entities is not None:
+            entities.close()
+        for entity in _entities_of(node):
+            self.remove(entity)
+
+    def add_subscription(self, subscription: Subscription, callback: Callable[[Any], None]) -> None:
+        """Call ``callback(message)`` for each message."""
+        self._add(subscription, sources.SubscriptionSource(subscription, callback))
+
+    def add_service(self, service: Service, callback: Callable[[Any, Reply], None]) -> None:
+        """Call ``callback(request, reply)``; ``reply(response)`` answers, now or later."""
+        self._add(service, sources.ServiceSource(service, callback))
+
+    def add_client(self, client: Client) -> None:
+        """Complete the futures of ``client.call_async``."""
+        self._add(client, sources.ClientSource(client, self._futures))
+
+    def add_action_server(self, server: ActionServer) -> None:
+        """Run the server's goal, cancel and result requests."""
+        self._add(server, sources.source_of_action_server(server, self._futures, self.run_task))
+        self.call_later(_EXPIRY_PERIOD_S, lambda: self._expire(server))
+
+    def add_action_client(self, client: ActionClient) -> None:
+        """Complete the futures of the client and deliver its feedback."""
+        self._add(client, sources.source_of_action_client(client, self._futures, self.run_task))
+
+    def remove(self, entity: object) -> None:
+        """Stop serving one entity. To be called before it is destroyed."""
+        slot = self._slots_of.pop(entity, None)
+        if slot is not None:
+            self.close_slot(slot)
+
+    def serves(self, entity: object) -> bool:
+        """Tell whether the entity was added by itself, not with its node."""
+        return entity in self._slots_of
+
+    def own_source(self, entity: object) -> Source | None:
+        """Return the source for what came with a node, or None where there is nothing to do."""
+        match entity:
+            case Subscription():
+                return sources.SubscriptionSource(entity, entity.callback)
+            case Service():
+                answer = sources.answer_with_own_callback(entity, self.run_task)
+                return sources.ServiceSource(entity, answer)
+            case Client():
+                return sources.ClientSource(entity, self._futures)
+            case EventHandler():
+                return sources.EventSource(entity)
+        return None
+
+    def _add(self, entity: object, source: Source) -> None:
+        self.remove(entity)
+        for entities in list(self._nodes.values()):
+            entities.let_go(entity)
+        self._slots_of[entity] = self.open_slot(source)
+
+    def _expire(self, server: ActionServer) -> None:
+        if server not in self._slots_of:
+            return
+        self.call_later(_EXPIRY_PERIOD_S, lambda: self._expire(server))
+        if sources.keeps_goals(server):
+            self.run_task(sources.forget_expired_goals(server))
+
+
+class _NodeEntities:
+    """What a node has and nobody added: served together, on one signal.
+
+    Rarely used, all of it; a file descriptor for each would be thousands in a large system.
+    """
+
+    def __init__(self, loop: EventLoop, node: Node) -> None:
+        self._loop = loop
+        self._node = node
+        self._slot = loop.open_slot()
+        self._sources: dict[object, Source] = {}
+        self._look_due = False
+        self._closed = False
+        self._executor = NodeExecutor(loop, self._look_soon)  # the node refers to it weakly
+        node.executor = self._executor
+        self._look()
+
+    def let_go(self, entity: object) -> None:
+        """Leave the entity to whoever adds it by itself."""
+        source = self._sources.pop(entity, None)
+        if source is not None:
+            self._slot.discard(source)
+
+    def close(self) -> None:
+        """Serve nothing of the node any more."""
+        self._closed = True
+        self._node.executor = None
+        self._sources.clear()
+        self._loop.close_slot(self._slot)
+
+    def _look_soon(self) -> None:
+        if not self._look_due:
+            self._look_due = True
+            self._loop.call_soon(self._look)
+
+    def _look(self) -> None:
+        self._look_due = False
+        if self._closed:
+            return
+        present = [entity for entity in _entities_of(self._node) if not self._loop.serves(entity)]
+        for gone in [entity for entity in self._sources if entity not in present]:
+            self.let_go(gone)
+        for entity in present:
+            if entity not in self._sources:
+                source = self._loop.own_source(entity)
+                if source is not None:
+                    self._sources[entity] = source
+                    self._slot.add(source)
+
+
+def _entities_of(node: Node) -> list[object]:
+    return [*node.subscriptions, *node.services, *node.clients, *node.waitables]

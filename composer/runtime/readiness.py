@@ -1,0 +1,112 @@
+"""How rcl says that an entity has something to take.
+
+rcl calls back on the middleware's threads, which hold the reader's lock. A Python callback there
+needs the interpreter's lock, while rclpy's ``take`` holds that one and waits for the reader's:
+a deadlock, met within a second under load. So the callback handed to rcl is libc's own
+``eventfd_write``, whose two arguments (a file descriptor, a count) travel in the registers of
+``void (*)(const void * user_data, size_t count)`` on x86-64 and arm64. No Python runs there.
+
+This module and :mod:`composer.runtime.sources` hold all that is known of rcl's and rclpy's
+insides (rclpy 7.1, ROS 2 Jazzy).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Callable
+from typing import Protocol
+
+import rclpy  # noqa: F401  loads librcl, whichever ROS it is of
+
+
+class Handle(Protocol):
+    """An rclpy handle (``_rclpy.Destroyable``): what owns an rcl entity."""
+
+    @property
+    def pointer(self) -> int:
+        """The address of the rcl entity."""
+
+    def __enter__(self) -> None:
+        """Put off the destruction of the entity."""
+
+    def __exit__(self, *_: object) -> None:
+        """Destroy the entity when that was put off."""
+
+
+#: Sets the callback of one kind of entity: rcl's function.
+Announcement = Callable[[int, ctypes.c_void_p | None, int], int]
+
+_RCL = ctypes.CDLL("librcl.so")
+_RCL_ACTION = ctypes.CDLL("librcl_action.so")
+_WRITE = ctypes.cast(ctypes.CDLL(None).eventfd_write, ctypes.c_void_p)
+
+
+def _announcement(library: ctypes.CDLL, name: str) -> Announcement:
+    function = getattr(library, name)
+    function.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]
+    function.restype = ctypes.c_int
+    return function  # type: ignore[no-any-return]
+
+
+MESSAGE = _announcement(_RCL, "rcl_subscription_set_on_new_message_callback")
+REQUEST = _announcement(_RCL, "rcl_service_set_on_new_request_callback")
+RESPONSE = _announcement(_RCL, "rcl_client_set_on_new_response_callback")
+EVENT = _announcement(_RCL, "rcl_event_set_callback")
+ACTION_SERVER = tuple(
+    _announcement(_RCL_ACTION, f"rcl_action_server_set_{kind}_service_callback")
+    for kind in ("goal", "cancel", "result")
+)
+ACTION_CLIENT = tuple(
+    _announcement(_RCL_ACTION, f"rcl_action_client_set_{kind}_callback")
+    for kind in (
+        "goal_client",
+        "cancel_client",
+        "result_client",
+        "feedback_subscription",
+        "status_subscription",
+    )
+)
+
+
+class Signal:
+    """An eventfd that rcl writes when one of the entities attached has something to take.
+
+    While attached an entity is in use, so destroying it early only puts the destruction off:
+    rcl never writes to a file descriptor that belongs to somebody else by now.
+    """
+
+    def __init__(self) -> None:
+        self.fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._attached: list[tuple[Handle, tuple[Announcement, ...]]] = []
+
+    def attach(self, handle: Handle, *announcements: Announcement) -> None:
+        """Have rcl announce the entity. Data that waits already is announced at once.
+
+        Raises rclpy's InvalidHandle when the entity is destroyed, RuntimeError when rcl refuses.
+        """
+        handle.__enter__()
+        self._attached.append((handle, announcements))
+        for announce in announcements:
+            if announce(handle.pointer, _WRITE, self.fd) != 0:
+                self.detach(handle)
+                raise RuntimeError(f"rcl does not announce {handle!r}")
+        self.raise_()  # a middleware may not count what came before
+
+    def detach(self, handle: Handle) -> None:
+        """Have rcl announce the entity no more, and let it be destroyed."""
+        for attached in [item for item in self._attached if item[0] is handle]:
+            self._attached.remove(attached)
+            for announce in attached[1]:
+                announce(handle.pointer, None, 0)
+            handle.__exit__(None, None, None)
+
+    def raise_(self) -> None:
+        """Announce as rcl does."""
+        os.eventfd_write(self.fd, 1)
+
+    def close(self) -> None:
+        """Detach everything and give the file descriptor back."""
+        for handle, _ in list(self._attached):
+            self.detach(handle)
+        os.close(self.fd)

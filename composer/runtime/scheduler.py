@@ -1,0 +1,230 @@
+"""The composer's own scheduler: one thread, no wait set, a cost that does not grow with entities.
+
+rcl announces what is ready (:mod:`composer.runtime.readiness`); the scheduler goes round what was
+announced, one item each, and never keeps a due timer waiting for more than one callback.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import traceback
+from collections import deque
+from collections.abc import Callable, Coroutine
+from functools import partial
+from time import monotonic
+from typing import Any, TypeVar
+
+from composer.runtime.handover import Handover
+from composer.runtime.loop import ExceptionHandler
+from composer.runtime.poller import Poller
+from composer.runtime.slots import Slot
+from composer.runtime.sources import Source
+from composer.runtime.tasks import Future, Task, name_of
+from composer.runtime.timers import ScheduledCall, TimerHeap
+
+T = TypeVar("T")
+
+_ROUND = 64  # calls, then items of entities, before readiness is looked at again
+
+
+class Scheduler:
+    """Runs calls, timers, tasks and whatever has a slot. It runs once: start, then stop."""
+
+    def __init__(self, name: str, on_exception: ExceptionHandler) -> None:
+        self._name = name
+        self._on_exception = on_exception
+        self._poller = Poller()
+        self._timers = TimerHeap()
+        self._calls: deque[Callable[[], object]] = deque()
+        self._ready: deque[Slot] = deque()
+        self._slots: dict[int, Slot] = {}  # by the file descriptor of their signal
+        self._tasks: set[Task[Any]] = set()
+        self._running: object = None  # a source or a callback, while it is called
+        self._sleeping = False
+        self._stopping = False
+        self._stopped = False
+        self._thread = threading.Thread(target=self._spin, name=f"executor {name}", daemon=True)
+
+    @property
+    def name(self) -> str:
+        """The name of the executor in YAML."""
+        return self._name
+
+    def call_soon(self, callback: Callable[[], object]) -> None:
+        """Call ``callback`` on the loop as soon as it is free."""
+        self._calls.append(callback)
+        if self._sleeping:
+            self._poller.wake()
+
+    def call_later(self, delay_s: float, callback: Callable[[], object]) -> ScheduledCall:
+        """Call ``callback`` once, ``delay_s`` seconds from now."""
+        return self._schedule(ScheduledCall(monotonic() + delay_s, None, callback))
+
+    def call_every(self, period_s: float, callback: Callable[[], object]) -> ScheduledCall:
+        """Call ``callback`` each ``period_s`` seconds; a late call does not shift the next.
+
+        Raises ValueError for a period that is not positive.
+        """
+        if not period_s > 0:
+            raise ValueError(f"a period must be positive, not {period_s:g} s")
+        return self._schedule(ScheduledCall(monotonic() + period_s, period_s, callback))
+
+    def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
+        """Run a coroutine; the future is its outcome. Cancelling the future closes it."""
+        task = Task(coroutine, self.call_soon, self._report, self._tasks.discard)
+        self._tasks.add(task)
+        return task.future
+
+    def run(self, function: Callable[[], T], timeout_s: float | None = None) -> T:
+        """Call ``function`` on the loop and wait for it (at once when already there).
+
+        Raises what ``function`` raises, and TimeoutError when it takes longer; it is not begun
+        after that.
+        """
+        if threading.current_thread() is self._thread:
+            return function()
+        handover = Handover(function)
+        self.call_soon(handover.call)
+        if self._stopped and handover.call_off():
+            raise RuntimeError(f"executor '{self._name}' has stopped")
+        return handover.wait(timeout_s, self.where)
+
+    def start(self) -> None:
+        """Begin to call, on a thread of the loop's own."""
+        self._thread.start()
+
+    def stop(self, timeout_s: float) -> bool:
+        """End the thread; false when a callback did not return in time.
+
+        Tasks are cancelled and get a moment to clean up. Called on the loop itself, this asks for
+        the end and answers false.
+        """
+        self._stopping = True
+        if threading.current_thread() is self._thread:
+            return False
+        if self._thread.ident is None:  # never started
+            self._wind_up()
+            return True
+        self._poller.wake()
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    def where(self) -> str:
+        """Return the Python stack of the callback that runs now; empty when none does."""
+        frame = sys._current_frames().get(self._thread.ident or 0)
+        if frame is None or self._running is None:
+            return ""
+        return "".join(traceback.format_stack(frame))
+
+    # --- for those who serve entities
+
+    def open_slot(self, *sources: Source) -> Slot:
+        """Serve ``sources``, announced by one signal. Raises InvalidHandle, RuntimeError."""
+        slot = Slot()
+        self._slots[slot.signal.fd] = slot
+        self._poller.watch(slot.signal.fd)
+        for source in sources:
+            slot.add(source)
+        return slot
+
+    def close_slot(self, slot: Slot) -> None:
+        """Serve the slot's sources no more."""
+        if self._slots.pop(slot.signal.fd, None) is not None:
+            self._poller.forget(slot.signal.fd)
+            slot.close()
+
+    # --- the thread
+
+    def _spin(self) -> None:
+        while not self._stopping:
+            try:
+                self._turn()
+            except BaseException as error:  # an asynchronous one, between two callbacks
+                self._report(f"executor '{self._name}'", error)
+        self._wind_up()
+
+    def _turn(self) -> None:
+        for call in self._timers.take_due():
+            self._call(call.callback)
+            self._timers.repeat(call)
+        for _ in range(min(len(self._calls), _ROUND)):
+            self._call(self._calls.popleft())
+            if self._timers.due():
+                break
+        self._gather(self._poller.ready() if self._ready or self._calls else self._wait())
+        for _ in range(_ROUND):
+            if not self._ready or self._timers.due():
+                break
+            self._serve(self._ready.popleft())
+
+    def _wait(self) -> list[tuple[int, int]]:
+        self._sleeping = True
+        try:
+            if self._calls or self._stopping:  # put there while nobody thought us asleep
+                return self._poller.ready()
+            return self._poller.wait(self._timers.next_due_s())
+        finally:
+            self._sleeping = False
+
+    def _gather(self, announced: list[tuple[int, int]]) -> None:
+        for fd, _ in announced:
+            slot = self._slots.get(fd)
+            if slot is not None and not slot.queued:
+                slot.queued = True
+                self._ready.append(slot)
+
+    def _serve(self, slot: Slot) -> None:
+        slot.queued = False
+        for source in slot.sources:
+            self._running = source
+            try:
+                taken = source.take()
+            except BaseException as error:
+                if source in slot.sources:  # not removed meanwhile
+                    self._report(source.name, error)
+                continue
+            if taken is None:
+                continue
+            if not slot.queued:
+                slot.queued = True
+                self._ready.append(slot)
+            try:
+                source.call(taken)
+            except BaseException as error:
+                self._report(source.name, error)
+        self._running = None
+
+    def _call(self, callback: Callable[[], object]) -> None:
+        self._running = callback
+        try:
+            callback()
+        except BaseException as error:
+            self._report(name_of(callback), error)
+        self._running = None
+
+    def _report(self, what: str, error: BaseException) -> None:
+        try:
+            self._on_exception(what, error)
+        except BaseException:
+            traceback.print_exc()  # the last resort: the handler itself failed
+
+    def _schedule(self, call: ScheduledCall) -> ScheduledCall:
+        if threading.current_thread() is self._thread:
+            self._timers.add(call)
+        else:
+            self.call_soon(partial(self._timers.add, call))
+        return call
+
+    def _wind_up(self) -> None:
+        for task in list(self._tasks):
+            task.future.cancel()
+        self._stopped = True
+        for _ in range(_ROUND):
+            for _ in range(len(self._calls)):
+                self._call(self._calls.popleft())
+        for task in list(self._tasks):
+            task.close()
+        for slot in list(self._slots.values()):
+            self.close_slot(slot)
+        self._ready.clear()

@@ -1,0 +1,309 @@
+"""What a loop serves: one source an entity, each with how to take from it and whom to call.
+
+A source takes one item at a time, so that a loop can go round them all. Kept here, with
+:mod:`composer.runtime.readiness`: everything that reaches into rclpy.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Coroutine
+from typing import Any, Protocol
+
+from rclpy.action import ActionClient, ActionServer
+from rclpy.client import Client
+from rclpy.event_handler import EventHandler
+from rclpy.service import Service
+from rclpy.subscription import Subscription
+
+from composer.runtime import readiness
+from composer.runtime.readiness import Handle, Signal
+from composer.runtime.tasks import name_of
+
+Reply = Callable[[Any], None]
+RunTask = Callable[[Coroutine[Any, Any, Any]], object]
+
+
+class Source(Protocol):
+    """One entity that is served."""
+
+    @property
+    def name(self) -> str:
+        """What people call it, for reports."""
+
+    def attach(self, signal: Signal) -> None:
+        """Have the entity announced by ``signal``."""
+
+    def detach(self, signal: Signal) -> None:
+        """End that."""
+
+    def take(self) -> Any:
+        """Return what is there next, or None."""
+
+    def call(self, taken: Any) -> None:
+        """Give what was taken to whom it is for."""
+
+
+class SubscriptionSource:
+    """Calls ``callback(message)`` for each message."""
+
+    __slots__ = ("_callback", "_raw", "_subscription", "_take", "_type")
+
+    def __init__(self, subscription: Subscription, callback: Callable[[Any], object]) -> None:
+        self._subscription = subscription
+        self._callback = callback
+        self._take = subscription.handle.take_message
+        self._type = subscription.msg_type
+        self._raw = subscription.raw
+
+    @property
+    def name(self) -> str:
+        """The topic and the callback."""
+        return f"subscription '{self._subscription.topic}' ({name_of(self._callback)})"
+
+    def attach(self, signal: Signal) -> None:
+        """Have messages announced."""
+        signal.attach(self._subscription.handle, readiness.MESSAGE)
+
+    def detach(self, signal: Signal) -> None:
+        """End that."""
+        signal.detach(self._subscription.handle)
+
+    def take(self) -> Any:
+        """Return a message and its information."""
+        return self._take(self._type, self._raw)
+
+    def call(self, taken: Any) -> None:
+        """Call with the message."""
+        self._callback(taken[0])
+
+
+class ServiceSource:
+    """Calls ``callback(request, reply)`` for each request."""
+
+    def __init__(self, service: Service, callback: Callable[[Any, Reply], object]) -> None:
+        self._service = service
+        self._callback = callback
+
+    @property
+    def name(self) -> str:
+        """The service and the callback."""
+        return f"service '{self._service.srv_name}' ({name_of(self._callback)})"
+
+    def attach(self, signal: Signal) -> None:
+        """Have requests announced."""
+        signal.attach(self._service.handle, readiness.REQUEST)
+
+    def detach(self, signal: Signal) -> None:
+        """End that."""
+        signal.detach(self._service.handle)
+
+    def take(self) -> Any:
+        """Return a request and its header."""
+        service = self._service
+        request, header = service.handle.service_take_request(service.srv_type.Request)
+        return None if header is None else (request, header)
+
+    def call(self, taken: Any) -> None:
+        """Call with the request. When the callback raises, the caller gets an empty answer."""
+        request, header = taken
+        reply = OneReply(self._service, header)
+        try:
+            self._callback(request, reply)
+        except BaseException:
+            reply.give_up()
+            raise
+
+
+class OneReply:
+    """Answers one request, once."""
+
+    __slots__ = ("_header", "_service")
+
+    def __init__(self, service: Service, header: object) -> None:
+        self._service = service
+        self._header: object = header
+
+    def __call__(self, response: Any) -> None:
+        """Send the answer.
+
+        Raises TypeError when it is not a response of the service, RuntimeError when the request
+        has been answered.
+        """
+        if self._header is None:
+            raise RuntimeError(f"service '{self._service.srv_name}': answered already")
+        self._service.send_response(response, self._header)
+        self._header = None
+
+    def give_up(self) -> None:
+        """Send an empty answer, unless there was one."""
+        if self._header is not None:
+            self(self._service.srv_type.Response())
+
+
+def answer_with_own_callback(service: Service, run_task: RunTask) -> Callable[[Any, Reply], None]:
+    """Return what calls ``service.callback``, as ``node.create_service`` was given it."""
+
+    async def answer(request: Any, reply: Any) -> None:
+        try:
+            reply(await service.callback(request, service.srv_type.Response()))
+        except BaseException:
+            reply.give_up()
+            raise
+
+    def call(request: Any, reply: Reply) -> None:
+        if inspect.iscoroutinefunction(service.callback):
+            run_task(answer(request, reply))
+        else:
+            reply(service.callback(request, service.srv_type.Response()))
+
+    return call
+
+
+class ClientSource:
+    """Completes the futures of ``client.call_async``."""
+
+    def __init__(self, client: Client, executor: object) -> None:
+        self._client = client
+        self._executor = executor
+
+    @property
+    def name(self) -> str:
+        """The service."""
+        return f"client of '{self._client.srv_name}'"
+
+    def attach(self, signal: Signal) -> None:
+        """Have responses announced."""
+        signal.attach(self._client.handle, readiness.RESPONSE)
+
+    def detach(self, signal: Signal) -> None:
+        """End that."""
+        signal.detach(self._client.handle)
+
+    def take(self) -> Any:
+        """Return a response and its header."""
+        header, response = self._client.handle.take_response(self._client.srv_type.Response)
+        return None if header is None else (header, response)
+
+    def call(self, taken: Any) -> None:
+        """Complete the future of the request, unless nobody waits for it any more."""
+        header, response = taken
+        try:
+            future = self._client.get_pending_request(header.request_id.sequence_number)
+        except KeyError:
+            return
+        future._set_executor(self._executor)  # exceptions of done callbacks come to the loop
+        future.set_result(response)
+
+
+class EventSource:
+    """Calls what was registered for a QoS event of a publisher or a subscription."""
+
+    def __init__(self, handler: EventHandler) -> None:
+        self._handler = handler
+        self._handle = handler._EventHandler__event
+
+    @property
+    def name(self) -> str:
+        """The kind of event and the callback."""
+        return f"event {self._handler.event_type.name} ({name_of(self._handler.callback)})"
+
+    def attach(self, signal: Signal) -> None:
+        """Have the event announced."""
+        signal.attach(self._handle, readiness.EVENT)
+
+    def detach(self, signal: Signal) -> None:
+        """End that."""
+        signal.detach(self._handle)
+
+    def take(self) -> Any:
+        """Return the status, unless nothing changed in it: rcl always has a status."""
+        status = self._handle.take_event()
+        changes = (name for name in dir(status) if name.endswith("_change"))
+        return status if any(getattr(status, name) for name in changes) else None
+
+    def call(self, taken: Any) -> None:
+        """Call with the status."""
+        self._handler.callback(taken)
+
+
+class ActionSource:
+    """An action server or client: rclpy's own code does the work, as under its executors."""
+
+    def __init__(
+        self,
+        waitable: ActionServer | ActionClient,
+        handle: Handle,
+        executor: object,
+        run_task: RunTask,
+    ) -> None:
+        self._waitable = waitable
+        self._handle = handle
+        self._executor = executor
+        self._run_task = run_task
+        server = isinstance(waitable, ActionServer)
+        self._announcements = readiness.ACTION_SERVER if server else readiness.ACTION_CLIENT
+        self._ready_flags = _SERVER_FLAGS if server else _CLIENT_FLAGS
+
+    @property
+    def name(self) -> str:
+        """What it is."""
+        return type(self._waitable).__name__
+
+    def attach(self, signal: Signal) -> None:
+        """Have everything about the action announced."""
+        signal.attach(self._handle, *self._announcements)
+
+    def detach(self, signal: Signal) -> None:
+        """End that."""
+        signal.detach(self._handle)
+
+    def take(self) -> Any:
+        """Return one of each kind of thing an action consists of."""
+        for flag in self._ready_flags:
+            setattr(self._waitable, flag, True)
+        return self._waitable.take_data() or None
+
+    def call(self, taken: Any) -> None:
+        """Have rclpy work on it."""
+        for future in self._waitable._futures:
+            future._set_executor(self._executor)
+        self._run_task(self._waitable.execute(taken))
+
+
+_SERVER_FLAGS = ("_is_goal_request_ready", "_is_cancel_request_ready", "_is_result_request_ready")
+_CLIENT_FLAGS = (
+    "_is_goal_response_ready",
+    "_is_cancel_response_ready",
+    "_is_result_response_ready",
+    "_is_feedback_ready",
+    "_is_status_ready",
+)
+
+
+def source_of_action_server(
+    server: ActionServer, executor: object, run_task: RunTask
+) -> ActionSource:
+    """Return the source for an action server."""
+    server._is_goal_expired = False  # asked for by a timer, not by readiness
+    return ActionSource(server, server._handle, executor, run_task)
+
+
+def source_of_action_client(
+    client: ActionClient, executor: object, run_task: RunTask
+) -> ActionSource:
+    """Return the source for an action client."""
+    return ActionSource(client, client._client_handle, executor, run_task)
+
+
+async def forget_expired_goals(server: ActionServer) -> None:
+    """Drop the results that the server kept for longer than its result timeout."""
+    with server._lock:
+        expired = server._handle.expire_goals(len(server._goal_handles))
+    if expired:
+        await server._execute_expire_goals(expired)
+
+
+def keeps_goals(server: ActionServer) -> bool:
+    """Tell whether the server keeps goals, running or ended."""
+    return bool(server._goal_handles)

@@ -1,0 +1,346 @@
+"""Futures and tasks: how ``async def`` handlers run on a :class:`~composer.runtime.loop.Loop`.
+
+Not asyncio: its event loop knows nothing of DDS. A coroutine that runs here awaits a
+:class:`Future`, another coroutine, or an rclpy future.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Coroutine, Generator
+from functools import partial
+from typing import Any, Generic, Protocol, TypeVar, cast
+
+T = TypeVar("T")
+
+#: Called with (what was running, the exception).
+Report = Callable[[str, BaseException], None]
+
+
+class Cancelled(BaseException):
+    """Raised at the ``await`` of a coroutine whose task was cancelled, and by a cancelled future.
+
+    Not an ``Exception``, so that a handler's ``except Exception`` does not swallow it.
+    """
+
+
+class Future(Generic[T]):
+    """An outcome that comes later.
+
+    Every method may be called from any thread; the first of ``set_result``, ``set_exception``
+    and ``cancel`` wins, and answers true.
+    """
+
+    __slots__ = (
+        "__weakref__",
+        "_callbacks",
+        "_cancelled",
+        "_done",
+        "_error",
+        "_noticed",
+        "_report",
+        "_right_to_finish",
+        "_value",
+    )
+
+    def __init__(self, report: Callable[[BaseException], None] | None = None) -> None:
+        """``report`` is told of an exception that nobody asked for, when the future is dropped."""
+        # Popping from a list and from a deque is atomic, so a future needs no lock.
+        self._right_to_finish = [True]
+        self._callbacks: deque[Callable[[Future[T]], object]] = deque()
+        self._report = report
+        self._value: T | None = None
+        self._error: BaseException | None = None
+        self._cancelled = False
+        self._noticed = False
+        self._done = False
+
+    def done(self) -> bool:
+        """Tell whether there is an outcome: a result, an exception or a cancellation."""
+        return self._done
+
+    def cancelled(self) -> bool:
+        """Tell whether the outcome is a cancellation."""
+        return self._cancelled
+
+    def set_result(self, value: T) -> bool:
+        """Finish with a result; false when there is an outcome already."""
+        return self._finish(value, None, cancelled=False)
+
+    def set_exception(self, error: BaseException) -> bool:
+        """Finish with an exception; false when there is an outcome already."""
+        return self._finish(None, error, cancelled=False)
+
+    def cancel(self) -> bool:
+        """Finish as cancelled; false when there is an outcome already."""
+        return self._finish(None, None, cancelled=True)
+
+    def exception(self) -> BaseException | None:
+        """Return the exception, or None. An exception asked for is not reported any more."""
+        self._noticed = True
+        return self._error
+
+    def result(self) -> T:
+        """Return the result.
+
+        Raises the exception that was set, Cancelled, or RuntimeError while there is no outcome.
+        """
+        if not self._done:
+            raise RuntimeError("the future has no result yet")
+        self._noticed = True
+        if self._error is not None:
+            raise self._error
+        if self._cancelled:
+            raise Cancelled
+        return cast(T, self._value)
+
+    def add_done_callback(self, callback: Callable[[Future[T]], object]) -> None:
+        """Call ``callback(self)`` on whichever thread finishes this; at once when it is done."""
+        self._callbacks.append(callback)
+        if self._done:
+            self._call_back()
+
+    def __await__(self) -> Generator[Future[T], None, T]:
+        if not self._done:
+            yield self
+        return self.result()
+
+    def __del__(self) -> None:
+        if self._error is not None and not self._noticed and self._report is not None:
+            self._report(self._error)
+
+    def _finish(self, value: T | None, error: BaseException | None, *, cancelled: bool) -> bool:
+        try:
+            self._right_to_finish.pop()
+        except IndexError:
+            return False
+        self._value = value
+        self._error = error
+        self._cancelled = cancelled
+        self._done = True
+        self._call_back()
+        return True
+
+    def _call_back(self) -> None:
+        while True:
+            try:
+                callback = self._callbacks.popleft()
+            except IndexError:
+                return
+            try:
+                callback(self)
+            except BaseException:
+                self._call_back()  # the others are told all the same
+                raise
+
+
+class Calls(Protocol):
+    """The part of a loop that tasks need."""
+
+    def call_soon(self, callback: Callable[[], object]) -> None:
+        """Call ``callback`` on the loop as soon as it is free."""
+
+    def call_later(self, delay_s: float, callback: Callable[[], object]) -> Cancellable:
+        """Call ``callback`` once, ``delay_s`` seconds from now."""
+
+
+class Cancellable(Protocol):
+    """A call that can still be called off."""
+
+    def cancel(self) -> None:
+        """Never call."""
+
+
+class Task(Generic[T]):
+    """Drives one coroutine, a step per call of the loop.
+
+    Cancelling ``future`` throws :class:`Cancelled` into the coroutine where it awaits; what it
+    awaits is left alone.
+    """
+
+    __slots__ = (
+        "_awaited",
+        "_call_soon",
+        "_coroutine",
+        "_finished",
+        "_lock",
+        "_on_end",
+        "_report",
+        "future",
+    )
+
+    def __init__(
+        self,
+        coroutine: Coroutine[Any, Any, T],
+        call_soon: Callable[[Callable[[], object]], None],
+        report: Report,
+        on_end: Callable[[Task[T]], object],
+    ) -> None:
+        """``on_end`` is called when the coroutine has ended, which may be after the future."""
+        self._coroutine = coroutine
+        self._call_soon = call_soon
+        self._on_end = on_end
+        self._report = partial(report, name_of(coroutine))
+        self._lock = threading.Lock()  # a cancellation may meet a running step on another thread
+        self._awaited: object = None
+        self._finished = False
+        self.future: Future[T] = Future(self._report)
+        self.future.add_done_callback(self._cancel)
+        call_soon(partial(self._step, None))
+
+    def close(self) -> None:
+        """End the coroutine now, on the calling thread, as when nothing will ever resume it."""
+        with self._lock:
+            if self._finished:
+                return
+            try:
+                self._coroutine.close()
+            except BaseException as error:
+                self._report(error)
+            self._end()
+        self.future.cancel()
+
+    def _cancel(self, future: Future[T]) -> None:
+        if future.cancelled() and not self._finished:
+            self._call_soon(self._throw)
+
+    def _throw(self) -> None:
+        with self._lock:
+            if not self._finished:
+                self._advance(partial(self._coroutine.throw, Cancelled()))
+
+    def _step(self, awaited: object) -> None:
+        with self._lock:
+            # A cancelled task may be woken by what it no longer waits for.
+            if not self._finished and self._awaited is awaited:
+                self._advance(partial(self._coroutine.send, None))
+
+    def _advance(self, resume: Callable[[], object]) -> None:
+        while True:
+            self._awaited = None
+            try:
+                yielded = resume()
+            except StopIteration as stop:
+                self._end()
+                self.future.set_result(stop.value)
+                return
+            except Cancelled:
+                self._end()
+                self.future.cancel()
+                return
+            except BaseException as error:
+                self._end()
+                self._fail(error)
+                return
+            if self._wait_for(yielded):
+                return
+            resume = partial(self._coroutine.throw, _not_awaitable(yielded))
+
+    def _end(self) -> None:
+        self._finished = True
+        self._on_end(self)
+
+    def _fail(self, error: BaseException) -> None:
+        if error.__traceback__ is not None:
+            # Without this frame, which holds the task, the future goes as soon as nobody wants it.
+            error.__traceback__ = error.__traceback__.tb_next
+        if not self.future.set_exception(error):
+            self._report(error)
+
+    def _wait_for(self, yielded: object) -> bool:
+        if isinstance(yielded, Future):
+            self._awaited = yielded
+            yielded.add_done_callback(self._wake)
+            return True
+        if yielded is not None:
+            return False
+        foreign = _awaited_rclpy_future(self._coroutine)
+        if foreign is None:
+            self._wake(None)  # asyncio.sleep(0): let others run first
+        else:
+            self._awaited = foreign
+            foreign.add_done_callback(self._wake)
+        return True
+
+    def _wake(self, awaited: object) -> None:
+        self._call_soon(partial(self._step, awaited))
+
+
+def sleep(loop: Calls, delay_s: float) -> Future[None]:
+    """Return a future that is done ``delay_s`` seconds from now."""
+    future: Future[None] = Future()
+    timer = loop.call_later(delay_s, lambda: future.set_result(None))
+    future.add_done_callback(lambda _: timer.cancel())
+    return future
+
+
+async def within(loop: Calls, future: Future[T], timeout_s: float) -> T:
+    """Wait for ``future`` for at most ``timeout_s`` seconds.
+
+    Raises TimeoutError when it takes longer. A future not waited for any more, because of that
+    or because the caller was cancelled, is cancelled.
+    """
+    woken: Future[None] = Future()
+    timer = loop.call_later(timeout_s, lambda: woken.set_result(None))
+    future.add_done_callback(lambda _: woken.set_result(None))
+    try:
+        await woken
+        if not future.done():
+            raise TimeoutError(f"no answer within {timeout_s:g} s")
+        return future.result()
+    finally:
+        timer.cancel()
+        future.cancel()
+
+
+def wrap_rclpy_future(foreign: Any) -> Future[Any]:
+    """Return a future with the outcome of an ``rclpy.task.Future``.
+
+    Cancelling one cancels the other, so that a client forgets a request nobody waits for.
+    """
+    future: Future[Any] = Future()
+
+    def take_over(_: object) -> None:
+        if foreign.cancelled():
+            future.cancel()
+        elif (error := foreign.exception()) is not None:
+            future.set_exception(error)
+        else:
+            future.set_result(foreign.result())
+
+    foreign.add_done_callback(take_over)
+    future.add_done_callback(lambda done: foreign.cancel() if done.cancelled() else None)
+    return future
+
+
+def name_of(called: object) -> str:
+    """Return the name people know a callback or coroutine by."""
+    inner = getattr(called, "func", called)
+    return str(getattr(inner, "__qualname__", None) or type(inner).__qualname__)
+
+
+def _not_awaitable(yielded: object) -> TypeError:
+    kind = type(yielded)
+    return TypeError(
+        f"cannot await {kind.__module__}.{kind.__qualname__} here: handlers run on the composer's "
+        "loop, not on asyncio's; use self.clock.sleep, the node's clients, or a Future of the loop"
+    )
+
+
+def _awaited_rclpy_future(coroutine: object) -> Any:
+    """Return the rclpy future at the end of the chain of awaits, or None.
+
+    ``rclpy.task.Future.__await__`` yields None until it is done, for its executors poll. Looking
+    at which future it belongs to spares us the polling.
+    """
+    innermost = coroutine
+    while (
+        inner := getattr(innermost, "cr_await", None) or getattr(innermost, "gi_yieldfrom", None)
+    ) is not None:
+        innermost = inner
+    frame = getattr(innermost, "gi_frame", None)
+    if frame is None or frame.f_code.co_name != "__await__":
+        return None
+    owner = frame.f_locals.get("self")
+    return owner if hasattr(owner, "add_done_callback") else None

@@ -1,0 +1,81 @@
+"""Calls at a time: a heap on the steady clock."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+from collections.abc import Callable
+from time import monotonic
+
+_MANY = 64  # cancelled calls that may linger in the heap before it is swept
+
+
+class ScheduledCall:
+    """A call that is due at ``due_s``, and each ``period_s`` after that where there is one."""
+
+    __slots__ = ("callback", "cancelled", "due_s", "period_s")
+
+    def __init__(
+        self, due_s: float, period_s: float | None, callback: Callable[[], object]
+    ) -> None:
+        self.due_s = due_s
+        self.period_s = period_s
+        self.callback = callback
+        self.cancelled = False
+
+    def cancel(self) -> None:
+        """Never call again."""
+        self.cancelled = True
+
+
+class TimerHeap:
+    """Scheduled calls, the next one first. To be used by one thread."""
+
+    def __init__(self) -> None:
+        self._heap: list[tuple[float, int, ScheduledCall]] = []
+        self._order = itertools.count()  # calls due at the same time keep their order
+        self._sweep_at = _MANY
+
+    def add(self, call: ScheduledCall) -> None:
+        """Put a call in its place."""
+        if len(self._heap) >= self._sweep_at:
+            self._sweep()
+        heapq.heappush(self._heap, (call.due_s, next(self._order), call))
+
+    def next_due_s(self) -> float | None:
+        """Return when the next call is due, or None when there is none."""
+        heap = self._heap
+        while heap and heap[0][2].cancelled:
+            heapq.heappop(heap)
+        return heap[0][0] if heap else None
+
+    def due(self) -> bool:
+        """Tell whether a call is due by now."""
+        return bool(self._heap) and self._heap[0][0] <= monotonic()
+
+    def take_due(self) -> list[ScheduledCall]:
+        """Take out every call that is due by now, in order."""
+        now_s = monotonic()
+        due = []
+        while self._heap and self._heap[0][0] <= now_s:
+            call = heapq.heappop(self._heap)[2]
+            if not call.cancelled:
+                due.append(call)
+        return due
+
+    def repeat(self, call: ScheduledCall) -> None:
+        """Put a periodic call back for its next multiple of the period that is still to come.
+
+        A late call does not shift the next one; periods missed altogether are skipped.
+        """
+        if call.period_s is None or call.cancelled:
+            return
+        missed = math.floor((monotonic() - call.due_s) / call.period_s)
+        call.due_s += (max(missed, 0) + 1) * call.period_s
+        self.add(call)
+
+    def _sweep(self) -> None:
+        self._heap = [entry for entry in self._heap if not entry[2].cancelled]
+        heapq.heapify(self._heap)
+        self._sweep_at = max(_MANY, 2 * len(self._heap))
