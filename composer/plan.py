@@ -17,6 +17,11 @@ from composer.model.dependencies import Edge, dependency_edges, in_dependency_or
 TransitionName: TypeAlias = Literal["configure", "activate", "deactivate", "cleanup", "shutdown"]
 
 _RANK = {PrimaryState.UNCONFIGURED: 0, PrimaryState.INACTIVE: 1, PrimaryState.ACTIVE: 2}
+_UPWARD: tuple[tuple[TransitionName, PrimaryState], ...] = (
+    ("configure", PrimaryState.INACTIVE),
+    ("activate", PrimaryState.ACTIVE),
+)
+_DOWNWARD: tuple[TransitionName, ...] = ("deactivate", "cleanup", "shutdown")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,17 +59,12 @@ def bring_up(system: System, autostart: PrimaryState | None = None) -> Plan:
     goal = system.autostart if autostart is None else autostart
     goals = _goals(order, goal)
     causes = _causes(system, edges, goal)
-    steps: list[tuple[TransitionName, Node, str]] = []
-    for transition, needed in (
-        ("configure", PrimaryState.INACTIVE),
-        ("activate", PrimaryState.ACTIVE),
-    ):
-        steps.extend(
-            (transition, node, causes[node.name.value])
-            for node in order
-            if _RANK[goals[node.name.value]] >= _RANK[needed]
-        )
-    return _numbered(steps)
+    return _numbered(
+        (transition, node, causes[node.name.value])
+        for transition, reached in _UPWARD
+        for node in order
+        if _rank(goals[node.name.value]) >= _rank(reached)
+    )
 
 
 def tear_down(system: System) -> Plan:
@@ -76,13 +76,12 @@ def tear_down(system: System) -> Plan:
     edges = dependency_edges(system)
     order = _nodes(system, reversed(in_dependency_order(system, edges)))
     users = _dependents(edges)
-    steps: list[tuple[TransitionName, Node, str]] = []
-    for transition in ("deactivate", "cleanup", "shutdown"):
-        for node in order:
-            waiting = users.get(node.name.value, ())
-            cause = f"after {_listed(waiting)}" if waiting else "system is going down"
-            steps.append((transition, node, cause))
-    return _numbered(steps)
+    causes = {name: f"after {_listed(waiting)}" for name, waiting in users.items()}
+    return _numbered(
+        (transition, node, causes.get(node.name.value, "system is going down"))
+        for transition in _DOWNWARD
+        for node in order
+    )
 
 
 def _numbered(steps: Iterable[tuple[TransitionName, Node, str]]) -> Plan:

@@ -1,0 +1,183 @@
+"""What is known of the class that ``behavior: module:Class`` names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from composer.behavior_source.modules import (
+    Unreadable,
+    is_installed,
+    module_file,
+    relative_module_file,
+)
+from composer.behavior_source.syntax import Class, Import, Method, Module, read_module
+from composer.catalog import shown_path
+from composer.model import BehaviorReference
+from composer.source import Span
+
+#: A behaviour that reaches into more files than this is not followed further.
+MAXIMUM_MODULES = 32
+
+#: Bases that add no handlers: the root of behaviours, and what Python's own typing needs.
+_PLAIN_BASES = frozenset(
+    {
+        ("composer.behavior", "Behavior"),
+        ("", "object"),
+        ("abc", "ABC"),
+        ("typing", "Generic"),
+        ("typing", "Protocol"),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviorSource:
+    """A behaviour as syntax.
+
+    ``complete`` is true when ``methods`` are all there are; only then may one be called missing.
+    ``problem`` says why a module that was found cannot be read.
+    """
+
+    reference: BehaviorReference
+    module_found: bool = False
+    class_found: bool = False
+    complete: bool = False
+    path: Path | None = None
+    problem: str | None = None
+    class_names: tuple[str, ...] = ()
+    class_span: Span | None = field(default=None, compare=False)
+    methods: tuple[Method, ...] = ()
+
+    def method(self, name: str) -> Method | None:
+        """Return the method called ``name``, inherited or not; None when there is none in sight."""
+        return next((method for method in self.methods if method.name == name), None)
+
+
+def find_behavior(reference: BehaviorReference) -> BehaviorSource:
+    """Read what ``reference`` names as far as syntax tells. Never raises, never imports."""
+    path = module_file(reference.module, reference.folder)
+    if path is None:
+        # A compiled module is there, but has no syntax to read.
+        found = _is_dotted(reference.module) and is_installed(reference.module)
+        return BehaviorSource(reference, module_found=found and "." not in reference.module)
+    reader = _Reader(reference.folder)
+    try:
+        module = reader.module(path)
+    except Unreadable as error:
+        return BehaviorSource(reference, module_found=True, path=path, problem=str(error))
+    names = tuple(module.classes)
+    start = reader.lookup(module, reference.class_name)
+    if start is None:
+        return BehaviorSource(
+            reference,
+            module_found=True,
+            class_found=module.may_have(reference.class_name),
+            path=path,
+            class_names=names,
+        )
+    methods: dict[str, Method] = {}
+    complete = True
+    for known in reader.lineage(*start):
+        complete = complete and known is not None and not known.dynamic
+        for method in known.methods if known is not None else ():
+            methods.setdefault(method.name, method)
+    return BehaviorSource(
+        reference,
+        module_found=True,
+        class_found=True,
+        complete=complete,
+        path=path,
+        class_names=names,
+        class_span=start[1].span,
+        methods=tuple(methods.values()),
+    )
+
+
+def _is_dotted(name: str) -> bool:
+    return all(part.isidentifier() for part in name.split("."))
+
+
+Place = tuple[Module, Class]
+
+
+@dataclass(slots=True)
+class _Reader:
+    """Follows names from module to module."""
+
+    folder: Path
+    modules: dict[Path, Module] = field(default_factory=dict)
+
+    def module(self, path: Path) -> Module:
+        """Return a module, read once. Raises Unreadable."""
+        if path not in self.modules:
+            if len(self.modules) >= MAXIMUM_MODULES:
+                raise Unreadable("is behind too many other files")
+            self.modules[path] = read_module(path, shown_path(path))
+        return self.modules[path]
+
+    def lineage(self, module: Module, start: Class) -> Iterator[Class | None]:
+        """Yield a class and all its bases, nearest first; None for a base out of reach."""
+        seen: set[tuple[Path, str]] = set()
+        pending: list[Place] = [(module, start)]
+        while pending:
+            home, known = pending.pop()
+            if (home.path, known.name) in seen:
+                continue
+            seen.add((home.path, known.name))
+            yield known
+            for base in reversed(known.bases):
+                if self._is_plain(home, base):
+                    continue
+                found = self.lookup(home, base)
+                if found is None:
+                    yield None
+                else:
+                    pending.append(found)
+
+    def lookup(self, module: Module, name: str) -> Place | None:
+        """Return the class that ``name`` stands for in ``module``, or None out of reach."""
+        for _ in range(MAXIMUM_MODULES):
+            if name in module.classes:
+                return module, module.classes[name]
+            imported = _imported(module, name)
+            if imported is None:
+                return None
+            following = self._imported_module(module, imported)
+            if following is None:
+                return None
+            module, name = following, imported.name
+        return None
+
+    def _imported_module(self, module: Module, imported: Import) -> Module | None:
+        if imported.level:
+            path = relative_module_file(imported.module, imported.level, module.path)
+        else:
+            beside = module_file(imported.module, module.path.parent)
+            path = beside or module_file(imported.module, self.folder)
+        try:
+            return self.module(path) if path is not None else None
+        except Unreadable:
+            return None
+
+    def _is_plain(self, module: Module, base: str) -> bool:
+        if base == "object":
+            return True
+        imported = _imported(module, base)
+        return imported is not None and (imported.module, imported.name) in _PLAIN_BASES
+
+
+def _imported(module: Module, name: str) -> Import | None:
+    """Return where a name that ``module`` imports comes from: ``Base``, or ``package.Base``."""
+    if name in module.imports:
+        found = module.imports[name]
+        return found if found.name else None
+    prefix, _, last = name.rpartition(".")
+    found_module = module.imports.get(prefix)
+    if not last or found_module is None:
+        return None
+    if found_module.name:  # from package import module
+        dotted = f"{found_module.module}.{found_module.name}".lstrip(".")
+        return Import(dotted, last, found_module.level)
+    return Import(found_module.module, last)

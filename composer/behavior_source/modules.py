@@ -1,0 +1,112 @@
+"""Where the file of a Python module is, and its text, without importing it or its parents."""
+
+from __future__ import annotations
+
+import importlib.machinery
+import importlib.util
+import io
+import stat
+import tokenize
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from composer.catalog import project_nodes
+
+MAXIMUM_BYTES = 250_000
+
+#: Some of Python's codecs take time that grows with the square of the text, or are none for text.
+_ENCODINGS = frozenset({"utf-8", "utf-8-sig", "ascii", "us-ascii", "iso-8859-1", "iso-8859-15"})
+
+
+class Unreadable(Exception):
+    """The file of a module cannot be read as Python; the text says why."""
+
+
+def module_file(module: str, folder: Path) -> Path | None:
+    """Return the file of ``module``, a dotted name, or None.
+
+    It is looked for beside the YAML file (``folder``), in the project's ``nodes`` folder, and where
+    Python would find it.
+    """
+    parts = module.split(".")
+    if not all(part.isidentifier() for part in parts):
+        return None
+    project = project_nodes(folder)
+    for base in dict.fromkeys((folder, project) if project is not None else (folder,)):
+        found = _below(base, parts)
+        if found is not None:
+            return found
+    return _installed(parts)
+
+
+def is_installed(module: str) -> bool:
+    """Say whether Python knows the top of ``module``, be it compiled or built in."""
+    return _spec(module.partition(".")[0]) is not None
+
+
+def relative_module_file(module: str, level: int, importer: Path) -> Path | None:
+    """Return the file of ``from ...module import`` with ``level`` dots, written in ``importer``."""
+    base = importer.parent
+    for _ in range(level - 1):
+        base = base.parent
+    return _below(base, module.split(".") if module else [])
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a Python file, by its declared encoding. Raises Unreadable."""
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise Unreadable("is not a regular file")
+        if status.st_size > MAXIMUM_BYTES:
+            raise Unreadable(f"is larger than {MAXIMUM_BYTES} bytes")
+        content = path.read_bytes()
+    except OSError as error:
+        raise Unreadable(f"cannot be read: {error.strerror}") from None
+    try:
+        encoding, _ = tokenize.detect_encoding(io.BytesIO(content).readline)
+        if encoding not in _ENCODINGS:
+            raise Unreadable(f"has the encoding '{encoding[:40]}'; use UTF-8")
+        return content.decode(encoding)
+    except (SyntaxError, UnicodeError):
+        raise Unreadable("is not text in the encoding it declares") from None
+
+
+def _below(base: Path, parts: Sequence[str]) -> Path | None:
+    path = base.joinpath(*parts)
+    candidates = [path / "__init__.py"]
+    if parts:
+        candidates.append(path.with_name(f"{path.name}.py"))
+    return next((file for file in candidates if _exists(file)), None)
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
+def _installed(parts: list[str]) -> Path | None:
+    spec = _spec(parts[0])
+    if spec is None:
+        return None
+    if len(parts) == 1:
+        origin = Path(spec.origin) if spec.has_location and spec.origin else None
+        return origin if origin is not None and origin.suffix == ".py" else None
+    return next(_submodules(spec, parts[1:]), None)
+
+
+def _submodules(spec: importlib.machinery.ModuleSpec, parts: list[str]) -> Iterator[Path]:
+    for location in spec.submodule_search_locations or ():
+        found = _below(Path(location), parts)
+        if found is not None:
+            yield found
+
+
+def _spec(name: str) -> importlib.machinery.ModuleSpec | None:
+    """Ask Python where a top-level module is: that looks at folders and imports nothing."""
+    try:
+        return importlib.util.find_spec(name)
+    except Exception:  # import hooks of installed packages may raise whatever they like
+        return None

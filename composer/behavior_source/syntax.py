@@ -1,0 +1,229 @@
+"""One Python file as syntax: its classes, their bases and methods, and what it imports."""
+
+from __future__ import annotations
+
+import ast
+import re
+import warnings
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+from composer.behavior_source.modules import Unreadable, read_text
+from composer.source import SourceFile, Span
+
+#: Columns are not counted exactly in a line that nobody can read: it costs its square.
+_LONGEST_LINE = 10_000
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """A method of a behaviour.
+
+    ``arguments`` are the names that can be given by position, without ``self``; the last
+    ``optional`` of them have defaults. ``known`` is false when a decorator or an assignment hides
+    the signature.
+    """
+
+    name: str
+    span: Span = field(compare=False)
+    arguments: tuple[str, ...] = ()
+    optional: int = 0
+    variadic: bool = False  # takes *arguments
+    keywords: tuple[str, ...] = ()  # keyword-only arguments without a default
+    is_async: bool = False
+    known: bool = True
+
+    def accepts(self, count: int) -> bool:
+        """Say whether it can be called with ``count`` arguments by position."""
+        if not self.known:
+            return True
+        most = count if self.variadic else len(self.arguments)
+        return not self.keywords and len(self.arguments) - self.optional <= count <= most
+
+
+@dataclass(frozen=True, slots=True)
+class Class:
+    """A class as it is written. ``dynamic`` is true when syntax does not tell all it has."""
+
+    name: str
+    span: Span
+    bases: tuple[str, ...]  # dotted, as written; "" for what is not a name
+    methods: tuple[Method, ...]
+    dynamic: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Import:
+    """``from module import name``, or ``import module`` with an empty name."""
+
+    module: str
+    name: str
+    level: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Module:
+    """What a Python file defines and imports at its top."""
+
+    path: Path
+    classes: dict[str, Class]
+    imports: dict[str, Import]
+    assigned: frozenset[str]
+    dynamic: bool  # it has names that syntax does not show
+
+    def may_have(self, name: str) -> bool:
+        """Say whether ``name`` may be there without being a class statement of this file."""
+        return self.dynamic or name in self.imports or name in self.assigned
+
+
+def read_module(path: Path, shown: str) -> Module:
+    """Read a Python file; ``shown`` is its path as people know it. Raises Unreadable."""
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise Unreadable(f"cannot be read: {error.strerror}") from None
+    return _read_module(path, shown, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=128)
+def _read_module(path: Path, shown: str, _changed_ns: int, _bytes: int) -> Module:
+    source = SourceFile(shown, read_text(path))
+    statements = tuple(_top_level(_parse(source.text)))
+    classes = (item for item in statements if isinstance(item, ast.ClassDef))
+    imports = dict(_imports(statements))
+    return Module(
+        path=path,
+        classes={item.name: _class(item, source) for item in classes},
+        imports=imports,
+        assigned=frozenset(name.id for item in statements for name in _assigned(item)),
+        dynamic="*" in imports or any(_is_getattr(item) for item in statements),
+    )
+
+
+def _parse(text: str) -> list[ast.stmt]:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return ast.parse(text).body
+    except SyntaxError as error:
+        raise Unreadable(f"is not Python: {error.msg} (line {error.lineno})") from None
+    except (ValueError, RecursionError, MemoryError):
+        raise Unreadable("is not Python that can be read") from None
+
+
+def _top_level(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
+    """Yield the statements of a body, and those under an if, a try or a with."""
+    pending = list(body)[::-1]
+    while pending:
+        statement = pending.pop()
+        yield statement
+        inner: list[ast.stmt] = []
+        for name in ("body", "orelse", "finalbody"):
+            if isinstance(statement, ast.If | ast.Try | ast.With):
+                inner.extend(getattr(statement, name, ()))
+        if isinstance(statement, ast.Try):
+            inner.extend(item for handler in statement.handlers for item in handler.body)
+        pending.extend(reversed(inner))
+
+
+def _imports(statements: Iterable[ast.stmt]) -> Iterator[tuple[str, Import]]:
+    for statement in statements:
+        if isinstance(statement, ast.ImportFrom):
+            for alias in statement.names:
+                found = Import(statement.module or "", alias.name, statement.level)
+                yield alias.asname or alias.name, found
+        elif isinstance(statement, ast.Import):
+            for alias in statement.names:
+                bound = alias.asname or alias.name
+                yield bound, Import(alias.name, "")
+
+
+def _class(node: ast.ClassDef, source: SourceFile) -> Class:
+    statements = tuple(_top_level(node.body))
+    methods = {method.name: method for item in statements for method in _methods(item, source)}
+    dynamic = bool(node.decorator_list or node.keywords) or "__getattr__" in methods
+    return Class(
+        node.name,
+        _name_span(node, "class", source),
+        tuple(_dotted(base) for base in node.bases),
+        tuple(methods.values()),
+        dynamic,
+    )
+
+
+def _methods(statement: ast.stmt, source: SourceFile) -> Iterator[Method]:
+    if isinstance(statement, Function):
+        yield _method(statement, source)
+        return
+    for target in _assigned(statement):
+        yield Method(target.id, _span(target, len(target.id), source), known=False)
+
+
+def _assigned(statement: ast.stmt) -> Iterator[ast.Name]:
+    """Yield the names that a statement assigns a value to."""
+    targets: list[ast.expr] = []
+    if isinstance(statement, ast.Assign):
+        targets = statement.targets
+    elif isinstance(statement, ast.AnnAssign) and statement.value is not None:
+        targets = [statement.target]
+    yield from (target for target in targets if isinstance(target, ast.Name))
+
+
+def _is_getattr(statement: ast.stmt) -> bool:
+    return isinstance(statement, Function) and statement.name == "__getattr__"
+
+
+def _method(node: Function, source: SourceFile) -> Method:
+    decorators = {_dotted(decorator) for decorator in node.decorator_list}
+    positional = [item.arg for item in (*node.args.posonlyargs, *node.args.args)]
+    static = "staticmethod" in decorators
+    return Method(
+        name=node.name,
+        span=_name_span(node, "def", source),
+        arguments=tuple(positional if static else positional[1:]),
+        optional=min(len(node.args.defaults), len(positional)),
+        variadic=node.args.vararg is not None,
+        keywords=tuple(
+            argument.arg
+            for argument, default in zip(node.args.kwonlyargs, node.args.kw_defaults, strict=True)
+            if default is None
+        ),
+        is_async=isinstance(node, ast.AsyncFunctionDef),
+        known=decorators <= _TRANSPARENT and bool(positional or static),
+    )
+
+
+_TRANSPARENT = frozenset({"staticmethod", "classmethod", "override", "typing.override"})
+
+
+def _dotted(node: ast.expr) -> str:
+    """Return a dotted name as written; the subscript of ``Base[T]`` left out; "" for the rest."""
+    if isinstance(node, ast.Subscript):
+        node = node.value
+    parts = []
+    while isinstance(node, ast.Attribute):
+        parts.append(node.attr)
+        node = node.value
+    if not isinstance(node, ast.Name):
+        return ""
+    return ".".join((node.id, *reversed(parts)))
+
+
+def _name_span(node: Function | ast.ClassDef, keyword: str, source: SourceFile) -> Span:
+    """Return the place of the name behind ``def`` or ``class``."""
+    span = _span(node, len(node.name), source)
+    found = re.search(rf"{keyword}\s+({re.escape(node.name)})\b", source.line(span.line))
+    return Span(source, span.line, found.start(1) + 1, span.length) if found else span
+
+
+def _span(node: ast.stmt | ast.expr, length: int, source: SourceFile) -> Span:
+    """Return a place in characters; Python counts columns in UTF-8 bytes."""
+    line = source.line(node.lineno)
+    column = node.col_offset
+    if not line.isascii() and len(line) <= _LONGEST_LINE:
+        column = len(line.encode()[:column].decode(errors="replace"))
+    return Span(source, node.lineno, column + 1, length)

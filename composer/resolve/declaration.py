@@ -1,0 +1,119 @@
+"""What a node is made of, as its type or its inline entry declares it, before it has a place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from composer.diagnostics import Diagnostic
+from composer.model import (
+    BehaviorReference,
+    Parameter,
+    PeriodUnit,
+    Port,
+    PortKind,
+    Timer,
+    UnknownKey,
+)
+from composer.resolve.parameters import declarations
+from composer.resolve.ports import ports, timers
+from composer.resolve.qos import QosTable
+from composer.resolve.reactions import NODE_EVENTS, Events, node_reactions
+from composer.resolve.reading import entries, key, plain_text, text
+from composer.source import Located
+from composer.tree import Entry, Mapping, Plain, plain
+
+
+@dataclass(frozen=True, slots=True)
+class Declaration:
+    """Everything that nodes of one type, made with the same variables, share."""
+
+    description: str
+    behavior: BehaviorReference | None
+    parameters: tuple[Parameter, ...]
+    ports: tuple[Port, ...]
+    timers: tuple[Timer, ...]
+    state: tuple[tuple[Located[str], Plain], ...]
+    reactions: Events
+
+
+def declare(tree: Mapping, folder: Path, qos: QosTable, findings: list[Diagnostic]) -> Declaration:
+    """Read a node type or an inline node. ``folder`` is that of the file it stands in."""
+    behavior = text(tree.get("behavior"))
+    return Declaration(
+        description=plain_text(tree.get("description")),
+        behavior=BehaviorReference(behavior, folder) if behavior is not None else None,
+        parameters=declarations(tree.get("parameters")),
+        ports=ports(tree, qos, findings),
+        timers=timers(tree, findings),
+        state=tuple((key(entry), plain(entry.value)) for entry in entries(tree.get("state"))),
+        reactions=node_reactions(tree, findings),
+    )
+
+
+_REFINED_SECTIONS = (*(kind.section for kind in PortKind), "timers")
+_REPLACED_KEYS = ("description", *(name for name, _ in NODE_EVENTS))
+_PERIOD_KEYS = frozenset(unit.value for unit in PeriodUnit)
+
+
+def refines(instance: Mapping) -> bool:
+    """Say whether a system's entry of a node changes anything of its type but parameter values."""
+    return any(
+        entry.name in _REFINED_SECTIONS or entry.name in _REPLACED_KEYS or entry.name == "state"
+        for entry in instance
+    )
+
+
+def refined(declared: Mapping, instance: Mapping) -> Mapping:
+    """Return the node type's tree with what the instance says instead.
+
+    Of a port or a timer each key that the instance gives replaces the type's; ports and timers
+    that the type does not have are left out (see :func:`unknown_keys`).
+    """
+    changed = {entry.name: entry for entry in declared}
+    for entry in instance:
+        if entry.name in _REFINED_SECTIONS:
+            if entry.name in changed:
+                changed[entry.name] = _refined_section(changed[entry.name], entry)
+        elif entry.name == "state":
+            changed["state"] = _overlaid(changed["state"], entry) if "state" in changed else entry
+        elif entry.name in _REPLACED_KEYS:
+            changed[entry.name] = entry
+    return Mapping(tuple(changed.values()), declared.span)
+
+
+def unknown_keys(declared: Mapping, instance: Mapping) -> tuple[UnknownKey, ...]:
+    """Return the ports and timers that the instance refines and its type does not have."""
+    unknown = []
+    for section in _REFINED_SECTIONS:
+        given = entries(instance.get(section))
+        if not given:
+            continue
+        known = dict.fromkeys(entry.name for entry in entries(declared.get(section)))
+        unknown.extend(
+            UnknownKey(section, key(entry), tuple(known))
+            for entry in given
+            if entry.name not in known
+        )
+    return tuple(unknown)
+
+
+def _refined_section(declared: Entry, given: Entry) -> Entry:
+    """Return a section of ports or timers, each overlaid with what the instance says of it."""
+    changes = {entry.name: entry for entry in entries(given.value)}
+    merged = tuple(
+        _overlaid(entry, changes[entry.name]) if entry.name in changes else entry
+        for entry in entries(declared.value)
+    )
+    return Entry(declared.key, Mapping(merged, declared.value.span))
+
+
+def _overlaid(declared: Entry, given: Entry) -> Entry:
+    """Return ``declared`` with the keys of ``given`` in place of its own."""
+    if not isinstance(given.value, Mapping):
+        return declared
+    replaced = {entry.name for entry in given.value}
+    if replaced & _PERIOD_KEYS:
+        replaced |= _PERIOD_KEYS  # one way to say how often takes the place of the other
+    kept = (entry for entry in entries(declared.value) if entry.name not in replaced)
+    return Entry(given.key, Mapping((*kept, *given.value), given.value.span))

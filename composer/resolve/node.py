@@ -1,0 +1,181 @@
+"""A node of a system: its type or inline declaration, put in its place and given its values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from composer.catalog import Catalog
+from composer.diagnostics import Diagnostic
+from composer.model import (
+    Dependency,
+    Node,
+    Port,
+    PrimaryState,
+    Remapping,
+    UnknownKey,
+)
+from composer.names import expand_name, join
+from composer.resolve.connections import Joint, Joints, joint_of
+from composer.resolve.declaration import Declaration, declare, refined, refines, unknown_keys
+from composer.resolve.overrides import Overrides
+from composer.resolve.parameters import with_values
+from composer.resolve.qos import QosTable
+from composer.resolve.reading import entries, is_opaque, key, plain_text, text, text_or_opaque
+from composer.resolve.types import NodeTypes
+from composer.source import Located
+from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What all nodes of a system have around them."""
+
+    folder: Path
+    namespace: Located[str]  # absolute
+    catalog: Catalog
+    types: NodeTypes
+    qos: QosTable
+    joints: Joints
+    overrides: Overrides
+    findings: list[Diagnostic]
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """A declaration, and how much is known of it."""
+
+    declaration: Declaration
+    unknown: tuple[UnknownKey, ...] = ()
+    type_found: bool = True
+    complete: bool = True
+
+
+_NOTHING = Declaration("", None, (), (), (), (), ())
+
+
+def node(entry: Entry, around: Surroundings) -> Node:
+    """Return the node that an entry of a system's ``nodes`` declares."""
+    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    type_entry = tree.entry("type")
+    made = _inline(tree, around) if type_entry is None else _typed(type_entry, tree, around)
+    declared = made.declaration
+    namespace = node_namespace(tree.get("namespace"), around.namespace)
+    given = dict(around.overrides.by_node.get(entry.name, {}))
+    if type_entry is not None:
+        given = {item.name: item for item in entries(tree.get("parameters"))} | given
+    parameters, unknown = with_values(declared.parameters, given, complete=made.complete)
+    remappings = _remappings(tree.get("remappings"))
+    lifecycle = tree.get("lifecycle")
+    lifecycle = lifecycle if isinstance(lifecycle, Mapping) else Mapping((), tree.span)
+    return Node(
+        name=key(entry),
+        namespace=namespace,
+        span=entry.key.span,
+        type_name=text_or_opaque(type_entry.value, type_entry.key.span) if type_entry else None,
+        type_found=made.type_found,
+        description=plain_text(tree.get("description")) or declared.description,
+        behavior=declared.behavior,
+        parameters=parameters,
+        ports=placed(declared.ports, entry.name, namespace.value, remappings, around.joints),
+        timers=declared.timers,
+        state=declared.state,
+        reactions=declared.reactions,
+        remappings=remappings,
+        executor=text(tree.get("executor")),
+        depends_on=_dependencies(lifecycle.get("depends_on")),
+        autostart=state(lifecycle.get("autostart")),
+        unknown=(*made.unknown, *unknown),
+        complete=made.complete,
+    )
+
+
+def node_namespace(tree: Tree | None, system: Located[str]) -> Located[str]:
+    """Return a node's namespace, absolute: its own below the system's, unless it is absolute."""
+    own = text(tree)
+    if own is None:
+        return system
+    return own if is_opaque(own.value) else own.map(lambda name: join(system.value, name))
+
+
+def placed(
+    ports: Iterable[Port],
+    name: str,
+    namespace: str,
+    remappings: Iterable[Remapping],
+    joints: Joints,
+) -> tuple[Port, ...]:
+    """Return the ports with the full names they have in a node, and the profiles of connections.
+
+    A connection's name wins over remapping, and remapping over the declared name.
+    """
+
+    def expanded(ros_name: str) -> str:
+        return ros_name if is_opaque(ros_name) else expand_name(ros_name, name, namespace)
+
+    renamed: dict[str, str] = {}
+    for remapping in remappings:
+        renamed.setdefault(expanded(remapping.source.value), expanded(remapping.target.value))
+    return tuple(
+        _placed(port, joints.get((name, port.name.value), ()), expanded, renamed) for port in ports
+    )
+
+
+def _placed(
+    port: Port,
+    joints: Iterable[Joint],
+    expanded: Callable[[str], str],
+    renamed: dict[str, str],
+) -> Port:
+    joint = joint_of(port, joints)
+    if joint is None:
+        own = expanded(port.ros_name.value)
+        return replace(port, full_name=renamed.get(own, own))
+    return replace(port, full_name=joint.full_name, qos=joint.qos or port.qos)
+
+
+def _inline(tree: Mapping, around: Surroundings) -> Made:
+    return Made(declare(tree, around.folder, around.qos, around.findings))
+
+
+def _typed(type_entry: Entry, tree: Mapping, around: Surroundings) -> Made:
+    name = text(type_entry.value)
+    path = around.catalog.find(name.value) if name is not None else None
+    if path is None:
+        return Made(_NOTHING, type_found=False, complete=False)
+    made = around.types.make(path, tree.get("variables"))
+    if made is None:
+        return Made(_NOTHING, complete=False)
+    unknown = unknown_keys(made.tree, tree) if made.complete else ()
+    declaration = made.declaration
+    if refines(tree):
+        # Expressions of the type that are compiled again say nothing that was not said before.
+        merged = refined(made.tree, tree)
+        declaration = declare(merged, made.folder, around.qos, around.findings)
+    return Made(declaration, unknown, complete=made.complete)
+
+
+def _remappings(tree: Tree | None) -> tuple[Remapping, ...]:
+    found = ((key(entry), text(entry.value)) for entry in entries(tree))
+    return tuple(Remapping(source, target) for source, target in found if target is not None)
+
+
+def _dependencies(tree: Tree | None) -> tuple[Dependency, ...]:
+    """Return the nodes depended on: a list of names, or a map of names to states."""
+    if isinstance(tree, Mapping):
+        return tuple(_dependency(entry) for entry in tree)
+    names = (text(item) for item in (tree.items if isinstance(tree, Sequence) else ()))
+    return tuple(Dependency(name) for name in names if name is not None)
+
+
+def _dependency(entry: Entry) -> Dependency:
+    needed = state(entry.value)
+    return Dependency(key(entry), needed.value if needed is not None else PrimaryState.ACTIVE)
+
+
+def state(tree: Tree | None) -> Located[PrimaryState] | None:
+    """Return a lifecycle state with its place."""
+    if isinstance(tree, Scalar) and tree.value in {item.value for item in PrimaryState}:
+        return Located(PrimaryState(str(tree.value)), tree.span)
+    return None

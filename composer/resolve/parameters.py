@@ -1,0 +1,139 @@
+"""Parameters: declarations, and the values that a system gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from collections.abc import Mapping as Map
+from dataclasses import replace
+
+from composer.model import Parameter, ParameterType, UnknownKey
+from composer.resolve.reading import (
+    OPAQUE,
+    entries,
+    flag,
+    key,
+    number,
+    plain_text,
+    text_or_opaque,
+)
+from composer.source import Located
+from composer.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree, plain
+
+
+def declarations(tree: Tree | None) -> tuple[Parameter, ...]:
+    """Return what ``parameters`` of a node type or an inline node declares.
+
+    A bare value declares a parameter of its own type with that default.
+    """
+    return tuple(_declaration(entry) for entry in entries(tree))
+
+
+def with_values(
+    parameters: Iterable[Parameter], given: Map[str, Entry], *, complete: bool
+) -> tuple[tuple[Parameter, ...], tuple[UnknownKey, ...]]:
+    """Return the parameters with the values given by name, and the names that none of them has.
+
+    Of a node that is not ``complete`` nothing is known well enough to call a name unknown.
+    """
+    declared = tuple(parameters)
+    if not given:
+        return declared, ()
+    valued = tuple(
+        _with_value(item, given[item.name.value].value) if item.name.value in given else item
+        for item in declared
+    )
+    names = tuple(item.name.value for item in declared)
+    known = set(names)
+    unknown = tuple(
+        UnknownKey("parameters", key(entry), names)
+        for name, entry in given.items()
+        if name not in known
+    )
+    return valued, unknown if complete else ()
+
+
+def inferred_type(value: Plain) -> str | None:
+    """Return the parameter type that ``value`` itself tells; None for null, maps and mixtures."""
+    if isinstance(value, list):
+        kinds = {_SCALAR_TYPES.get(type(item)) for item in value}
+        if kinds == {"integer", "double"}:
+            kinds = {"double"}
+        kind = kinds.pop() if len(kinds) == 1 else None
+        return f"{kind}_array" if kind is not None else None
+    return _SCALAR_TYPES.get(type(value))
+
+
+def promoted(value: Plain, kind: str) -> Plain:
+    """Return ``value`` with whole numbers as doubles where ``kind`` asks for doubles."""
+    if kind == ParameterType.DOUBLE and _is_whole(value):
+        return _as_double(value)
+    if kind == ParameterType.DOUBLE_ARRAY and isinstance(value, list):
+        return [_as_double(item) if _is_whole(item) else item for item in value]
+    return value
+
+
+_SCALAR_TYPES: Map[type, str] = {bool: "bool", int: "integer", float: "double", str: "string"}
+
+
+def _is_whole(value: Plain) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _as_double(value: Plain) -> Plain:
+    try:
+        return float(value)  # type: ignore[arg-type]  # only asked of whole numbers
+    except OverflowError:
+        return value
+
+
+def _declaration(entry: Entry) -> Parameter:
+    if not isinstance(entry.value, Mapping):
+        return _bare(entry)
+    tree = entry.value
+    kind = text_or_opaque(tree.get("type"), entry.key.span)
+    default = _value(tree.get("default"), kind.value)
+    choices = tree.get("choices")
+    return Parameter(
+        name=key(entry),
+        type=kind,
+        value=default,
+        default=default,
+        span=entry.key.span,
+        minimum=number(tree.get("minimum")),
+        maximum=number(tree.get("maximum")),
+        step=number(tree.get("step")),
+        choices=_choices(choices, kind.value) if isinstance(choices, Sequence) else None,
+        read_only=flag(tree.get("read_only"), default=False),
+        unit=plain_text(tree.get("unit")),
+        description=plain_text(tree.get("description")),
+    )
+
+
+def _bare(entry: Entry) -> Parameter:
+    kind = inferred_type(plain(entry.value)) or OPAQUE
+    value = _value(entry.value, kind)
+    return Parameter(
+        name=key(entry),
+        type=Located(kind, entry.value.span),
+        value=value,
+        default=value,
+        span=entry.key.span,
+    )
+
+
+def _with_value(parameter: Parameter, tree: Tree) -> Parameter:
+    value = _value(tree, parameter.type.value)
+    return replace(parameter, value=value) if value is not None else parameter
+
+
+def _value(tree: Tree | None, kind: str) -> Located[Plain] | None:
+    """Return a value; None for null, which no ROS parameter can be declared with, and for maps."""
+    if tree is None or isinstance(tree, Mapping):
+        return None
+    if isinstance(tree, Scalar) and tree.value is None:
+        return None
+    return Located(promoted(plain(tree), kind), tree.span)
+
+
+def _choices(tree: Sequence, kind: str) -> Located[tuple[Plain, ...]]:
+    return Located(tuple(promoted(plain(item), kind) for item in tree.items), tree.span)

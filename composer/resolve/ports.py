@@ -1,0 +1,154 @@
+"""Ports and timers, as a node type or an inline node declares them."""
+
+from __future__ import annotations
+
+from composer.diagnostics import Diagnostic
+from composer.model import (
+    Event,
+    FeedbackSteps,
+    Period,
+    PeriodUnit,
+    Port,
+    PortKind,
+    Timer,
+)
+from composer.resolve.qos import QosTable, implicit_qos
+from composer.resolve.reactions import Events, expression, nested, reaction, template
+from composer.resolve.reading import (
+    entries,
+    flag,
+    integer,
+    key,
+    number,
+    plain_text,
+    text,
+    text_or_opaque,
+)
+from composer.source import Located, Span
+from composer.templates import Computed
+from composer.tree import Entry, Mapping, Scalar, Tree
+
+#: What clients wait for their server and its answer unless they say otherwise.
+DEFAULT_TIMEOUT_MS = 5000
+
+_CLIENTS = frozenset({PortKind.CLIENT, PortKind.ACTION_CLIENT})
+_INLINE_EVENTS = {
+    PortKind.SUBSCRIPTION: Event.MESSAGE,
+    PortKind.SERVICE: Event.REQUEST,
+    PortKind.ACTION_SERVER: Event.GOAL,
+}
+_NESTED_EVENTS = {
+    PortKind.CLIENT: (("on_response", Event.RESPONSE), ("on_failure", Event.FAILURE)),
+    PortKind.ACTION_CLIENT: (
+        ("on_feedback", Event.FEEDBACK),
+        ("on_result", Event.RESULT),
+        ("on_failure", Event.FAILURE),
+    ),
+}
+
+
+def ports(node: Mapping, qos: QosTable, findings: list[Diagnostic]) -> tuple[Port, ...]:
+    """Return the ports a node declares, with the names they declare for full names.
+
+    What they are called in full is known once the node has a name and a namespace.
+    """
+    return tuple(
+        _port(kind, entry, qos, findings)
+        for kind in PortKind
+        for entry in entries(node.get(kind.section))
+    )
+
+
+def timers(node: Mapping, findings: list[Diagnostic]) -> tuple[Timer, ...]:
+    """Return the timers a node declares."""
+    return tuple(_timer(entry, findings) for entry in entries(node.get("timers")))
+
+
+def _port(kind: PortKind, entry: Entry, qos: QosTable, findings: list[Diagnostic]) -> Port:
+    span = entry.key.span
+    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), span)
+    ros_name = text(tree.get(kind.channel.value)) or key(entry)
+    accept = expression(tree.get("accept"), findings)
+    return Port(
+        kind=kind,
+        name=key(entry),
+        interface=text_or_opaque(tree.get("type"), span),
+        ros_name=ros_name,
+        full_name=ros_name.value,
+        qos=qos.resolve(tree.get("qos"), implicit_qos(kind.channel, span)),
+        span=span,
+        reactions=_reactions(kind, entry, tree, findings),
+        timeout_ms=_timeout(kind, tree, span),
+        result_timeout_ms=number(tree.get("result_timeout_ms")),
+        accept=accept.value if accept is not None else None,
+        accept_span=accept.span if accept is not None else None,
+        feedback=_feedback(tree.entry("feedback"), findings),
+        result=template(tree.get("result"), findings),
+        reentrant=flag(tree.get("reentrant"), default=False),
+        external=flag(tree.get("external"), default=False),
+        required=flag(tree.get("required"), default=True),
+        description=plain_text(tree.get("description")),
+    )
+
+
+def _timeout(kind: PortKind, tree: Mapping, span: Span) -> Located[float] | None:
+    default = Located(DEFAULT_TIMEOUT_MS, span) if kind in _CLIENTS else None
+    return number(tree.get("timeout_ms")) or default
+
+
+def _reactions(kind: PortKind, entry: Entry, tree: Mapping, findings: list[Diagnostic]) -> Events:
+    if kind in _INLINE_EVENTS:
+        found = reaction(tree, entry.key.span, findings)
+        return ((_INLINE_EVENTS[kind], found),) if found is not None else ()
+    return tuple(
+        found
+        for name, event in _NESTED_EVENTS.get(kind, ())
+        for found in nested(tree.entry(name), event, findings)
+    )
+
+
+def _feedback(entry: Entry | None, findings: list[Diagnostic]) -> FeedbackSteps | None:
+    if entry is None or not isinstance(entry.value, Mapping):
+        return None
+    count = integer(entry.value.get("count"))
+    period_ms = number(entry.value.get("period_ms"))
+    content = template(entry.value.get("message"), findings)
+    if count is None or period_ms is None:
+        return None
+    return FeedbackSteps(count, period_ms, content, entry.key.span)
+
+
+def _timer(entry: Entry, findings: list[Diagnostic]) -> Timer:
+    span = entry.key.span
+    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), span)
+    return Timer(
+        name=key(entry),
+        period=_period(tree, span, findings),
+        span=span,
+        reaction=reaction(tree, span, findings),
+        reentrant=flag(tree.get("reentrant"), default=False),
+        description=plain_text(tree.get("description")),
+    )
+
+
+def _period(tree: Mapping, span: Span, findings: list[Diagnostic]) -> Period:
+    """Return how often a timer fires.
+
+    Where that cannot be read there is a finding already (or a load-time variable without value),
+    and a plain second keeps the timer in the model: nothing else is wrong with it.
+    """
+    for unit in PeriodUnit:
+        written = tree.get(unit.value)
+        if written is not None:
+            return _written_period(written, unit, findings)
+    return Period(1000.0, PeriodUnit.MILLISECONDS, span)
+
+
+def _written_period(tree: Tree, unit: PeriodUnit, findings: list[Diagnostic]) -> Period:
+    value = number(tree)
+    if value is not None:
+        return Period(value.value, unit, tree.span)
+    compiled = template(tree, findings) if isinstance(tree, Scalar) else None
+    if isinstance(compiled, Computed):
+        return Period(compiled.expression, unit, compiled.span)
+    return Period(1000.0, PeriodUnit.MILLISECONDS, tree.span)

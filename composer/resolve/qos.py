@@ -1,0 +1,163 @@
+"""QoS profiles: by name, by preset, written out in place, and built on each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Mapping as Map
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from composer.model import ChannelKind, NamedQos, Qos, QosReference
+from composer.qos import (
+    PRESETS,
+    Durability,
+    History,
+    Liveliness,
+    QosProfile,
+    Reliability,
+)
+from composer.resolve.reading import entries, integer, is_opaque, key, number, text
+from composer.source import Located, Span
+from composer.tree import Entry, Mapping, Scalar, Tree
+
+
+@dataclass(slots=True)
+class QosTable:
+    """The profiles a system knows by name, and every use of a name that was met."""
+
+    named: tuple[NamedQos, ...] = ()
+    by_name: dict[str, Qos] = field(default_factory=dict)
+    references: list[QosReference] = field(default_factory=list)
+
+    def resolve(self, tree: Tree | None, default: Qos) -> Qos:
+        """Return the profile that ``tree`` names or writes out; ``default`` where it is absent.
+
+        An unknown name stays among the references, for the checks; it gives ``default``'s values.
+        """
+        if isinstance(tree, Mapping):
+            base = self._base(tree, default)
+            return _overlaid(tree, base, tree.span)
+        name = text(tree)
+        if name is None:
+            return default
+        found = self.use(name)
+        return _at(found or default, name.span)
+
+    def use(self, name: Located[str]) -> Qos | None:
+        """Return the profile called ``name``, and remember that it was asked for."""
+        if is_opaque(name.value):
+            return None
+        self.references.append(QosReference(name))
+        return self.by_name.get(name.value) or _preset(name)
+
+    def _base(self, tree: Mapping, default: Qos) -> Qos:
+        extends = text(tree.get("extends"))
+        if extends is None:
+            # What an inline profile leaves out is rclpy's, whatever the kind of port.
+            return replace(default, profile=QosProfile())
+        return self.use(extends) or default
+
+
+def qos_table(tree: Tree | None) -> QosTable:
+    """Resolve a system's ``qos_profiles``, each on top of what it extends.
+
+    A profile on a cycle is built on rclpy's default; so is one that extends an unknown name.
+    """
+    table = QosTable()
+    written = {entry.name: entry for entry in entries(tree) if isinstance(entry.value, Mapping)}
+    for entry in written.values():
+        for link in reversed(_unresolved_chain(entry, written, table.by_name)):
+            table.by_name[link.name] = _profile(link, table.by_name)
+    table.named = tuple(
+        NamedQos(key(entry), table.by_name[entry.name], _extends(entry))
+        for entry in written.values()
+    )
+    for profile in table.named:
+        if profile.extends is not None:
+            table.references.append(QosReference(profile.extends))
+    return table
+
+
+def implicit_qos(kind: ChannelKind, span: Span) -> Qos:
+    """Return what a port gets that says nothing: rclpy's defaults for its kind."""
+    preset = "command" if kind is ChannelKind.TOPIC else "services_default"
+    return Qos(PRESETS[preset], span, explicit=False)
+
+
+def _unresolved_chain(
+    entry: Entry, written: Map[str, Entry], resolved: Map[str, Qos]
+) -> list[Entry]:
+    """Return ``entry`` and what it extends, up to something known; chains may be long."""
+    chain: dict[str, Entry] = {}
+    link: Entry | None = entry
+    while link is not None and link.name not in chain and link.name not in resolved:
+        chain[link.name] = link
+        extends = _extends(link)
+        link = written.get(extends.value) if extends is not None else None
+    return list(chain.values())
+
+
+def _profile(entry: Entry, resolved: Map[str, Qos]) -> Qos:
+    extends = _extends(entry)
+    base = Qos(QosProfile(), entry.key.span)
+    if extends is not None:
+        base = resolved.get(extends.value) or _preset(extends) or base
+    return _overlaid(entry.value, base, entry.key.span)
+
+
+def _extends(entry: Entry) -> Located[str] | None:
+    return text(entry.value.get("extends")) if isinstance(entry.value, Mapping) else None
+
+
+def _preset(name: Located[str]) -> Qos | None:
+    profile = PRESETS.get(name.value)
+    return Qos(profile, name.span) if profile is not None else None
+
+
+def _at(qos: Qos, span: Span) -> Qos:
+    """Return the profile as used at ``span``; policies keep the place that decided them."""
+    return Qos(qos.profile, span, explicit=True, policy_spans=qos.policy_spans)
+
+
+def _overlaid(tree: Tree, base: Qos, span: Span) -> Qos:
+    """Return ``base`` with the policies that ``tree`` writes out."""
+    changes: dict[str, Any] = {}
+    spans = dict(base.policy_spans)
+    for entry in entries(tree):
+        read = _POLICIES.get(entry.name)
+        value = read(entry.value) if read is not None else None
+        if value is not None:
+            changes[entry.name] = value.value
+            spans[entry.name] = entry.value.span
+    profile = replace(base.profile, **changes)
+    return Qos(profile, span, explicit=True, policy_spans=tuple(spans.items()))
+
+
+Reader = Callable[[Tree], "Located[Any] | None"]
+
+
+def _one_of(values: type[History | Reliability | Durability | Liveliness]) -> Reader:
+    def read(tree: Tree) -> Located[Any] | None:
+        found = text(tree)
+        known = {item.value: item for item in values}
+        return found.map(known.__getitem__) if found is not None and found.value in known else None
+
+    return read
+
+
+def _duration(tree: Tree) -> Located[Any] | None:
+    if isinstance(tree, Scalar) and tree.value is None:
+        return Located(None, tree.span)
+    return number(tree)
+
+
+_POLICIES: Map[str, Reader] = {
+    "history": _one_of(History),
+    "depth": integer,
+    "reliability": _one_of(Reliability),
+    "durability": _one_of(Durability),
+    "deadline_ms": _duration,
+    "lifespan_ms": _duration,
+    "liveliness": _one_of(Liveliness),
+    "liveliness_lease_duration_ms": _duration,
+}

@@ -1,0 +1,149 @@
+"""A whole file: a system, or a node type alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from composer.catalog import Catalog
+from composer.diagnostics import Diagnostic
+from composer.model import (
+    Executor,
+    ExecutorKind,
+    Node,
+    PrimaryState,
+    System,
+    UnknownKey,
+)
+from composer.names import join
+from composer.resolve.connections import connections
+from composer.resolve.declaration import declare
+from composer.resolve.node import Surroundings, node, placed, state
+from composer.resolve.overrides import Overrides
+from composer.resolve.parameters import with_values
+from composer.resolve.qos import qos_table
+from composer.resolve.reading import (
+    entries,
+    integer,
+    is_opaque,
+    key,
+    plain_text,
+    text,
+    text_or_opaque,
+)
+from composer.resolve.types import NodeTypes
+from composer.source import Located, SourceFile, Span
+from composer.tree import Entry, Mapping, Tree
+
+ROOT = "/"
+DEFAULT_THREADS = 2
+
+
+def resolve_system(
+    tree: Mapping, source: SourceFile, folder: Path, catalog: Catalog, overrides: Overrides
+) -> tuple[System, list[Diagnostic]]:
+    """Return the system that an expanded tree declares. See :func:`composer.resolve.resolve`."""
+    findings: list[Diagnostic] = []
+    qos = qos_table(tree.get("qos_profiles"))
+    namespace = _system_namespace(tree, overrides)
+    joined, joints = connections(tree.get("connections"), namespace.value, qos)
+    types = NodeTypes(catalog, qos, findings)
+    around = Surroundings(folder, namespace, catalog, types, qos, joints, overrides, findings)
+    nodes = tuple(node(entry, around) for entry in entries(tree.get("nodes")))
+    lifecycle = tree.get("lifecycle")
+    autostart = state(lifecycle.get("autostart")) if isinstance(lifecycle, Mapping) else None
+    system = System(
+        name=_name(tree, "system"),
+        source=source,
+        nodes=nodes,
+        span=_name_span(tree, "system"),
+        description=plain_text(tree.get("description")),
+        connections=joined,
+        qos_profiles=qos.named,
+        qos_references=tuple(qos.references),
+        executors=tuple(_executor(entry) for entry in entries(tree.get("executors"))),
+        autostart=autostart.value if autostart is not None else PrimaryState.ACTIVE,
+        unknown=_unknown_nodes(nodes, overrides),
+    )
+    return system, findings
+
+
+def resolve_node_type(
+    tree: Mapping, source: SourceFile, folder: Path, overrides: Overrides
+) -> tuple[System, list[Diagnostic]]:
+    """Return a system of the one node that a node type declares, for validating it alone."""
+    findings: list[Diagnostic] = []
+    qos = qos_table(None)
+    declared = declare(tree, folder, qos, findings)
+    name = _name(tree, "node")
+    span = _name_span(tree, "node")
+    namespace = _system_namespace(Mapping((), span), overrides)
+    given = overrides.by_node.get(name.value, {})
+    parameters, unknown = with_values(declared.parameters, given, complete=True)
+    alone = Node(
+        name=name,
+        namespace=namespace,
+        span=span,
+        description=declared.description,
+        behavior=declared.behavior,
+        parameters=parameters,
+        ports=placed(declared.ports, name.value, namespace.value, (), {}),
+        timers=declared.timers,
+        state=declared.state,
+        reactions=declared.reactions,
+        unknown=unknown,
+    )
+    system = System(
+        name=name,
+        source=source,
+        nodes=(alone,),
+        span=span,
+        description=declared.description,
+        qos_references=tuple(qos.references),
+        node_type=True,
+        unknown=_unknown_nodes((alone,), overrides),
+    )
+    return system, findings
+
+
+def _name(tree: Mapping, kind: str) -> Located[str]:
+    return text_or_opaque(tree.get(kind), _name_span(tree, kind))
+
+
+def _name_span(tree: Mapping, kind: str) -> Span:
+    entry = tree.entry(kind)
+    return entry.value.span if entry is not None else tree.span
+
+
+def _system_namespace(tree: Mapping, overrides: Overrides) -> Located[str]:
+    """Return the namespace of everything in the system, absolute. The command line's wins."""
+    written = overrides.namespace or text(tree.get("namespace"))
+    if written is None:
+        return Located(ROOT, tree.span)
+    return written if is_opaque(written.value) else written.map(lambda name: join(ROOT, name))
+
+
+def _unknown_nodes(nodes: tuple[Node, ...], overrides: Overrides) -> tuple[UnknownKey, ...]:
+    names = tuple(item.name.value for item in nodes)
+    known = set(names)
+    return tuple(
+        UnknownKey("nodes", item.node, names)
+        for item in overrides.parameters
+        if item.node.value not in known
+    )
+
+
+def _executor(entry: Entry) -> Executor:
+    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    threads = integer(tree.get("threads"))
+    return Executor(
+        name=key(entry),
+        kind=_executor_kind(tree.get("kind")),
+        span=entry.key.span,
+        threads=threads.value if threads is not None else DEFAULT_THREADS,
+    )
+
+
+def _executor_kind(tree: Tree | None) -> ExecutorKind:
+    written = text(tree)
+    known = {item.value: item for item in ExecutorKind}
+    return known.get(written.value, ExecutorKind.EVENTS) if written else ExecutorKind.EVENTS
