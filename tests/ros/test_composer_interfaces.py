@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import pytest
-
-pytestmark = pytest.mark.ros
+from composer_interfaces.action import Navigate
+from composer_interfaces.srv import PlanTrajectory
 
 
 def _fields(message) -> dict[str, str]:
@@ -12,8 +11,6 @@ def _fields(message) -> dict[str, str]:
 
 
 def test_plan_trajectory() -> None:
-    from composer_interfaces.srv import PlanTrajectory
-
     assert _fields(PlanTrajectory.Request) == {
         "start": "geometry_msgs/Point",
         "goal": "geometry_msgs/Point",
@@ -27,8 +24,6 @@ def test_plan_trajectory() -> None:
 
 
 def test_navigate() -> None:
-    from composer_interfaces.action import Navigate
-
     assert _fields(Navigate.Goal) == {"target": "geometry_msgs/Point", "max_velocity": "double"}
     assert _fields(Navigate.Result) == {
         "success": "boolean",

@@ -1,0 +1,45 @@
+"""The wheel, built once, and an empty environment with the wheel in it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+import pytest
+
+from tests.packaging.installation import Installation, without_ros
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+PIP = ("-m", "pip", "--disable-pip-version-check")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.path.is_relative_to(HERE):
+            item.add_marker(pytest.mark.slow)
+            item.add_marker(pytest.mark.timeout(300))
+
+
+def _pip(python: Path | str, *arguments: str | Path) -> None:
+    subprocess.run([python, *PIP, *arguments], env=without_ros(), check=True)
+
+
+@pytest.fixture(scope="session")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel that would be published."""
+    folder = tmp_path_factory.mktemp("wheel")
+    _pip(sys.executable, "wheel", "-qq", "--no-deps", "--wheel-dir", folder, ROOT)
+    (path,) = folder.glob("*.whl")
+    return path
+
+
+@pytest.fixture(scope="session")
+def installation(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installation:
+    """The wheel in an environment that has nothing but what the wheel asks for."""
+    environment = tmp_path_factory.mktemp("environment")
+    venv.create(environment, with_pip=True, symlinks=True)
+    _pip(environment / "bin" / "python", "install", "-qq", wheel)
+    return Installation(environment, tmp_path_factory.mktemp("elsewhere"))

@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+import zipfile
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from tests.packaging.installation import Installation, with_this_ros, without_ros
+
+
+def test_the_wheel_carries_everything_and_no_litter(wheel: Path) -> None:
+    names = zipfile.ZipFile(wheel).namelist()
+
+    for path in (
+        "composer/py.typed",
+        "composer/share/interfaces/action/Navigate.action",
+        "composer/share/nodes/planner.py",
+        "composer/share/nodes/planner.yaml",
+        "composer/share/schemas/system.schema.json",
+        "composer/share/systems/pipeline.yaml",
+    ):
+        assert path in names
+    assert [name for name in names if name.endswith("/licenses/LICENSE")]
+    assert [name for name in names if "__pycache__" in name or name.startswith("tests/")] == []
+
+
+def test_the_command_tells_its_version(installation: Installation) -> None:
+    done = installation.run("compose", "--version", variables=without_ros())
+
+    assert done.returncode == 0, done.stderr
+    assert version("ros2-composer") in done.stdout
+
+
+def test_the_empty_environment_has_no_ros(installation: Installation) -> None:
+    done = installation.run("python", "-c", "import rclpy", variables=without_ros())
+
+    assert "No module named 'rclpy'" in done.stderr
+
+
+def test_the_shipped_files_are_valid_from_another_folder_and_without_ros(
+    installation: Installation,
+) -> None:
+    share = installation.package / "share"
+
+    done = installation.run(
+        "compose", "validate", share / "systems", share / "nodes", variables=without_ros()
+    )
+
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_mistake_is_found_without_ros(installation: Installation) -> None:
+    broken = installation.elsewhere / "broken.yaml"
+    broken.write_text("system: broken\nnodes:\n  planner: {type: planer}\n", "utf-8")
+
+    done = installation.run("compose", "validate", broken.name, variables=without_ros())
+
+    assert done.returncode == 1
+    assert "did you mean 'planner'?" in done.stdout + done.stderr
+
+
+def test_a_diagram_is_drawn_without_ros(installation: Installation) -> None:
+    system = installation.package / "share" / "systems" / "pipeline.yaml"
+
+    done = installation.run("compose", "graph", system, variables=without_ros())
+
+    assert done.returncode == 0, done.stderr
+    assert "motor_controller" in done.stdout
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("name", ["talker_listener", "pipeline"])
+def test_a_shipped_system_runs_with_ros(installation: Installation, name: str) -> None:
+    system = installation.package / "share" / "systems" / f"{name}.yaml"
+
+    done = installation.run("compose", "run", system, "--for", "2", variables=with_this_ros())
+
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
+
+
+@pytest.mark.ros
+def test_what_runs_is_the_wheel_and_not_the_checkout(installation: Installation) -> None:
+    where = "import composer, rclpy; print(composer.__file__)"
+
+    done = installation.run("python", "-c", where, variables=with_this_ros())
+
+    assert Path(done.stdout.strip()).is_relative_to(installation.package), done.stderr
