@@ -104,11 +104,11 @@ class Incompatibility:
 
 
 def incompatibilities(offered: QosProfile, requested: QosProfile) -> tuple[Incompatibility, ...]:
-    """Return every policy that keeps a publisher and a subscription (or a server and a client)
-    apart; none when they match.
+    """Return every policy that keeps two ends apart; none when they match.
 
-    The rule is that of DDS (OMG DDS 1.4, 2.2.3) as ``rmw_qos_profile_check_compatible`` states it:
-    the offer must be at least as strong as the request. History, depth and lifespan never matter.
+    A publisher or server offers, a subscription or client requests, and the offer must be at least
+    as strong. The rule is that of DDS (OMG DDS 1.4, 2.2.3) as ``rmw_qos_profile_check_compatible``
+    states it. History, depth and lifespan never matter.
     """
     return tuple(_incompatibilities(offered, requested))
 

@@ -96,8 +96,10 @@ def compile_template(value: Tree) -> tuple[Template | None, list[TemplateProblem
 
 
 def evaluate(template: Template, scope: Mapping[str, Any]) -> Any:
-    """Return the value of the template with the names in ``scope``: a Record becomes a dict, Items
-    a list. Raises EvaluationError."""
+    """Return the value of the template with the names in ``scope``.
+
+    A Record becomes a dict, Items a list. Raises EvaluationError.
+    """
     match template:
         case Constant(value=value):
             return value

@@ -10,10 +10,11 @@ How safety is kept: ``tokens`` lets through ASCII names, numbers, texts and a fe
 those look at the type of a value before they touch it and bound every number.
 """
 
-from composer.expressions.compiler import MAXIMUM_LENGTH, MAXIMUM_NODES, compile_expression
+from composer.expressions.compiler import compile_expression
 from composer.expressions.errors import EvaluationError, ExpressionError
-from composer.expressions.expression import Expression, FieldPath, Result
+from composer.expressions.expression import Expression, FieldPath
 from composer.expressions.operations import CONSTANTS, FUNCTIONS
+from composer.expressions.syntax import MAXIMUM_LENGTH, MAXIMUM_NODES
 
 __all__ = [
     "CONSTANTS",
@@ -24,6 +25,5 @@ __all__ = [
     "Expression",
     "ExpressionError",
     "FieldPath",
-    "Result",
     "compile_expression",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class ExpressionError(Exception):
-    """The expression says something the language does not have.
+    """The text is no expression of the language.
 
     ``offset`` and ``length`` give the part that is wrong, in characters of the source; ``hint``
     says how to mend it, where that is known.

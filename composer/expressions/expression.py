@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 from types import CodeType, TracebackType
 from typing import Any
 
+from composer.diagnostics import shown
 from composer.expressions.errors import EvaluationError, Refusal
-from composer.expressions.operations import kind_of
+from composer.expressions.values import describe
 
-_LONGEST_PART = 80
-
-
-class Result(StrEnum):
-    """What kind of value an expression has, as far as its form tells."""
-
-    PATH = "path"  # it is one field path: whatever that field is
-    NUMBER = "number"
-    INTEGER = "integer"
-    BOOL = "bool"
-    TEXT = "text"
-    UNKNOWN = "unknown"  # depends on the values
+_REASONS: Mapping[type[Exception], str] = {
+    KeyError: "there is no such name here",
+    ZeroDivisionError: "division by zero",
+    OverflowError: "the number is too large",
+    TypeError: "a text and a number have no order",
+    ValueError: "not defined for this value",
+}
 
 
 @dataclass(frozen=True, slots=True)
 class FieldPath:
-    """A use of a name: ``("message", "poses", 0, "pose")``. Offset and length are in characters
-    of the expression's source."""
+    """A use of a name: ``("message", "poses", 0, "pose")``.
+
+    Offset and length are in characters of the expression's source.
+    """
 
     parts: tuple[str | int, ...]
     offset: int = field(compare=False)
@@ -46,11 +44,15 @@ class FieldPath:
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """An expression ready to be evaluated. Two are equal when their sources are."""
+    """An expression ready to be evaluated. Two are equal when their sources are.
+
+    ``tree`` is its syntax, for whoever wants to know the type of its value; columns in it count
+    characters of the source.
+    """
 
     source: str
     paths: tuple[FieldPath, ...] = field(compare=False)
-    result: Result = field(compare=False)
+    tree: ast.expr = field(compare=False, repr=False)
     function: Callable[[Mapping[str, Any]], Any] = field(compare=False, repr=False)
 
     def evaluate(self, scope: Mapping[str, Any]) -> Any:
@@ -64,38 +66,27 @@ class Expression:
             raise EvaluationError(self._explain(error)) from error
 
     def holds(self, scope: Mapping[str, Any]) -> bool:
-        """Return the value of a condition. Raises EvaluationError when it is not a bool."""
+        """Return the value of a condition. Raises EvaluationError when it is not true or false."""
         value = self.evaluate(scope)
         if not isinstance(value, bool):
-            kind = kind_of(type(value)).value
-            raise EvaluationError(f"'{_cut(self.source)}': {kind} where true or false is expected")
+            message = f"'{shown(self.source)}': {describe(value)} where true or false is expected"
+            raise EvaluationError(message)
         return value
 
     def __str__(self) -> str:
         return self.source
 
     def _explain(self, error: Exception) -> str:
-        code: CodeType = self.function.__code__  # type: ignore[attr-defined]
+        code: CodeType = self.function.__code__
         part = _failed_part(self.source, code, error.__traceback__)
-        return f"'{_cut(part)}': {_reason(error)}"
+        return f"'{shown(part)}': {_reason(error)}"
 
 
 def _reason(error: Exception) -> str:
-    match error:
-        case Refusal():
-            return str(error)
-        case KeyError():
-            return "there is no such name here"
-        case ZeroDivisionError():
-            return "division by zero"
-        case OverflowError():
-            return "the number is too large"
-        case TypeError():
-            return "the values have no order"
-        case ValueError():
-            return "not defined for this value"
-        case _:
-            return f"{type(error).__name__} while reading the value"
+    if isinstance(error, Refusal):
+        return str(error)
+    reason = _REASONS.get(type(error))
+    return reason or f"{type(error).__name__} while the value was read"
 
 
 def _failed_part(source: str, code: CodeType, traceback: TracebackType | None) -> str:
@@ -104,13 +95,5 @@ def _failed_part(source: str, code: CodeType, traceback: TracebackType | None) -
         traceback = traceback.tb_next
     if traceback is None:
         return source
-    positions = list(code.co_positions())
-    _, _, start, end = positions[traceback.tb_lasti // 2]
-    if start is None or end is None:  # python -X no_debug_ranges
-        return source
-    return source.encode()[start:end].decode(errors="replace")
-
-
-def _cut(text: str) -> str:
-    flat = " ".join(text.split())
-    return flat if len(flat) <= _LONGEST_PART else flat[: _LONGEST_PART - 3] + "..."
+    _, _, start, end = list(code.co_positions())[traceback.tb_lasti // 2]
+    return source if start is None or end is None else source[start:end]

@@ -1,0 +1,122 @@
+"""What values are to the language, and how messages, maps and lists are read.
+
+A field is read only when the message's class declares it: methods and private attributes cannot be
+reached. A ``byte``, which rclpy keeps as ``bytes`` of one, is an integer here.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Mapping
+from enum import Enum
+from functools import lru_cache
+from typing import Any, cast
+
+from composer.expressions.errors import Refusal
+
+
+class Kind(Enum):
+    """What a value is, to the language; the value is how an error speaks of it."""
+
+    BOOL = "true or false"
+    NUMBER = "a number"
+    TEXT = "a text"
+    SEQUENCE = "a list"
+    MAPPING = "a map"
+    MESSAGE = "a message"
+    BYTES = "bytes"
+    ELEMENT = "an element of an array"
+    NOTHING = "nothing"
+    OTHER = "a value of an unknown kind"
+
+
+_KINDS: tuple[tuple[type, Kind], ...] = (
+    (bool, Kind.BOOL),
+    (int, Kind.NUMBER),
+    (float, Kind.NUMBER),
+    (str, Kind.TEXT),
+    (bytes, Kind.BYTES),
+    (list, Kind.SEQUENCE),
+    (tuple, Kind.SEQUENCE),
+    (array, Kind.SEQUENCE),
+    (Mapping, Kind.MAPPING),
+    (type(None), Kind.NOTHING),
+)
+
+
+def _kind_of(cls: type) -> Kind:
+    if _is_numpy(cls, "generic"):  # numpy.float64 is a float too, and must become a plain one
+        return Kind.ELEMENT
+    if _is_numpy(cls, "ndarray"):
+        return Kind.SEQUENCE
+    for base, kind in _KINDS:
+        if issubclass(cls, base):
+            return kind
+    return Kind.MESSAGE if _message_fields(cls) is not None else Kind.OTHER
+
+
+def _is_numpy(cls: type, name: str) -> bool:
+    """Say whether ``cls`` is numpy's, without importing numpy."""
+    return any(base.__module__ == "numpy" and base.__name__ == name for base in cls.__mro__)
+
+
+def _message_fields(cls: type) -> frozenset[str] | None:
+    declared = vars(cls).get("_fields_and_field_types")
+    if not isinstance(declared, dict):
+        return None
+    return frozenset(name for name in declared if not name.startswith("_"))
+
+
+#: What values of a class are.
+kind_of = cast("Callable[[type], Kind]", lru_cache(maxsize=1024)(_kind_of))
+#: The fields of a generated message class; None for any other class.
+message_fields = cast(
+    "Callable[[type], frozenset[str] | None]", lru_cache(maxsize=1024)(_message_fields)
+)
+
+
+def describe(value: Any) -> str:
+    """Return how an error speaks of ``value``: never the value itself, which may be huge."""
+    kind = kind_of(type(value))
+    return f"a {type(value).__name__}" if kind is Kind.MESSAGE else kind.value
+
+
+def plain(value: Any) -> Any:
+    """Return a byte as an integer, an element of a numpy array as Python's own, all else as is."""
+    if type(value) is bytes and len(value) == 1:
+        return value[0]
+    return value.item() if kind_of(type(value)) is Kind.ELEMENT else value
+
+
+def read_fields(value: Any, names: tuple[str, ...]) -> Any:
+    """Return what is reached through the field names."""
+    for name in names:
+        known = message_fields(type(value))
+        if known is not None and name in known:
+            value = getattr(value, name)
+        else:
+            value = _read_key(value, name)
+    return plain(value) if type(value) is bytes else value
+
+
+def read_path(value: Any, parts: tuple[str | int, ...]) -> Any:
+    """Return what is reached through field names and indices."""
+    for part in parts:
+        value = read_fields(value, (part,)) if isinstance(part, str) else _read_index(value, part)
+    return value
+
+
+def _read_key(value: Any, name: str) -> Any:
+    if kind_of(type(value)) is Kind.MAPPING:
+        if name in value:
+            return value[name]
+        raise Refusal(f"there is no '{name}'")
+    raise Refusal(f"{describe(value)} has no field '{name}'")
+
+
+def _read_index(value: Any, index: int) -> Any:
+    if kind_of(type(value)) is not Kind.SEQUENCE:
+        raise Refusal(f"{describe(value)} has no elements")
+    if not -len(value) <= index < len(value):
+        raise Refusal(f"there is no element {index} in a list of {len(value)}")
+    return plain(value[index])
