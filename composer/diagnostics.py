@@ -18,6 +18,12 @@ class Severity(Enum):
     INFO = "info"
 
 
+_YAML_WORDS = {None: "null", True: "true", False: "false"}
+
+#: How much of a value from a file is repeated in a message, in characters.
+LONGEST_ECHO = 80
+
+
 @dataclass(frozen=True, slots=True)
 class Rule:
     """One thing that can be wrong, with all that ``compose rule`` and the catalogue say of it.
@@ -85,12 +91,30 @@ def registered_rules() -> Iterator[Rule]:
 
 def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
     """Return the findings sorted by place, each once."""
-    return sorted(dict.fromkeys(diagnostics), key=lambda diagnostic: diagnostic.sort_key)
+    # By key, not by equality: spans compare without their file.
+    unique: dict[tuple[str, int, int, str, str], Diagnostic] = {}
+    for diagnostic in diagnostics:
+        unique.setdefault(diagnostic.sort_key, diagnostic)
+    return [unique[key] for key in sorted(unique)]
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
     """Say whether any finding is an error."""
     return any(diagnostic.severity is Severity.ERROR for diagnostic in diagnostics)
+
+
+def shown(value: object, *, limit: int = LONGEST_ECHO) -> str:
+    """Return ``value`` as messages echo it, no longer than ``limit``.
+
+    Characters that could steer a terminal or hide become escapes, as Python writes them.
+    """
+    text = _YAML_WORDS[value] if value is None or isinstance(value, bool) else str(value)
+    cut = text if len(text) <= limit else f"{text[: limit - 3]}..."
+    if cut.isprintable():
+        return cut
+    return "".join(
+        character if character.isprintable() else repr(character)[1:-1] for character in cut
+    )
 
 
 def nearest(name: str, candidates: Iterable[str]) -> str | None:
