@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.action import ActionClient, ActionServer
+from rclpy.action.client import ActionClient
+from rclpy.action.server import ActionServer
 from rclpy.client import Client
 from rclpy.event_handler import EventHandler
 from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
-from composer.runtime import sources
+from composer.runtime import actions, sources
 from composer.runtime.loop import ExceptionHandler, Reply
 from composer.runtime.node_executor import NodeExecutor
 from composer.runtime.scheduler import Scheduler
@@ -57,12 +58,13 @@ class EventLoop(Scheduler):
 
     def add_action_server(self, server: ActionServer) -> None:
         """Run the server's goal, cancel and result requests."""
-        self._add(server, sources.source_of_action_server(server, self._futures, self.run_task))
+        actions.contain(server, self._report)
+        self._add(server, actions.ActionSource(server, self._futures, self.run_task))
         self.call_later(_EXPIRY_PERIOD_S, lambda: self._expire(server))
 
     def add_action_client(self, client: ActionClient) -> None:
         """Complete the futures of the client and deliver its feedback."""
-        self._add(client, sources.source_of_action_client(client, self._futures, self.run_task))
+        self._add(client, actions.ActionSource(client, self._futures, self.run_task))
 
     def remove(self, entity: object) -> None:
         """Stop serving one entity. To be called before it is destroyed."""
@@ -98,8 +100,8 @@ class EventLoop(Scheduler):
         if server not in self._slots_of:
             return
         self.call_later(_EXPIRY_PERIOD_S, lambda: self._expire(server))
-        if sources.keeps_goals(server):
-            self.run_task(sources.forget_expired_goals(server))
+        if actions.keeps_goals(server):
+            self.run_task(actions.forget_expired_goals(server))
 
 
 class _NodeEntities:
@@ -108,7 +110,7 @@ class _NodeEntities:
     Rarely used, all of it; a file descriptor for each would be thousands in a large system.
     """
 
-    def __init__(self, loop: EventLoop, node: Node) -> None:
+    def __init__(self, loop: EventLoop, node: Any) -> None:
         self._loop = loop
         self._node = node
         self._slot = loop.open_slot()
@@ -142,15 +144,14 @@ class _NodeEntities:
         if self._closed:
             return
         present = [entity for entity in _entities_of(self._node) if not self._loop.serves(entity)]
-        for gone in [entity for entity in self._sources if entity not in present]:
+        for gone in self._sources.keys() - set(present):
             self.let_go(gone)
         for entity in present:
-            if entity not in self._sources:
-                source = self._loop.own_source(entity)
-                if source is not None:
-                    self._sources[entity] = source
-                    self._slot.add(source)
+            source = None if entity in self._sources else self._loop.own_source(entity)
+            if source is not None:
+                self._sources[entity] = source
+                self._slot.add(source)
 
 
-def _entities_of(node: Node) -> list[object]:
+def _entities_of(node: Any) -> list[object]:
     return [*node.subscriptions, *node.services, *node.clients, *node.waitables]

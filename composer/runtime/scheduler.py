@@ -146,8 +146,9 @@ class Scheduler:
 
     def _turn(self) -> None:
         for call in self._timers.take_due():
-            self._call(call.callback)
-            self._timers.repeat(call)
+            if not call.cancelled:  # by one of those before it
+                self._call(call.callback)
+                self._timers.repeat(call)
         for _ in range(min(len(self._calls), _ROUND)):
             self._call(self._calls.popleft())
             if self._timers.due():

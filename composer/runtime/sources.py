@@ -1,7 +1,8 @@
 """What a loop serves: one source an entity, each with how to take from it and whom to call.
 
-A source takes one item at a time, so that a loop can go round them all. Kept here, with
-:mod:`composer.runtime.readiness`: everything that reaches into rclpy.
+A source takes one item at a time, so that a loop can go round them all. Kept here, in
+:mod:`composer.runtime.actions` and in :mod:`composer.runtime.readiness`: everything that reaches
+into rclpy.
 """
 
 from __future__ import annotations
@@ -10,18 +11,16 @@ import inspect
 from collections.abc import Callable, Coroutine
 from typing import Any, Protocol
 
-from rclpy.action import ActionClient, ActionServer
-from rclpy.client import Client
-from rclpy.event_handler import EventHandler
-from rclpy.service import Service
 from rclpy.subscription import Subscription
 
 from composer.runtime import readiness
-from composer.runtime.readiness import Handle, Signal
+from composer.runtime.readiness import Signal
 from composer.runtime.tasks import name_of
 
 Reply = Callable[[Any], None]
 RunTask = Callable[[Coroutine[Any, Any, Any]], object]
+
+# rclpy's own type hints are in part wrong (a service's type has no Request): hence Any below.
 
 
 class Source(Protocol):
@@ -81,7 +80,7 @@ class SubscriptionSource:
 class ServiceSource:
     """Calls ``callback(request, reply)`` for each request."""
 
-    def __init__(self, service: Service, callback: Callable[[Any, Reply], object]) -> None:
+    def __init__(self, service: Any, callback: Callable[[Any, Reply], object]) -> None:
         self._service = service
         self._callback = callback
 
@@ -120,7 +119,7 @@ class OneReply:
 
     __slots__ = ("_header", "_service")
 
-    def __init__(self, service: Service, header: object) -> None:
+    def __init__(self, service: Any, header: object) -> None:
         self._service = service
         self._header: object = header
 
@@ -141,7 +140,7 @@ class OneReply:
             self(self._service.srv_type.Response())
 
 
-def answer_with_own_callback(service: Service, run_task: RunTask) -> Callable[[Any, Reply], None]:
+def answer_with_own_callback(service: Any, run_task: RunTask) -> Callable[[Any, Reply], None]:
     """Return what calls ``service.callback``, as ``node.create_service`` was given it."""
 
     async def answer(request: Any, reply: Any) -> None:
@@ -163,7 +162,7 @@ def answer_with_own_callback(service: Service, run_task: RunTask) -> Callable[[A
 class ClientSource:
     """Completes the futures of ``client.call_async``."""
 
-    def __init__(self, client: Client, executor: object) -> None:
+    def __init__(self, client: Any, executor: object) -> None:
         self._client = client
         self._executor = executor
 
@@ -199,7 +198,7 @@ class ClientSource:
 class EventSource:
     """Calls what was registered for a QoS event of a publisher or a subscription."""
 
-    def __init__(self, handler: EventHandler) -> None:
+    def __init__(self, handler: Any) -> None:
         self._handler = handler
         self._handle = handler._EventHandler__event
 
@@ -225,85 +224,3 @@ class EventSource:
     def call(self, taken: Any) -> None:
         """Call with the status."""
         self._handler.callback(taken)
-
-
-class ActionSource:
-    """An action server or client: rclpy's own code does the work, as under its executors."""
-
-    def __init__(
-        self,
-        waitable: ActionServer | ActionClient,
-        handle: Handle,
-        executor: object,
-        run_task: RunTask,
-    ) -> None:
-        self._waitable = waitable
-        self._handle = handle
-        self._executor = executor
-        self._run_task = run_task
-        server = isinstance(waitable, ActionServer)
-        self._announcements = readiness.ACTION_SERVER if server else readiness.ACTION_CLIENT
-        self._ready_flags = _SERVER_FLAGS if server else _CLIENT_FLAGS
-
-    @property
-    def name(self) -> str:
-        """What it is."""
-        return type(self._waitable).__name__
-
-    def attach(self, signal: Signal) -> None:
-        """Have everything about the action announced."""
-        signal.attach(self._handle, *self._announcements)
-
-    def detach(self, signal: Signal) -> None:
-        """End that."""
-        signal.detach(self._handle)
-
-    def take(self) -> Any:
-        """Return one of each kind of thing an action consists of."""
-        for flag in self._ready_flags:
-            setattr(self._waitable, flag, True)
-        return self._waitable.take_data() or None
-
-    def call(self, taken: Any) -> None:
-        """Have rclpy work on it."""
-        for future in self._waitable._futures:
-            future._set_executor(self._executor)
-        self._run_task(self._waitable.execute(taken))
-
-
-_SERVER_FLAGS = ("_is_goal_request_ready", "_is_cancel_request_ready", "_is_result_request_ready")
-_CLIENT_FLAGS = (
-    "_is_goal_response_ready",
-    "_is_cancel_response_ready",
-    "_is_result_response_ready",
-    "_is_feedback_ready",
-    "_is_status_ready",
-)
-
-
-def source_of_action_server(
-    server: ActionServer, executor: object, run_task: RunTask
-) -> ActionSource:
-    """Return the source for an action server."""
-    server._is_goal_expired = False  # asked for by a timer, not by readiness
-    return ActionSource(server, server._handle, executor, run_task)
-
-
-def source_of_action_client(
-    client: ActionClient, executor: object, run_task: RunTask
-) -> ActionSource:
-    """Return the source for an action client."""
-    return ActionSource(client, client._client_handle, executor, run_task)
-
-
-async def forget_expired_goals(server: ActionServer) -> None:
-    """Drop the results that the server kept for longer than its result timeout."""
-    with server._lock:
-        expired = server._handle.expire_goals(len(server._goal_handles))
-    if expired:
-        await server._execute_expire_goals(expired)
-
-
-def keeps_goals(server: ActionServer) -> bool:
-    """Tell whether the server keeps goals, running or ended."""
-    return bool(server._goal_handles)

@@ -255,7 +255,7 @@ class Task(Generic[T]):
             return True
         if yielded is not None:
             return False
-        foreign = _awaited_rclpy_future(self._coroutine)
+        foreign = awaited_rclpy_future(self._coroutine)
         if foreign is None:
             self._wake(None)  # asyncio.sleep(0): let others run first
         else:
@@ -328,7 +328,7 @@ def _not_awaitable(yielded: object) -> TypeError:
     )
 
 
-def _awaited_rclpy_future(coroutine: object) -> Any:
+def awaited_rclpy_future(coroutine: object) -> Any:
     """Return the rclpy future at the end of the chain of awaits, or None.
 
     ``rclpy.task.Future.__await__`` yields None until it is done, for its executors poll. Looking

@@ -1,0 +1,159 @@
+"""Action servers and clients: rclpy's own code does the work, as under its executors.
+
+Together with :mod:`composer.runtime.sources`, what reaches into rclpy.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.action.client import ActionClient
+from rclpy.action.server import ActionServer, CancelResponse, GoalResponse
+
+from composer.runtime import readiness
+from composer.runtime.readiness import Announcement, Handle, Signal
+from composer.runtime.sources import RunTask
+from composer.runtime.tasks import Cancelled, Report, name_of
+
+
+@dataclass(frozen=True, slots=True)
+class _Side:
+    """What rclpy's servers and clients of actions differ in."""
+
+    name: str
+    handle: str  # the attribute that holds the handle
+    announcements: tuple[Announcement, ...]
+    ready_flags: tuple[str, ...]  # the attributes that tell ``take_data`` what to look for
+
+
+_SERVER = _Side(
+    "action server",
+    "_handle",
+    readiness.ACTION_SERVER,
+    ("_is_goal_request_ready", "_is_cancel_request_ready", "_is_result_request_ready"),
+)
+_CLIENT = _Side(
+    "action client",
+    "_client_handle",
+    readiness.ACTION_CLIENT,
+    (
+        "_is_goal_response_ready",
+        "_is_cancel_response_ready",
+        "_is_result_response_ready",
+        "_is_feedback_ready",
+        "_is_status_ready",
+    ),
+)
+
+
+class ActionSource:
+    """Everything one action server or client receives."""
+
+    def __init__(
+        self, waitable: ActionServer | ActionClient, executor: object, run_task: RunTask
+    ) -> None:
+        self._waitable: Any = waitable
+        self._side = _SERVER if isinstance(waitable, ActionServer) else _CLIENT
+        self._handle: Handle = getattr(waitable, self._side.handle)
+        self._executor = executor
+        self._run_task = run_task
+        if self._side is _SERVER:
+            self._waitable._is_goal_expired = False  # a timer asks, see forget_expired_goals
+
+    @property
+    def name(self) -> str:
+        """What it is."""
+        return f"{self._side.name} of {self._waitable._action_type.__name__}"
+
+    def attach(self, signal: Signal) -> None:
+        """Have everything about the action announced."""
+        signal.attach(self._handle, *self._side.announcements)
+
+    def detach(self, signal: Signal) -> None:
+        """End that."""
+        signal.detach(self._handle)
+
+    def take(self) -> Any:
+        """Return one of each kind of thing an action consists of."""
+        for flag in self._side.ready_flags:
+            setattr(self._waitable, flag, True)
+        return self._waitable.take_data() or None
+
+    def call(self, taken: Any) -> None:
+        """Have rclpy work on it."""
+        work_on(self._waitable, taken, self._executor, self._run_task)
+
+
+def work_on(waitable: Any, taken: Any, executor: object, run_task: RunTask) -> None:
+    """Have rclpy work on what was taken; done callbacks of futures run by ``executor``."""
+    for future in waitable._futures:
+        future._set_executor(executor)
+    run_task(waitable.execute(taken))
+
+
+def keeps_goals(server: ActionServer) -> bool:
+    """Tell whether the server keeps goals, running or ended."""
+    return bool(server._goal_handles)
+
+
+async def forget_expired_goals(server: ActionServer) -> None:
+    """Drop the goals that ended longer ago than the server's result timeout."""
+    with server._lock:
+        expired = server._handle.expire_goals(len(server._goal_handles))
+    await server._execute_expire_goals(expired)
+
+
+def contain(server: ActionServer, report: Report) -> None:
+    """Turn what the server's callbacks raise into an answer to the client, and a report.
+
+    A goal whose acceptance raises is rejected, a cancellation likewise; one whose execution raises
+    is aborted. rclpy by itself leaves the client without an answer, or contains ``Exception`` only.
+    """
+
+    def reject(_: object) -> GoalResponse:
+        return GoalResponse.REJECT
+
+    def refuse(_: object) -> CancelResponse:
+        return CancelResponse.REJECT
+
+    def abort(goal: Any) -> Any:
+        if goal.is_active:
+            goal.abort()
+        return server.action_type.Result()
+
+    def give_up(goal: Any) -> None:
+        goal.execute(abort)  # the way for a goal that was accepted only
+
+    server.register_goal_callback(_contained(server._goal_callback, reject, report))
+    server.register_cancel_callback(_contained(server._cancel_callback, refuse, report))
+    server.register_execute_callback(_contained(server._execute_callback, abort, report))
+    accepted = _contained(server._handle_accepted_callback, give_up, report)
+    server.register_handle_accepted_callback(accepted)
+
+
+def _contained(
+    callback: Callable[[Any], Any], instead: Callable[[Any], Any], report: Report
+) -> Callable[[Any], Any]:
+    def fail(error: BaseException, argument: Any) -> Any:
+        if not isinstance(error, Cancelled):  # the loop stops: nothing to report
+            report(name_of(callback), error)
+        return instead(argument)
+
+    def call(argument: Any) -> Any:
+        try:
+            return callback(argument)
+        except BaseException as error:
+            return fail(error, argument)
+
+    async def call_and_await(argument: Any) -> Any:
+        try:
+            return await callback(argument)
+        except GeneratorExit:
+            raise
+        except BaseException as error:
+            return fail(error, argument)
+
+    return call_and_await if inspect.iscoroutinefunction(callback) else call
