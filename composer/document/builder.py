@@ -1,0 +1,247 @@
+"""YAML events to a located tree, under limits, without recursion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import yaml
+
+from composer.diagnostics import Diagnostic, Label, Rule, shown
+from composer.document import rules
+from composer.document.characters import check_value
+from composer.document.limits import MAX_DEPTH, MAX_VALUES
+from composer.document.scalars import NumberRefused, resolve_plain
+from composer.document.spans import Mark, collection_span, scalar_span, span_at
+from composer.document.words import described
+from composer.source import SourceFile, Span
+from composer.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree
+
+
+class Stopped(Exception):
+    """Nothing more can be read; the finding says why."""
+
+    def __init__(self, finding: Diagnostic) -> None:
+        super().__init__(finding.message)
+        self.finding = finding
+
+
+@dataclass(frozen=True, slots=True)
+class _Anchored:
+    """What an anchor marks, and what repeating it costs."""
+
+    tree: Tree
+    values: int
+    height: int
+
+
+@dataclass(slots=True)
+class _Open:
+    """A map or list whose end has not been reached."""
+
+    start: Span
+    is_map: bool
+    is_flow: bool
+    anchor: str | None
+    items: list[Tree] = field(default_factory=list)
+    entries: list[Entry] = field(default_factory=list)
+    keys: dict[str, Scalar] = field(default_factory=dict)
+    key: Scalar | None = None  # None while a value is awaited: a refused key, its value is dropped
+    awaits_value: bool = False
+    text_in_braces: Scalar | None = None
+    values: int = 1
+    height: int = 1
+
+    def tree(self) -> Tree:
+        """Return the finished map or list."""
+        if self.text_in_braces is not None and len(self.entries) == 1:
+            return self.text_in_braces
+        if self.is_map:
+            first = self.entries[0].key.span if self.entries else self.start
+            return Mapping(tuple(self.entries), collection_span(self.start, first, self.is_flow))
+        first = self.items[0].span if self.items else self.start
+        return Sequence(tuple(self.items), collection_span(self.start, first, self.is_flow))
+
+
+class TreeBuilder:
+    """Takes the events of one document; ``root`` is the tree once its end is reached."""
+
+    def __init__(self, source: SourceFile) -> None:
+        self.root: Tree | None = None
+        self.findings: list[Diagnostic] = []
+        self._source = source
+        self._open: list[_Open] = []
+        self._anchors: dict[str, _Anchored | None] = {}  # None while what they mark is being read
+        self._values = 0
+
+    def take(self, event: yaml.Event) -> None:
+        """Go on by one event. Raises Stopped."""
+        match event:
+            case yaml.ScalarEvent():
+                self._take_scalar(event)
+            case yaml.MappingStartEvent() | yaml.SequenceStartEvent():
+                self._take_start(event)
+            case yaml.MappingEndEvent() | yaml.SequenceEndEvent():
+                self._take_end()
+            case yaml.AliasEvent():
+                self._take_alias(event)
+            case yaml.DocumentStartEvent() if self.root is not None:
+                span = span_at(self._source, event.start_mark, 3)
+                message = "a second document begins here"
+                hint = "keep one system or node type in a file"
+                raise Stopped(Diagnostic(rules.SEVERAL_DOCUMENTS, message, span, hint=hint))
+
+    def _take_scalar(self, event: yaml.ScalarEvent) -> None:
+        self._count(1, event.start_mark)
+        scalar = self._scalar(event)
+        if event.anchor is not None:
+            self._anchors[event.anchor] = _Anchored(scalar, 1, 0)
+        parent = self._open[-1] if self._open else None
+        if parent is None or not parent.is_map or parent.awaits_value:
+            self._add(scalar, 1, 0)
+            if parent is not None and parent.is_flow and scalar.value is None:
+                self._check_value_in_braces(parent, scalar)
+            return
+        parent.values += 1
+        parent.awaits_value = True
+        parent.key = self._key(scalar, event, parent)
+
+    def _take_start(self, event: yaml.CollectionStartEvent) -> None:
+        self._count(1, event.start_mark)
+        self._check_tag(event.tag, event.start_mark)
+        is_map = isinstance(event, yaml.MappingStartEvent)
+        start = span_at(self._source, event.start_mark)
+        if len(self._open) >= MAX_DEPTH:
+            message = f"maps and lists stand inside each other more than {MAX_DEPTH} times"
+            raise Stopped(Diagnostic(rules.NESTED_TOO_DEEP, message, start))
+        if event.anchor is not None:
+            self._anchors[event.anchor] = None
+        self._open.append(_Open(start, is_map, bool(event.flow_style), event.anchor))
+
+    def _take_end(self) -> None:
+        ended = self._open.pop()
+        tree = ended.tree()
+        if ended.anchor is not None:
+            self._anchors[ended.anchor] = _Anchored(tree, ended.values, ended.height)
+        self._add(tree, ended.values, ended.height)
+
+    def _take_alias(self, event: yaml.AliasEvent) -> None:
+        anchor = event.anchor or ""
+        name = shown(anchor)
+        span = span_at(self._source, event.start_mark, len(anchor) + 1)
+        anchored = self._anchors.get(anchor)
+        if anchored is None:
+            inside = anchor in self._anchors
+            message = f"'*{name}' is part of what it stands for" if inside else _undefined(name)
+            hint = None if inside else f"mark what it repeats with '&{name}', or quote the text"
+            raise Stopped(Diagnostic(rules.BAD_ALIAS, message, span, hint=hint))
+        if self._open and self._open[-1].is_map and not self._open[-1].awaits_value:
+            message = f"the alias '*{name}' stands where a key is expected"
+            raise Stopped(Diagnostic(rules.BAD_ALIAS, message, span, hint="write the key out"))
+        self._count(anchored.values, event.start_mark)
+        if len(self._open) + anchored.height > MAX_DEPTH:
+            message = f"with what '*{name}' stands for, more than {MAX_DEPTH} levels are nested"
+            raise Stopped(Diagnostic(rules.NESTED_TOO_DEEP, message, span))
+        self._add(anchored.tree, anchored.values, anchored.height)
+
+    def _add(self, tree: Tree, values: int, height: int) -> None:
+        """Put a finished value where it belongs."""
+        if not self._open:
+            self.root = tree
+            return
+        parent = self._open[-1]
+        parent.values += values
+        parent.height = max(parent.height, height + 1)
+        if not parent.is_map:
+            parent.items.append(tree)
+        elif parent.awaits_value:
+            if parent.key is not None:
+                parent.entries.append(Entry(parent.key, tree))
+            parent.awaits_value = False
+        else:
+            hint = "put a text with braces or brackets in quotes"
+            self._report(
+                rules.KEY_NOT_TEXT, f"a key is text, found {described(tree)}", tree.span, hint
+            )
+            parent.awaits_value, parent.key = True, None
+
+    def _scalar(self, event: yaml.ScalarEvent) -> Scalar:
+        self._check_tag(event.tag, event.start_mark)
+        span, verbatim, offset = scalar_span(self._source, event)
+        value: ScalarValue = event.value
+        if not event.style:  # None from PyYAML's parser, "" from libyaml's: unquoted
+            if event.tag is None:
+                value = self._plain(event.value, span)
+        else:
+            value, findings = check_value(event.value, span)
+            self.findings += findings
+        return Scalar(value, span, verbatim, offset)
+
+    def _plain(self, text: str, span: Span) -> ScalarValue:
+        try:
+            return resolve_plain(text)
+        except NumberRefused as refusal:
+            hint = "leave the key out where there is no limit; put it in quotes where it is a text"
+            self._report(rules.BAD_NUMBER, f"'{shown(text)}' {refusal}", span, hint)
+            return 1  # stands in, so that what is said about its place is said once
+
+    def _key(self, scalar: Scalar, event: yaml.ScalarEvent, parent: _Open) -> Scalar | None:
+        if scalar.value == "<<" and not event.style:
+            hint = "write the keys out; what nodes share belongs into a node type or qos_profiles"
+            self._report(rules.MERGE_KEY, "YAML merge keys are not read", scalar.span, hint)
+            return None
+        if scalar.value is None and not event.value:
+            self._report(rules.KEY_NOT_TEXT, "a key is missing before this ':'", scalar.span, None)
+            return None
+        key = scalar
+        if not isinstance(scalar.value, str):
+            text = shown(event.value)
+            message = f"a key is text, found {described(scalar)}"
+            self._report(rules.KEY_NOT_TEXT, message, scalar.span, f"put it in quotes: '{text}'")
+            key = Scalar(event.value, scalar.span, scalar.verbatim, scalar.content_offset)
+        first = parent.keys.setdefault(str(key.value), key)
+        if first is key:
+            return key
+        label = Label(first.span, "first here")
+        message = f"the key '{shown(key.value)}' stands here a second time"
+        hint = "rename one of them, or put what they say together"
+        self.findings.append(Diagnostic(rules.DUPLICATE_KEY, message, key.span, (label,), hint))
+        return None
+
+    def _check_value_in_braces(self, parent: _Open, value: Scalar) -> None:
+        """Report ``{message.data}`` and ``{rate_hz:10}``, which YAML takes for keys alone."""
+        key = parent.key
+        if not parent.is_map or key is None or key.content_offset or not key.verbatim:
+            return
+        if self._source.line(value.span.line)[: value.span.column - 1].rstrip().endswith(":"):
+            return
+        name, colon, rest = str(key.value).partition(":")
+        if colon and name and rest and name.isidentifier():
+            message = f"there is no space behind the colon of '{shown(key.value)}'"
+            self._report(rules.KEY_WITHOUT_VALUE, message, key.span, f"write '{name}: {rest}'")
+            value = Scalar(self._plain(rest, key.span), key.part(len(name) + 1, len(rest)))
+            parent.entries[-1] = Entry(Scalar(name, key.part(0, len(name))), value)
+            return
+        text = f"{{{key.value}}}"
+        message = f"'{shown(text)}' is a map whose key has no value"
+        hint = f'put it in quotes if it is an expression: "{shown(text)}"'
+        self._report(rules.KEY_WITHOUT_VALUE, message, key.span, hint)
+        parent.text_in_braces = Scalar(text, parent.start, verbatim=False)
+
+    def _check_tag(self, tag: str | None, mark: Mark | None) -> None:
+        if tag is not None:
+            hint = "leave it out, and put what is to be text in quotes"
+            message = f"the tag '{shown(tag.replace('tag:yaml.org,2002:', '!!'))}' is not read"
+            self._report(rules.YAML_TAG, message, span_at(self._source, mark), hint)
+
+    def _count(self, values: int, mark: Mark | None) -> None:
+        self._values += values
+        if self._values > MAX_VALUES:
+            message = f"this file says more than {MAX_VALUES:,} things"
+            raise Stopped(Diagnostic(rules.TOO_MANY_VALUES, message, span_at(self._source, mark)))
+
+    def _report(self, rule: Rule, message: str, span: Span, hint: str | None) -> None:
+        self.findings.append(Diagnostic(rule, message, span, hint=hint))
+
+
+def _undefined(name: str) -> str:
+    return f"'*{name}' repeats something, but nothing before it is marked '&{name}'"

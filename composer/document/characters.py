@@ -1,0 +1,57 @@
+"""Which characters a text may contain."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+from composer.diagnostics import Diagnostic
+from composer.document.rules import FORBIDDEN_CHARACTER
+from composer.source import SourceFile, Span
+
+#: Controls (all but tab and line ends), characters that end a line for YAML 1.1 only, those that
+#: change the direction of text or are invisible, half surrogate pairs, byte-order marks inside
+#: the text, and code points that are no characters.
+_FORBIDDEN = (
+    "\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f"
+    "\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069"
+    "\ud800-\udfff\ufeff\ufff9-\ufffb\ufffe\uffff\U000e0000-\U000e007f"
+)
+_FORBIDDEN_IN_TEXT = re.compile(f"[{_FORBIDDEN}]")
+_FORBIDDEN_IN_VALUE = re.compile(f"[{_FORBIDDEN}\r]")
+
+
+def check_text(source: SourceFile) -> list[Diagnostic]:
+    """Return a finding for the first character in the text that may not be there."""
+    if _FORBIDDEN_IN_TEXT.search(source.text) is None:
+        return []
+    for number, line in enumerate(source.lines, start=1):
+        match = _FORBIDDEN_IN_TEXT.search(line)
+        if match is not None:
+            count = len(_FORBIDDEN_IN_TEXT.findall(source.text))
+            more = f", the first of {count} like it" if count > 1 else ""
+            message = f"{_character(match[0])} is not allowed in a file{more}"
+            span = Span(source, number, match.start() + 1)
+            return [Diagnostic(FORBIDDEN_CHARACTER, message, span, hint="delete it")]
+    raise AssertionError("a character of the text is in none of its lines")
+
+
+def check_value(value: str, span: Span) -> tuple[str, list[Diagnostic]]:
+    """Return ``value`` without the characters that escapes must not make, and a finding if any."""
+    match = _FORBIDDEN_IN_VALUE.search(value)
+    if match is None:
+        return value, []
+    message = f"this text contains {_character(match[0])}, which is not allowed"
+    finding = Diagnostic(
+        FORBIDDEN_CHARACTER,
+        message,
+        span,
+        hint="leave the escape out; only \\t and \\n may stand for control characters",
+    )
+    return _FORBIDDEN_IN_VALUE.sub("", value), [finding]
+
+
+def _character(character: str) -> str:
+    name = unicodedata.name(character, "")
+    kind = f" ({name})" if name else ""
+    return f"the character U+{ord(character):04X}{kind}"

@@ -1,0 +1,124 @@
+"""Reading a file that may be anything: too large, a device, a pipe, in some other encoding."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+from composer.diagnostics import Diagnostic, nearest, shown
+from composer.document.limits import MAX_BYTES
+from composer.document.rules import FILE_TOO_LARGE, NOT_UTF8, UNREADABLE_FILE
+from composer.source import SourceFile, Span
+
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+}
+_ENTRIES_FOR_HINT = 1000
+_WIDE_ENCODINGS = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
+
+
+class _NotRead(Exception):
+    """Nothing was read; the finding's message and hint."""
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+def read_bytes(path: Path, source: SourceFile) -> tuple[bytes, list[Diagnostic]]:
+    """Return what is in a regular file of at most MAX_BYTES, or a finding at ``source``."""
+    start = Span(source, 1, 1)
+    try:
+        data = _read(path)
+    except _NotRead as problem:
+        return b"", [Diagnostic(UNREADABLE_FILE, str(problem), start, hint=problem.hint)]
+    if data is None:
+        return b"", [too_large(source)]
+    return data, []
+
+
+def too_large(source: SourceFile) -> Diagnostic:
+    """Return the finding for a text of more than MAX_BYTES."""
+    return Diagnostic(
+        FILE_TOO_LARGE,
+        f"this file is larger than {MAX_BYTES:,} bytes",
+        Span(source, 1, 1),
+        hint="split the system, or describe repeated nodes once as a node type",
+    )
+
+
+def decode(data: bytes, shown_path: str) -> tuple[SourceFile, list[Diagnostic]]:
+    """Return the text of UTF-8 ``data`` (a byte-order mark is dropped), or a finding."""
+    try:
+        return SourceFile(shown_path, data.decode("utf-8-sig")), []
+    except UnicodeDecodeError:
+        pass
+    # Once more without the mark being special, so that the offset counts from the first byte.
+    source = SourceFile(shown_path, data.decode("utf-8", errors="replace"))
+    good = _longest_valid_prefix(data)
+    before = SourceFile("", data[:good].decode("utf-8")).lines
+    return source, [_not_utf8(data, good, Span(source, len(before), len(before[-1]) + 1))]
+
+
+def _longest_valid_prefix(data: bytes) -> int:
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        return error.start
+    return len(data)
+
+
+def _not_utf8(data: bytes, offset: int, span: Span) -> Diagnostic:
+    encoding = _WIDE_ENCODINGS.get(data[:2])
+    if encoding is not None:
+        message = f"this file is {encoding}, not UTF-8"
+    else:
+        message = f"the byte 0x{data[offset]:02x} is not UTF-8"
+    return Diagnostic(NOT_UTF8, message, span, hint="save the file as UTF-8")
+
+
+def _read(path: Path) -> bytes | None:
+    """Return the content, or None when it is too much. Raises _NotRead."""
+    try:
+        # Looked at before it is opened, for opening a device can have effects; and again after,
+        # for the name may stand for something else by then.
+        _require_regular(path.stat().st_mode)
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
+        with os.fdopen(descriptor, "rb") as file:
+            status = os.fstat(descriptor)
+            _require_regular(status.st_mode)
+            if status.st_size > MAX_BYTES:
+                return None
+            data = file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise _NotRead("there is no such file", _similar_name(path)) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else None
+        raise _NotRead(f"this file cannot be read: {reason or error}") from None
+    return data if len(data) <= MAX_BYTES else None
+
+
+def _require_regular(mode: int) -> None:
+    if not stat.S_ISREG(mode):
+        kind = _KINDS.get(stat.S_IFMT(mode), "not a regular file")
+        raise _NotRead(f"expected a file, found {kind}")
+
+
+def _similar_name(path: Path) -> str | None:
+    name = nearest(path.name, _names_beside(path))
+    return f"did you mean '{shown(path.with_name(name))}'?" if name is not None else None
+
+
+def _names_beside(path: Path) -> Iterator[str]:
+    try:
+        with os.scandir(path.parent) as entries:
+            yield from (entry.name for entry in islice(entries, _ENTRIES_FOR_HINT))
+    except (OSError, ValueError):
+        return

@@ -1,0 +1,23 @@
+"""How large a file may be.
+
+Every limit is far beyond what a person writes, and keeps a hostile or broken file from costing
+more than a second or 200 MB.
+"""
+
+from __future__ import annotations
+
+#: Bytes in a file; looked at before anything is read.
+MAX_BYTES = 1_000_000
+
+#: Maps and lists inside each other.
+MAX_DEPTH = 32
+
+#: Keys, values, maps and lists in a file, those repeated by aliases counted again.
+MAX_VALUES = 150_000
+
+#: Characters of a number.
+MAX_NUMBER_LENGTH = 100
+
+#: The integers that some ROS type can hold: int64 and uint64.
+MIN_INTEGER = -(2**63)
+MAX_INTEGER = 2**64 - 1

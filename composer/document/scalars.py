@@ -1,0 +1,66 @@
+"""Plain scalars by the YAML 1.2 core schema: ``NO`` is text, ``0o17`` octal, ``1e3`` a number.
+
+Source: YAML 1.2.2, chapter 10.3.2.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+from composer.document.limits import MAX_INTEGER, MAX_NUMBER_LENGTH, MIN_INTEGER
+from composer.tree import ScalarValue
+
+_WORDS: dict[str, ScalarValue] = {
+    "": None,
+    "~": None,
+    **dict.fromkeys(("null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
+_INTEGER = re.compile(r"[-+]?[0-9]+")
+_OCTAL = re.compile(r"0o[0-7]+")
+_HEXADECIMAL = re.compile(r"0x[0-9a-fA-F]+")
+_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
+_FIRST_OF_NUMBER = frozenset("0123456789+-.")
+
+
+class NumberRefused(Exception):
+    """A number that no ROS type can hold, or that compares with nothing. Its text says why."""
+
+
+def resolve_plain(text: str) -> ScalarValue:
+    """Return the value of an unquoted scalar. Raises NumberRefused."""
+    if text in _WORDS:
+        return _WORDS[text]
+    if text[0] not in _FIRST_OF_NUMBER:
+        return text
+    if _NOT_FINITE.fullmatch(text):
+        raise NumberRefused("is not a finite number")
+    if _INTEGER.fullmatch(text):
+        return _integer(text, 10)
+    if _OCTAL.fullmatch(text):
+        return _integer(text[2:], 8)
+    if _HEXADECIMAL.fullmatch(text):
+        return _integer(text[2:], 16)
+    return _float(text) if _FLOAT.fullmatch(text) else text
+
+
+def _integer(digits: str, base: int) -> int:
+    # The length first: int() takes quadratic time, and refuses more than 4300 digits.
+    if len(digits) > MAX_NUMBER_LENGTH:
+        raise NumberRefused(f"has more than {MAX_NUMBER_LENGTH} digits")
+    value = int(digits, base)
+    if not MIN_INTEGER <= value <= MAX_INTEGER:
+        raise NumberRefused("does not fit into 64 bits")
+    return value
+
+
+def _float(text: str) -> float:
+    if len(text) > MAX_NUMBER_LENGTH:
+        raise NumberRefused(f"has more than {MAX_NUMBER_LENGTH} digits")
+    value = float(text)
+    if not math.isfinite(value):
+        raise NumberRefused("is larger than a double can hold")
+    return value

@@ -1,0 +1,54 @@
+"""Marks of the YAML parser to spans. Marks count from 0, in characters; spans from 1."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import yaml
+
+from composer.source import SourceFile, Span
+
+_BLOCK_STYLES = ("|", ">")
+
+
+class Mark(Protocol):
+    """A place in a text, as both parsers give it."""
+
+    @property
+    def line(self) -> int:
+        """The line, from 0."""
+
+    @property
+    def column(self) -> int:
+        """The character in the line, from 0."""
+
+
+def span_at(source: SourceFile, mark: Mark | None, length: int = 1) -> Span:
+    """Return the span of ``length`` characters that begins at ``mark``.
+
+    Without a mark, which PyYAML's types allow and its parsers never do, the first of the file.
+    """
+    if mark is None:
+        return Span(source, 1, 1, length)
+    return Span(source, mark.line + 1, mark.column + 1, length)
+
+
+def scalar_span(source: SourceFile, event: yaml.ScalarEvent) -> tuple[Span, bool, int]:
+    """Return the span of a scalar, whether its text is its value, and where in it that begins.
+
+    The span of a scalar of several lines ends with the first of them.
+    """
+    begin, end = event.start_mark, event.end_mark
+    if begin is None or end is None:
+        return span_at(source, begin), False, 0
+    line = source.line(begin.line + 1)
+    if event.style in _BLOCK_STYLES or end.line != begin.line:
+        return span_at(source, begin, max(len(line.rstrip()) - begin.column, 1)), False, 0
+    offset = 1 if event.style else 0
+    verbatim = line[begin.column + offset : end.column - offset] == event.value
+    return span_at(source, begin, max(end.column - begin.column, 1)), verbatim, offset
+
+
+def collection_span(start: Span, first: Span, is_flow: bool) -> Span:
+    """Return the span of a map or list: its bracket or, in block style, its first item."""
+    return start if is_flow else first
