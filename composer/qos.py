@@ -7,7 +7,7 @@ Policies and values are spelled as rclpy spells them; durations are in milliseco
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 
@@ -67,30 +67,6 @@ PRESETS: Mapping[str, QosProfile] = {
     "parameters": QosProfile(depth=1000),
     "system_default": QosProfile(),
 }
-
-#: The names of the policies, as they are written in YAML.
-POLICIES: tuple[str, ...] = tuple(policy.name for policy in fields(QosProfile))
-
-_VALUES: Mapping[str, type[StrEnum]] = {
-    "history": History,
-    "reliability": Reliability,
-    "durability": Durability,
-    "liveliness": Liveliness,
-}
-
-
-def override(profile: QosProfile, policies: Mapping[str, str | int | float | None]) -> QosProfile:
-    """Return ``profile`` with the given policies changed; the rest stays as it is.
-
-    Raises ValueError for a policy or a value that does not exist.
-    """
-    for name in policies:
-        if name not in POLICIES:
-            raise ValueError(f"there is no policy '{name}'")
-    changes = {
-        name: _VALUES[name](value) if name in _VALUES else value for name, value in policies.items()
-    }
-    return replace(profile, **changes)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ How safety is kept: ``tokens`` lets through ASCII names, numbers, texts and a fe
 those look at the type of a value before they touch it and bound every number.
 """
 
+from composer.expressions.builder import path_of
 from composer.expressions.compiler import compile_expression
 from composer.expressions.errors import EvaluationError, ExpressionError
 from composer.expressions.expression import Expression, FieldPath
@@ -26,4 +27,5 @@ __all__ = [
     "ExpressionError",
     "FieldPath",
     "compile_expression",
+    "path_of",
 ]

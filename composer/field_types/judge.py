@@ -1,0 +1,199 @@
+"""Judges templates, texts and conditions against what their places take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from composer.diagnostics import suggestion
+from composer.expressions import Expression
+from composer.field_types.constants import constant_problem
+from composer.field_types.inference import infer
+from composer.field_types.types import (
+    ANYTHING,
+    Problem,
+    Scope,
+    ValueType,
+    described,
+    fields_of,
+    is_array,
+    is_bool,
+    is_integer,
+    is_number,
+    is_seconds,
+    is_text,
+)
+from composer.interfaces import FieldType, Interfaces, Message
+from composer.source import Span
+from composer.templates import (
+    Computed,
+    Constant,
+    Items,
+    Record,
+    Template,
+    Text,
+    expressions_in,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Judge:
+    """What is wrong with templates and expressions, with the names of ``scope`` in scope."""
+
+    interfaces: Interfaces
+    scope: Scope
+
+    def template(self, template: Template, message: Message) -> Iterator[Problem]:
+        """Yield why ``template`` cannot become ``message``."""
+        match template:
+            case Record():
+                yield from self._record(template, message)
+            case Computed(expression=expression, span=span):
+                yield from self._computed(expression, span, message)
+            case Constant(value=str() as text) if "${" in text:
+                return
+            case Constant() | Text() | Items():
+                names = ", ".join(message.field_names) or "it has none"
+                problem = f"{message.name} is made of a map of fields"
+                yield Problem(problem, template.span, f"its fields: {names}")
+
+    def text(self, template: Template) -> Iterator[Problem]:
+        """Yield what is wrong with the expressions of a template that may become anything."""
+        for expression, span in expressions_in(template):
+            yield from self.expression(expression, span)
+
+    def condition(self, expression: Expression, span: Span) -> Iterator[Problem]:
+        """Yield what is wrong with an expression that must be true or false."""
+        found, problems = self._infer(expression, span)
+        yield from problems
+        if found is not ANYTHING and not is_bool(found):
+            message = f"a condition is true or false, this is {described(found)}"
+            hint = "compare it, as in '... > 0'" if is_number(found) else None
+            yield Problem(message, span, hint)
+
+    def expression(self, expression: Expression, span: Span) -> Iterator[Problem]:
+        """Yield what is wrong with an expression."""
+        yield from self._infer(expression, span)[1]
+
+    def _infer(self, expression: Expression, span: Span) -> tuple[ValueType, list[Problem]]:
+        found, complaints = infer(expression, self.scope, self.interfaces)
+        # Where the file does not spell the source out, its parts have no places of their own.
+        spelled_out = span.length == len(expression.source)
+        problems = [
+            Problem(
+                complaint.message,
+                span.part(complaint.offset, complaint.length) if spelled_out else span,
+                complaint.hint,
+            )
+            for complaint in complaints
+        ]
+        return found, problems
+
+    def _record(self, record: Record, message: Message) -> Iterator[Problem]:
+        for name, content in record.fields:
+            field = message.field(name.value)
+            if field is None:
+                problem = f"{message.name} has no field '{name.value}'"
+                yield Problem(problem, name.span, suggestion(name.value, message.field_names))
+                yield from self.text(content)
+            else:
+                yield from self._field(content, field.type)
+
+    def _field(self, template: Template, type_: FieldType) -> Iterator[Problem]:
+        match template:
+            case Constant(value=str() as text) if "${" in text:
+                return
+            case Constant(value=value, span=span):
+                problem = constant_problem(value, type_, self.interfaces)
+                if problem is not None:
+                    yield Problem(problem[0], span, problem[1])
+            case Computed(expression=expression, span=span):
+                yield from self._computed(expression, span, type_)
+            case Text(span=span):
+                yield from self.text(template)
+                if not is_text(type_):
+                    hint = 'a value is one {...} and nothing else: "{...}"'
+                    yield Problem(f"a text where {type_} is expected", span, hint)
+            case Record(span=span):
+                yield from self._nested(template, type_, span)
+            case Items():
+                yield from self._items(template, type_)
+
+    def _nested(self, record: Record, type_: FieldType, span: Span) -> Iterator[Problem]:
+        if type_.is_primitive or type_.is_array:
+            yield from self.text(record)
+            yield Problem(f"a map of fields where {type_} is expected", span)
+            return
+        message = self.interfaces.message(type_.name)
+        if message is not None:
+            yield from self._record(record, message)
+
+    def _items(self, items: Items, type_: FieldType) -> Iterator[Problem]:
+        if not type_.is_array:
+            yield from self.text(items)
+            yield Problem(f"a list where {type_} is expected", items.span)
+            return
+        count = len(items.items)
+        if type_.array_size not in (None, count) or (
+            type_.array_bound is not None and count > type_.array_bound
+        ):
+            yield Problem(f"a list of {count} does not fit {type_}", items.span)
+        for item in items.items:
+            yield from self._field(item, type_.element)
+
+    def _computed(
+        self, expression: Expression, span: Span, target: FieldType | Message
+    ) -> Iterator[Problem]:
+        found, problems = self._infer(expression, span)
+        yield from problems
+        if not problems and not self._fits(found, target):
+            problem = f"{described(found)} where {described(target)} is expected"
+            yield Problem(problem, span, _conversion_hint(expression, found, target))
+
+    def _fits(self, found: ValueType, target: FieldType | Message) -> bool:
+        if found is ANYTHING:
+            return True
+        if is_array(target):
+            return _fits_array(found, target)
+        if not isinstance(target, Message) and target.is_primitive:
+            return _fits_primitive(found, target)
+        if is_seconds(target) and is_number(found):
+            return True
+        given, wanted = (fields_of(type_, self.interfaces) for type_ in (found, target))
+        if given is None or wanted is None:  # a map of anything, or a message nobody defines
+            return not isinstance(found, FieldType) or _same_name(found, target)
+        return given.name == wanted.name
+
+
+def _fits_array(found: ValueType, target: ValueType) -> bool:
+    if not isinstance(found, FieldType) or not isinstance(target, FieldType) or not found.is_array:
+        return False
+    sizes = {found.array_size, target.array_size} - {None}
+    if len(sizes) > 1:
+        return False
+    if target.is_primitive:
+        return _fits_primitive(found.element, target.element)
+    return found.name == target.name
+
+
+def _fits_primitive(found: ValueType, target: FieldType) -> bool:
+    if is_integer(target):
+        return is_integer(found)
+    return any(belongs(target) and belongs(found) for belongs in (is_number, is_text, is_bool))
+
+
+def _same_name(found: FieldType, target: FieldType | Message) -> bool:
+    return found.name == target.name and not found.is_array
+
+
+def _conversion_hint(
+    expression: Expression, found: ValueType, target: FieldType | Message
+) -> str | None:
+    source = expression.source
+    if is_integer(target) and is_number(found):
+        return f"use {{round({source})}}"
+    if is_text(target) and (is_number(found) or is_bool(found)):
+        return f"use {{str({source})}}"
+    if is_number(target) and is_text(found):
+        return f"use {{float({source})}}"
+    return None

@@ -1,0 +1,197 @@
+"""The types of values, and what a field path leads to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from composer.diagnostics import suggestion
+from composer.interfaces import (
+    FLOATS,
+    INTEGER_RANGES,
+    TEXTS,
+    FieldType,
+    Interfaces,
+    Message,
+)
+from composer.source import Span
+from composer.tree import Plain
+
+
+@dataclass(frozen=True, slots=True)
+class Anything:
+    """The type of what is not known before it runs. It fits everywhere."""
+
+
+ANYTHING = Anything()
+BOOL = FieldType("bool")
+INTEGER = FieldType("int64")
+NUMBER = FieldType("float64")
+TEXT = FieldType("string")
+
+ValueType: TypeAlias = "FieldType | Message | Mapping[str, ValueType] | Anything"
+Scope: TypeAlias = Mapping[str, ValueType]
+
+#: rcl_interfaces/msg/ParameterType, as parameters are declared in YAML.
+_PARAMETER_TYPES: Mapping[str, FieldType] = {
+    "bool": BOOL,
+    "integer": INTEGER,
+    "double": NUMBER,
+    "string": TEXT,
+    "byte_array": FieldType("byte", is_array=True),
+    "bool_array": FieldType("bool", is_array=True),
+    "integer_array": FieldType("int64", is_array=True),
+    "double_array": FieldType("float64", is_array=True),
+    "string_array": FieldType("string", is_array=True),
+}
+_SECONDS = frozenset(("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"))
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What is wrong, where, and how to mend it."""
+
+    message: str
+    span: Span
+    hint: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PathProblem:
+    """A path that leads nowhere: ``index`` is the part that is wrong."""
+
+    message: str
+    index: int
+    hint: str | None = None
+
+
+def parameter_type(declared: str) -> ValueType:
+    """Return the type of a parameter declared as ``declared``."""
+    return _PARAMETER_TYPES.get(declared, ANYTHING)
+
+
+def type_of(value: Plain) -> ValueType:
+    """Return the type of a value written in YAML: what a node's state starts with.
+
+    A number is any number later: ``{last_s: 0}`` may become 0.5.
+    """
+    match value:
+        case bool():
+            return BOOL
+        case int() | float():
+            return NUMBER
+        case str() if "${" not in value:
+            return TEXT
+        case dict():
+            return {name: type_of(content) for name, content in value.items()}
+        case _:
+            return ANYTHING
+
+
+def resolve_path(
+    root: ValueType, parts: tuple[str | int, ...], interfaces: Interfaces
+) -> ValueType | PathProblem:
+    """Return the type of what ``parts`` lead to from ``root``, or where they go wrong."""
+    found = root
+    for index, part in enumerate(parts):
+        step = _element(found, part) if isinstance(part, int) else _field(found, part, interfaces)
+        if isinstance(step, _Refused):
+            return PathProblem(step.message, index, step.hint)
+        found = step
+    return found
+
+
+def fields_of(type_: ValueType, interfaces: Interfaces) -> Message | None:
+    """Return the definition of a message type; None for all else, and for unknown messages."""
+    if isinstance(type_, Message):
+        return type_
+    if isinstance(type_, FieldType) and not type_.is_array and not type_.is_primitive:
+        return interfaces.message(type_.name)
+    return None
+
+
+def is_number(type_: ValueType) -> bool:
+    """Say whether values of the type are numbers."""
+    return is_integer(type_) or (
+        isinstance(type_, FieldType) and not type_.is_array and type_.name in FLOATS
+    )
+
+
+def is_integer(type_: ValueType) -> bool:
+    """Say whether values of the type are integers."""
+    return isinstance(type_, FieldType) and not type_.is_array and type_.name in INTEGER_RANGES
+
+
+def is_text(type_: ValueType) -> bool:
+    """Say whether values of the type are texts."""
+    return isinstance(type_, FieldType) and not type_.is_array and type_.name in TEXTS
+
+
+def is_bool(type_: ValueType) -> bool:
+    """Say whether values of the type are true or false."""
+    return isinstance(type_, FieldType) and not type_.is_array and type_.name == "bool"
+
+
+def is_array(type_: ValueType) -> bool:
+    """Say whether values of the type are lists."""
+    return isinstance(type_, FieldType) and type_.is_array
+
+
+def is_seconds(type_: ValueType) -> bool:
+    """Say whether a number put there means seconds: Time and Duration."""
+    return isinstance(type_, FieldType) and not type_.is_array and type_.name in _SECONDS
+
+
+def described(type_: ValueType) -> str:
+    """Return how a message to people speaks of the type."""
+    match type_:
+        case Message(name=name):
+            return name
+        case FieldType():
+            return str(type_)
+        case Anything():
+            return "of unknown type"
+        case _:
+            return "a map"
+
+
+@dataclass(frozen=True, slots=True)
+class _Refused:
+    message: str
+    hint: str | None = None
+
+
+def _field(type_: ValueType, name: str, interfaces: Interfaces) -> ValueType | _Refused:
+    if isinstance(type_, Mapping):
+        found = type_.get(name)
+        return (
+            found
+            if found is not None
+            else _Refused(f"there is no '{name}'", suggestion(name, type_))
+        )
+    if isinstance(type_, FieldType) and type_.is_array:
+        return _Refused(
+            f"{type_} has no field '{name}'", "it is a list: name an element, as in [0]"
+        )
+    if isinstance(type_, FieldType) and type_.is_primitive:
+        return _Refused(f"{type_} has no field '{name}'", "it is a value, not a message")
+    message = fields_of(type_, interfaces)
+    if message is None:  # not known, or a message nobody defines
+        return ANYTHING
+    field = message.field(name)
+    if field is not None:
+        return field.type
+    hint = suggestion(name, message.field_names)
+    return _Refused(f"{message.name} has no field '{name}'", hint)
+
+
+def _element(type_: ValueType, index: int) -> ValueType | _Refused:
+    if isinstance(type_, Anything):
+        return ANYTHING
+    if not isinstance(type_, FieldType) or not type_.is_array:
+        return _Refused(f"{described(type_)} has no elements")
+    limit = type_.array_size if type_.array_size is not None else type_.array_bound
+    if limit is not None and not -limit <= index < limit:
+        return _Refused(f"there is no element {index} in {type_}")
+    return type_.element
