@@ -1,0 +1,92 @@
+"""A graph in Graphviz's language (graphviz.org/doc/info/lang.html)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.graph.picture import Cluster, Edge, Graph, Kind, Line, Vertex
+
+_VERTICES = {
+    Kind.NODE: 'shape=box, style="filled,rounded", fillcolor="#dbeafe", color="#1d4ed8"',
+    Kind.TOPIC: 'shape=ellipse, style=filled, fillcolor="#dcfce7", color="#15803d"',
+    Kind.SERVICE: 'shape=hexagon, style=filled, fillcolor="#ffedd5", color="#c2410c"',
+    Kind.ACTION: 'shape=box, peripheries=2, style=filled, fillcolor="#f3e8ff", color="#7e22ce"',
+    Kind.PORT: 'shape=box, style="filled,rounded", fillcolor="#f8fafc", color="#64748b"',
+    Kind.STATE: 'shape=box, style="filled,rounded", fillcolor="#e2e8f0", color="#475569"',
+}
+
+_EDGES = {
+    Line.TOPIC: 'color="#15803d"',
+    Line.SERVICE: 'color="#c2410c", style=dashed',
+    Line.ACTION: 'color="#7e22ce", style=bold',
+    Line.DEPENDENCY: 'color="#475569"',
+    Line.TRANSITION: 'color="#475569"',
+}
+
+_WRONG = 'color="#dc2626", penwidth=3'
+
+
+def render(graph: Graph) -> str:
+    """Return the graph as DOT text with a newline at the end."""
+    return "\n".join(_lines(graph)) + "\n"
+
+
+def _lines(graph: Graph) -> Iterator[str]:
+    yield f"digraph {_quoted(graph.title)} {{"
+    yield f"  graph [rankdir={graph.direction}, compound=true, labelloc=t, {_font(14)}];"
+    yield f"  graph [label={_quoted(f'{graph.title}: {graph.view}')}];"
+    yield f"  node [{_font(11)}];"
+    yield f"  edge [{_font(9)}];"
+    yield from _inside("", graph, "  ")
+    for edge in graph.edges:
+        yield f"  {_edge(edge)};"
+    yield "}"
+
+
+def _font(size_points: int) -> str:
+    return f'fontname="Helvetica,Arial,sans-serif", fontsize={size_points}'
+
+
+def _inside(around: str, graph: Graph, indent: str) -> Iterator[str]:
+    for vertex in graph.vertices:
+        if vertex.cluster == around:
+            yield f"{indent}{_vertex(vertex)};"
+    for cluster in graph.clusters:
+        if cluster.parent == around:
+            yield from _frame(cluster, graph, indent)
+
+
+def _frame(cluster: Cluster, graph: Graph, indent: str) -> Iterator[str]:
+    yield f"{indent}subgraph {_quoted(f'cluster_{cluster.key}')} {{"
+    yield f'{indent}  graph [label={_quoted(cluster.label)}, style=rounded, color="#94a3b8"];'
+    yield from _inside(cluster.key, graph, indent + "  ")
+    yield f"{indent}}}"
+
+
+def _vertex(vertex: Vertex) -> str:
+    attributes = [f"label={_label(vertex.lines)}", _VERTICES[vertex.kind]]
+    if vertex.wrong:
+        attributes += [_WRONG, f"tooltip={_quoted(vertex.wrong)}"]
+    return f"{_quoted(vertex.key)} [{', '.join(attributes)}]"
+
+
+def _edge(edge: Edge) -> str:
+    attributes = [_EDGES[edge.kind]]
+    if edge.lines:
+        attributes.append(f"label={_label(edge.lines)}")
+    if edge.wrong:
+        attributes += [_WRONG, f"tooltip={_quoted(edge.wrong)}"]
+    return f"{_quoted(edge.source)} -> {_quoted(edge.target)} [{', '.join(attributes)}]"
+
+
+def _label(lines: tuple[str, ...]) -> str:
+    return '"' + "\\n".join(map(_escaped, lines)) + '"'
+
+
+def _quoted(text: str) -> str:
+    return f'"{_escaped(text)}"'
+
+
+def _escaped(text: str) -> str:
+    """Escape for a quoted string; a line break within a text becomes one in the picture."""
+    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")

@@ -1,0 +1,73 @@
+"""What a diagram knows about nodes, ports and channels beyond their place in it."""
+
+from __future__ import annotations
+
+from composer.graph.labels import qos_facts
+from composer.graph.picture import Details
+from composer.graph.rates import publishing_rate_hz, timer_rate_hz
+from composer.model import Channel, Node, Port, PortKind
+from composer.tree import Plain
+
+
+def node_facts(node: Node) -> Details:
+    """Return what is worth knowing about a node, down to its ports and parameters."""
+    facts: dict[str, Plain] = {
+        "full_name": node.full_name,
+        "type": node.type_name.value if node.type_name is not None else None,
+        "behavior": node.behavior.text.value if node.behavior is not None else None,
+        "executor": node.executor.value if node.executor is not None else "default",
+        "description": node.description or None,
+        "declared_at": str(node.span),
+        "depends_on": [
+            f"{dependency.node.value} ({dependency.state})" for dependency in node.depends_on
+        ],
+        "ports": [dict(port_facts(node, port)) for port in node.ports],
+        "timers": [
+            {"name": timer.name.value, "rate_hz": timer_rate_hz(node, timer)}
+            for timer in node.timers
+        ],
+        "parameters": {
+            parameter.name.value: None if parameter.value is None else parameter.value.value
+            for parameter in node.parameters
+        },
+    }
+    return _said(facts)
+
+
+def port_facts(node: Node, port: Port) -> Details:
+    """Return what is worth knowing about a port."""
+    facts: dict[str, Plain] = {
+        "port": port.name.value,
+        "kind": port.kind.value,
+        "name": port.full_name,
+        "type": port.interface.value,
+        "qos": qos_facts(port.qos.profile),
+        "qos_explicit": port.qos.explicit,
+        "timeout_ms": port.timeout_ms.value if port.timeout_ms is not None else None,
+        "description": port.description or None,
+        "declared_at": str(port.span),
+    }
+    if port.kind is PortKind.PUBLISHER:
+        facts["rate_hz"] = publishing_rate_hz(node, port)
+    return _said(facts)
+
+
+def channel_facts(channel: Channel) -> Details:
+    """Return what is worth knowing about a topic, service or action."""
+    types: list[Plain] = [*dict.fromkeys(end.port.interface.value for end in channel.ends)]
+    return _said(
+        {
+            "name": channel.name,
+            "type": types[0] if len(types) == 1 else types,
+            "sources": [_end(end.node, end.port) for end in channel.sources],
+            "sinks": [_end(end.node, end.port) for end in channel.sinks],
+        }
+    )
+
+
+def _end(node: Node, port: Port) -> str:
+    return f"{node.full_name}.{port.name.value}"
+
+
+def _said(facts: dict[str, Plain]) -> Details:
+    return tuple((name, value) for name, value in facts.items() if value not in (None, [], {}))

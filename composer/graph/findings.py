@@ -1,0 +1,69 @@
+"""Which part of a diagram a finding is about: the part that was written where it points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from composer.diagnostics import Diagnostic, Severity
+from composer.model import Node, Port
+from composer.source import Span
+
+_Place = tuple[str, int, int]
+
+
+class Findings:
+    """Errors and warnings by the places they point at."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic] = ()) -> None:
+        self._by_place: dict[_Place, str] = {}
+        for diagnostic in diagnostics:
+            if diagnostic.severity is Severity.INFO:
+                continue
+            text = f"{diagnostic.rule.code} {diagnostic.message}"
+            for span in (diagnostic.primary, *(label.span for label in diagnostic.related)):
+                self._by_place.setdefault(_place(span), text)
+
+    def about_port(self, port: Port) -> str:
+        """Return the finding that points at a port's declaration; empty for none."""
+        return self._first(_port_spans(port))
+
+    def about_node(self, node: Node) -> str:
+        """Return the finding that points at a node itself; empty for none."""
+        return self._first(_node_spans(node))
+
+    def _first(self, spans: Iterable[Span]) -> str:
+        return next(
+            (self._by_place[place] for place in map(_place, spans) if place in self._by_place), ""
+        )
+
+
+def _place(span: Span) -> _Place:
+    return (span.file.path, span.line, span.column)
+
+
+def _port_spans(port: Port) -> Iterator[Span]:
+    yield port.span
+    yield port.name.span
+    yield port.interface.span
+    yield port.ros_name.span
+    yield port.qos.span
+    for _, span in port.qos.policy_spans:
+        yield span
+
+
+def _node_spans(node: Node) -> Iterator[Span]:
+    yield node.span
+    yield node.name.span
+    yield node.namespace.span
+    if node.type_name is not None:
+        yield node.type_name.span
+    if node.behavior is not None:
+        yield node.behavior.text.span
+    if node.executor is not None:
+        yield node.executor.span
+    for dependency in node.depends_on:
+        yield dependency.node.span
+    for parameter in node.parameters:
+        yield parameter.span
+        if parameter.value is not None:
+            yield parameter.value.span

@@ -1,0 +1,55 @@
+"""A graph as JSON, for programs. The form is part of the command's interface: only add to it."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from composer.graph.picture import Cluster, Edge, Graph, Vertex
+
+
+def render(graph: Graph) -> str:
+    """Return the graph as indented JSON text with a newline at the end."""
+    return json.dumps(as_data(graph), indent=2, ensure_ascii=False) + "\n"
+
+
+def as_data(graph: Graph) -> dict[str, Any]:
+    """Return the graph as plain data."""
+    return {
+        "title": graph.title,
+        "view": graph.view,
+        "clusters": [_cluster(cluster) for cluster in graph.clusters],
+        "vertices": [_vertex(vertex) for vertex in graph.vertices],
+        "edges": [_edge(edge) for edge in graph.edges],
+    }
+
+
+def _cluster(cluster: Cluster) -> dict[str, Any]:
+    return {
+        "key": cluster.key,
+        "label": cluster.label,
+        "parent": cluster.parent or None,
+        "details": dict(cluster.details),
+    }
+
+
+def _vertex(vertex: Vertex) -> dict[str, Any]:
+    return {
+        "key": vertex.key,
+        "kind": vertex.kind.value,
+        "label": list(vertex.lines),
+        "cluster": vertex.cluster or None,
+        "details": dict(vertex.details),
+        "wrong": vertex.wrong or None,
+    }
+
+
+def _edge(edge: Edge) -> dict[str, Any]:
+    return {
+        "source": edge.source,
+        "target": edge.target,
+        "kind": edge.kind.value,
+        "label": list(edge.lines),
+        "details": dict(edge.details),
+        "wrong": edge.wrong or None,
+    }

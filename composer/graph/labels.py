@@ -1,0 +1,56 @@
+"""Short texts for diagrams: what a person says instead of the whole of it."""
+
+from __future__ import annotations
+
+from composer.qos import PRESETS, History, QosProfile
+from composer.tree import Plain
+
+
+def short_type(interface: str) -> str:
+    """Return ``Odometry`` for ``nav_msgs/msg/Odometry``."""
+    return interface.rpartition("/")[2] or interface
+
+
+def rate(hertz: float) -> str:
+    """Return ``10 Hz``."""
+    return f"{hertz:g} Hz"
+
+
+def qos_label(profile: QosProfile) -> str:
+    """Return the preset's name where the profile is one, else what differs from the default."""
+    for name in ("command", "sensor_data", "state"):
+        if profile == PRESETS[name]:
+            return name
+    return ", ".join([profile.reliability, profile.durability, _history(profile), *_times(profile)])
+
+
+def qos_facts(profile: QosProfile) -> dict[str, Plain]:
+    """Return every policy that says something, keyed as in YAML."""
+    facts: dict[str, Plain] = {
+        "reliability": profile.reliability.value,
+        "durability": profile.durability.value,
+        "history": profile.history.value,
+    }
+    if profile.history is History.KEEP_LAST:
+        facts["depth"] = profile.depth
+    facts["liveliness"] = profile.liveliness.value
+    for name in ("deadline_ms", "lifespan_ms", "liveliness_lease_duration_ms"):
+        value = getattr(profile, name)
+        if value is not None:
+            facts[name] = value
+    return facts
+
+
+def _history(profile: QosProfile) -> str:
+    if profile.history is History.KEEP_ALL:
+        return "keep_all"
+    return f"keep_last {profile.depth}"
+
+
+def _times(profile: QosProfile) -> list[str]:
+    times = {
+        "deadline": profile.deadline_ms,
+        "lifespan": profile.lifespan_ms,
+        "lease": profile.liveliness_lease_duration_ms,
+    }
+    return [f"{name} {value:g} ms" for name, value in times.items() if value is not None]

@@ -1,0 +1,112 @@
+"""A graph as a Mermaid flowchart, for README files and wikis (mermaid.js.org, flowchart syntax)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.graph.picture import Cluster, Edge, Graph, Kind, Line, Vertex
+
+#: What stands around a label decides the shape.
+_SHAPES = {
+    Kind.NODE: ("[", "]"),
+    Kind.TOPIC: ("([", "])"),
+    Kind.SERVICE: ("{{", "}}"),
+    Kind.ACTION: ("[[", "]]"),
+    Kind.PORT: ("(", ")"),
+    Kind.STATE: ("(", ")"),
+}
+
+_ARROWS = {
+    Line.TOPIC: "-->",
+    Line.SERVICE: "-.->",
+    Line.ACTION: "==>",
+    Line.DEPENDENCY: "-->",
+    Line.TRANSITION: "-->",
+}
+
+_STYLES = (
+    "classDef node fill:#dbeafe,stroke:#1d4ed8,color:#172554",
+    "classDef topic fill:#dcfce7,stroke:#15803d,color:#052e16",
+    "classDef service fill:#ffedd5,stroke:#c2410c,color:#431407",
+    "classDef action fill:#f3e8ff,stroke:#7e22ce,color:#3b0764",
+    "classDef port fill:#f8fafc,stroke:#64748b,color:#0f172a",
+    "classDef state fill:#e2e8f0,stroke:#475569,color:#0f172a",
+    "classDef wrong stroke:#dc2626,stroke-width:3px",
+)
+
+
+def render(graph: Graph) -> str:
+    """Return the graph as Mermaid text with a newline at the end."""
+    return "\n".join(_lines(graph)) + "\n"
+
+
+def _lines(graph: Graph) -> Iterator[str]:
+    identifiers = {vertex.key: f"v{number}" for number, vertex in enumerate(graph.vertices, 1)}
+    yield "---"
+    yield f"title: {_title(graph)}"
+    yield "---"
+    yield f"flowchart {graph.direction}"
+    yield from _inside("", graph, identifiers, "  ")
+    for edge in graph.edges:
+        yield f"  {_arrow(edge, identifiers)}"
+    for style in _STYLES:
+        if style.split()[1] in _classes(graph):
+            yield f"  {style}"
+    yield from _wrong_parts(graph, identifiers)
+
+
+def _title(graph: Graph) -> str:
+    """Quote the title as YAML: Mermaid reads what stands between the dashes as such."""
+    text = f"{graph.title}: {graph.view}".replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{text}"'
+
+
+def _inside(around: str, graph: Graph, identifiers: dict[str, str], indent: str) -> Iterator[str]:
+    for vertex in graph.vertices:
+        if vertex.cluster == around:
+            yield f"{indent}{_vertex(vertex, identifiers)}"
+    for number, cluster in enumerate(graph.clusters, 1):
+        if cluster.parent == around:
+            yield f"{indent}{_frame(cluster, number)}"
+            yield from _inside(cluster.key, graph, identifiers, indent + "  ")
+            yield f"{indent}end"
+
+
+def _frame(cluster: Cluster, number: int) -> str:
+    return f"subgraph c{number} [{_quoted((cluster.label,))}]"
+
+
+def _vertex(vertex: Vertex, identifiers: dict[str, str]) -> str:
+    begin, end = _SHAPES[vertex.kind]
+    return f"{identifiers[vertex.key]}{begin}{_quoted(vertex.lines)}{end}:::{vertex.kind}"
+
+
+def _arrow(edge: Edge, identifiers: dict[str, str]) -> str:
+    label = f"|{_quoted(edge.lines)}|" if edge.lines else ""
+    return f"{identifiers[edge.source]} {_ARROWS[edge.kind]}{label} {identifiers[edge.target]}"
+
+
+def _classes(graph: Graph) -> set[str]:
+    classes = {vertex.kind.value for vertex in graph.vertices}
+    if any(vertex.wrong for vertex in graph.vertices):
+        classes.add("wrong")
+    return classes
+
+
+def _wrong_parts(graph: Graph, identifiers: dict[str, str]) -> Iterator[str]:
+    vertices = [identifiers[vertex.key] for vertex in graph.vertices if vertex.wrong]
+    if vertices:
+        yield f"  class {','.join(vertices)} wrong"
+    edges = [str(number) for number, edge in enumerate(graph.edges) if edge.wrong]
+    if edges:
+        yield f"  linkStyle {','.join(edges)} stroke:#dc2626,stroke-width:3px"
+
+
+def _quoted(lines: tuple[str, ...]) -> str:
+    return '"' + "<br/>".join(map(_escaped, lines)) + '"'
+
+
+def _escaped(text: str) -> str:
+    """Write what Mermaid or HTML would read as syntax as character codes (``#35;`` is ``#``)."""
+    special = '#&<>"`\\'
+    return "".join(f"#{ord(letter)};" if letter in special else letter for letter in text)

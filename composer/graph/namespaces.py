@@ -1,0 +1,54 @@
+"""Namespaces as frames: which are drawn, and which one a name stands in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from composer.graph.picture import Cluster
+from composer.model import Node
+
+
+class Namespaces:
+    """The namespaces of some nodes. One that holds nothing but one other is not drawn."""
+
+    def __init__(self, nodes: Iterable[Node]) -> None:
+        used = {node.namespace.value for node in nodes} - {"/"}
+        self._drawn = {name for name in _with_ancestors(used) if name in used or _forks(name, used)}
+
+    def clusters(self) -> tuple[Cluster, ...]:
+        """Return a cluster for each namespace that is drawn, parents first."""
+        return tuple(
+            Cluster(name, name, self.around(_parent(name))) for name in sorted(self._drawn)
+        )
+
+    def around(self, namespace: str) -> str:
+        """Return the innermost drawn namespace that ``namespace`` is or lies in; else empty."""
+        while namespace not in self._drawn:
+            if namespace in ("", "/"):
+                return ""
+            namespace = _parent(namespace)
+        return namespace
+
+    def around_name(self, full_name: str) -> str:
+        """Return the innermost drawn namespace that a topic, service or action name lies in."""
+        return self.around(_parent(full_name))
+
+
+def _parent(name: str) -> str:
+    return name.rpartition("/")[0]
+
+
+def _with_ancestors(names: Iterable[str]) -> set[str]:
+    found: set[str] = set()
+    for name in names:
+        levels = name.strip("/").split("/")
+        found.update("/" + "/".join(levels[:depth]) for depth in range(1, len(levels) + 1))
+    return found
+
+
+def _forks(name: str, used: set[str]) -> bool:
+    depth = name.count("/") + 1
+    children = {
+        tuple(other.split("/")[: depth + 1]) for other in used if other.startswith(f"{name}/")
+    }
+    return len(children) > 1
