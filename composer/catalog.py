@@ -8,9 +8,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from composer.resources import nodes_folder
+from composer.resources import interfaces_folder, nodes_folder
 
-FOLDER = "nodes"
+NODES = "nodes"
+INTERFACES = "interfaces"
 SUFFIX = ".yaml"
 
 _SUFFIXES = frozenset({".yaml", ".yml"})
@@ -57,10 +58,15 @@ class Catalog:
 
 
 def project_nodes(folder: Path) -> Path | None:
-    """Return the ``nodes`` folder of the nearest ancestor that has one, or None."""
-    start = folder.resolve()
-    candidates = (ancestor / FOLDER for ancestor in (start, *start.parents))
-    return next((path for path in candidates if path.is_dir()), None)
+    """Return the ``nodes`` folder of the project that ``folder`` belongs to, or None."""
+    return _nearest(NODES, folder)
+
+
+def interface_folders(folder: Path) -> tuple[Path, ...]:
+    """Return where sources of interface packages are: the project's, then the composer's own."""
+    project = _nearest(INTERFACES, folder)
+    found = (project,) if project is not None else ()
+    return tuple(dict.fromkeys((*found, interfaces_folder().resolve())))
 
 
 def find_files(paths: Iterable[Path]) -> tuple[Path, ...]:
@@ -85,6 +91,13 @@ def shown_path(path: Path) -> str:
         return str(path.resolve().relative_to(Path.cwd()))
     except (OSError, ValueError):
         return str(path)
+
+
+def _nearest(name: str, folder: Path) -> Path | None:
+    """Return the folder called ``name`` in the nearest of ``folder`` and its ancestors."""
+    start = folder.resolve()
+    candidates = (ancestor / name for ancestor in (start, *start.parents))
+    return next((path for path in candidates if _is_folder(path)), None)
 
 
 def _is_folder(path: Path) -> bool:

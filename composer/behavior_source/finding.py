@@ -8,7 +8,7 @@ from pathlib import Path
 
 from composer.behavior_source.modules import (
     Unreadable,
-    is_installed,
+    is_compiled,
     module_file,
     relative_module_file,
 )
@@ -59,9 +59,8 @@ def find_behavior(reference: BehaviorReference) -> BehaviorSource:
     """Read what ``reference`` names as far as syntax tells. Never raises, never imports."""
     path = module_file(reference.module, reference.folder)
     if path is None:
-        # A compiled module is there, but has no syntax to read.
-        found = _is_dotted(reference.module) and is_installed(reference.module)
-        return BehaviorSource(reference, module_found=found and "." not in reference.module)
+        compiled = is_compiled(reference.module)
+        return BehaviorSource(reference, module_found=compiled, class_found=compiled)
     reader = _Reader(reference.folder)
     try:
         module = reader.module(path)
@@ -93,10 +92,6 @@ def find_behavior(reference: BehaviorReference) -> BehaviorSource:
         class_span=start[1].span,
         methods=tuple(methods.values()),
     )
-
-
-def _is_dotted(name: str) -> bool:
-    return all(part.isidentifier() for part in name.split("."))
 
 
 Place = tuple[Module, Class]

@@ -39,9 +39,18 @@ def module_file(module: str, folder: Path) -> Path | None:
     return _installed(parts)
 
 
-def is_installed(module: str) -> bool:
-    """Say whether Python knows the top of ``module``, be it compiled or built in."""
-    return _spec(module.partition(".")[0]) is not None
+def is_compiled(module: str) -> bool:
+    """Say whether Python has ``module`` in a form without syntax to read: compiled or built in."""
+    parts = module.split(".")
+    spec = _spec(parts[0]) if all(part.isidentifier() for part in parts) else None
+    if spec is None or len(parts) == 1:
+        return spec is not None
+    *parents, last = parts[1:]
+    return any(
+        _exists(Path(location, *parents, last + suffix))
+        for location in spec.submodule_search_locations or ()
+        for suffix in importlib.machinery.EXTENSION_SUFFIXES
+    )
 
 
 def relative_module_file(module: str, level: int, importer: Path) -> Path | None:

@@ -13,7 +13,8 @@ from pathlib import Path
 from composer.catalog import Catalog
 from composer.diagnostics import Diagnostic, in_order
 from composer.model import System
-from composer.resolve.kinds import NODE, SYSTEM, check_kind
+from composer.resolve import kinds
+from composer.resolve.kinds import check_kind
 from composer.resolve.overrides import Overrides, read_overrides
 from composer.resolve.system import resolve_node_type, resolve_system
 from composer.schema import kind_of
@@ -40,11 +41,11 @@ def resolve(
     place = folder if folder is not None else Path(source.path).parent
     extra = overrides if overrides is not None else Overrides()
     match kind_of(tree):
-        case "system":
+        case kinds.SYSTEM:
             system, findings = resolve_system(tree, source, place, catalog, extra)
-        case "node":
+        case kinds.NODE:
             system, findings = resolve_node_type(tree, source, place, extra)
         case _:
-            wrong = check_kind(tree, source, SYSTEM, NODE)
+            wrong = check_kind(tree, source)
             return None, [wrong] if wrong is not None else []
     return system, in_order(findings)

@@ -28,7 +28,9 @@ RULE = register(
 _WORDS = {SYSTEM: "a system", NODE: "a node type"}
 
 
-def check_kind(tree: Mapping, source: SourceFile, *allowed: str) -> Diagnostic | None:
+def check_kind(
+    tree: Mapping, source: SourceFile, allowed: tuple[str, ...] = (SYSTEM, NODE)
+) -> Diagnostic | None:
     """Return what is wrong with the kind of a file; None when it is one of ``allowed``."""
     kind = kind_of(tree)
     if kind in allowed:

@@ -86,9 +86,13 @@ def _port(kind: PortKind, entry: Entry, qos: QosTable, findings: list[Diagnostic
         result=template(tree.get("result"), findings),
         reentrant=flag(tree.get("reentrant"), default=False),
         external=flag(tree.get("external"), default=False),
-        required=flag(tree.get("required"), default=True),
+        required=_required(tree.get("required")),
         description=plain_text(tree.get("description")),
     )
+
+
+def _required(tree: Tree | None) -> bool | None:
+    return tree.value if isinstance(tree, Scalar) and isinstance(tree.value, bool) else None
 
 
 def _timeout(kind: PortKind, tree: Mapping, span: Span) -> Located[float] | None:

@@ -39,9 +39,9 @@ class QosTable:
             return _overlaid(tree, base, tree.span)
         name = text(tree)
         if name is None:
-            return default
+            return default if tree is None else _guess(default)
         found = self.use(name)
-        return _at(found or default, name.span)
+        return replace(found or _guess(default), span=name.span, explicit=True)
 
     def use(self, name: Located[str]) -> Qos | None:
         """Return the profile called ``name``, and remember that it was asked for."""
@@ -55,7 +55,7 @@ class QosTable:
         if extends is None:
             # What an inline profile leaves out is rclpy's, whatever the kind of port.
             return replace(default, profile=QosProfile())
-        return self.use(extends) or default
+        return self.use(extends) or _guess(default)
 
 
 def qos_table(tree: Tree | None) -> QosTable:
@@ -101,7 +101,7 @@ def _profile(entry: Entry, resolved: Map[str, Qos]) -> Qos:
     extends = _extends(entry)
     base = Qos(QosProfile(), entry.key.span)
     if extends is not None:
-        base = resolved.get(extends.value) or _preset(extends) or base
+        base = resolved.get(extends.value) or _preset(extends) or _guess(base)
     return _overlaid(entry.value, base, entry.key.span)
 
 
@@ -114,23 +114,26 @@ def _preset(name: Located[str]) -> Qos | None:
     return Qos(profile, name.span) if profile is not None else None
 
 
-def _at(qos: Qos, span: Span) -> Qos:
-    """Return the profile as used at ``span``; policies keep the place that decided them."""
-    return Qos(qos.profile, span, explicit=True, policy_spans=qos.policy_spans)
+def _guess(qos: Qos) -> Qos:
+    """Return the profile as what stands in for one that is not known."""
+    return replace(qos, known=False)
 
 
 def _overlaid(tree: Tree, base: Qos, span: Span) -> Qos:
     """Return ``base`` with the policies that ``tree`` writes out."""
     changes: dict[str, Any] = {}
     spans = dict(base.policy_spans)
+    known = base.known
     for entry in entries(tree):
         read = _POLICIES.get(entry.name)
         value = read(entry.value) if read is not None else None
         if value is not None:
             changes[entry.name] = value.value
             spans[entry.name] = entry.value.span
+        elif entry.name != "extends":
+            known = False
     profile = replace(base.profile, **changes)
-    return Qos(profile, span, explicit=True, policy_spans=tuple(spans.items()))
+    return Qos(profile, span, explicit=True, policy_spans=tuple(spans.items()), known=known)
 
 
 Reader = Callable[[Tree], "Located[Any] | None"]

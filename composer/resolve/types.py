@@ -72,7 +72,7 @@ class NodeTypes:
         self.findings.extend(found)
         if tree is None:
             return None
-        wrong_kind = check_kind(tree, source, NODE)
+        wrong_kind = check_kind(tree, source, (NODE,))
         if wrong_kind is not None:
             self.findings.append(wrong_kind)
             return None

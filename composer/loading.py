@@ -1,0 +1,124 @@
+"""The whole pure pipeline: from a file to its model and everything that is wrong with it.
+
+Document, kind, variables, schema, model, checks - each stage runs on whatever the one before left
+it, so that one run shows every finding (DESIGN: The way data flows).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from composer.catalog import Catalog, interface_folders
+from composer.checks import Context, run_checks
+from composer.diagnostics import Diagnostic, has_errors, in_order
+from composer.document import parse_bytes, read_document
+from composer.expand import expand
+from composer.interfaces import Interfaces
+from composer.model import System
+from composer.resolve import Overrides, check_kind, read_overrides, resolve
+from composer.schema import check_schema, kind_of
+from composer.source import SourceFile
+from composer.tree import Mapping
+
+
+@dataclass(frozen=True, slots=True)
+class Loading:
+    """What came of a file. ``system`` is None when too little of it could be read.
+
+    ``catalog`` and ``interfaces`` are what the checks knew; ``source`` is the text.
+    """
+
+    system: System | None
+    diagnostics: list[Diagnostic]
+    source: SourceFile
+    catalog: Catalog
+    interfaces: Interfaces
+
+    @property
+    def runnable(self) -> bool:
+        """True when there is a system, whole and without errors."""
+        return (
+            self.system is not None
+            and not self.system.node_type
+            and not has_errors(self.diagnostics)
+        )
+
+
+def load(
+    path: Path,
+    *,
+    shown: str | None = None,
+    parameter_overrides: Iterable[str] = (),
+    namespace: str | None = None,
+    interfaces: Interfaces | None = None,
+) -> Loading:
+    """Read, resolve and check the system or node type in the file ``path``.
+
+    ``shown`` is the file's name in findings. ``parameter_overrides`` are texts of the form
+    ``node.parameter=value``; ``namespace`` takes the place of the system's own. ``interfaces`` may
+    be given by who loads many files of one project: reading them is what takes time.
+    """
+    tree, source, findings = read_document(path, shown)
+    overrides, found = read_overrides(parameter_overrides, namespace)
+    known = _Known.of(path, interfaces)
+    return _load(tree, source, [*findings, *found], known, overrides)
+
+
+def load_bytes(
+    content: bytes, folder: Path, *, shown: str, interfaces: Interfaces | None = None
+) -> Loading:
+    """Do the same for what came from elsewhere, as if it were a file in ``folder``."""
+    tree, source, findings = parse_bytes(content, shown)
+    return _load(tree, source, findings, _Known.of(folder / shown, interfaces), Overrides())
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """What a file may refer to."""
+
+    folder: Path
+    catalog: Catalog
+    interfaces: Interfaces
+
+    @classmethod
+    def of(cls, path: Path, interfaces: Interfaces | None) -> _Known:
+        known = (
+            interfaces
+            if interfaces is not None
+            else Interfaces.load(interface_folders(path.parent))
+        )
+        return cls(path.resolve().parent, Catalog.for_file(path), known)
+
+
+def _load(
+    tree: Mapping | None,
+    source: SourceFile,
+    found: list[Diagnostic],
+    known: _Known,
+    overrides: Overrides,
+) -> Loading:
+    system, findings = _resolved(tree, source, known, overrides) if tree else (None, [])
+    findings = [*found, *findings]
+    if system is not None:
+        findings.extend(run_checks(Context(system, known.interfaces, known.catalog)))
+    return Loading(system, in_order(findings), source, known.catalog, known.interfaces)
+
+
+def _resolved(
+    tree: Mapping,
+    source: SourceFile,
+    known: _Known,
+    overrides: Overrides,
+) -> tuple[System | None, list[Diagnostic]]:
+    kind = kind_of(tree)
+    if kind is None:
+        wrong = check_kind(tree, source)
+        return None, [wrong] if wrong is not None else []
+    expanded, findings = expand(tree, {})
+    findings.extend(check_schema(expanded, kind))
+    system, found = resolve(
+        expanded, source, known.catalog, folder=known.folder, overrides=overrides
+    )
+    return system, [*findings, *found]
