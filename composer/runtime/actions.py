@@ -60,8 +60,8 @@ class ActionSource:
         self._handle: Handle = getattr(waitable, self._side.handle)
         self._executor = executor
         self._run_task = run_task
-        if self._side is _SERVER:
-            self._waitable._is_goal_expired = False  # a timer asks, see forget_expired_goals
+        if isinstance(waitable, ActionServer):
+            waitable._is_goal_expired = False  # a timer asks, see forget_expired_goals
 
     @property
     def name(self) -> str:

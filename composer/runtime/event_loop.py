@@ -8,7 +8,6 @@ from typing import Any
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.client import Client
-from rclpy.event_handler import EventHandler
 from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.subscription import Subscription
@@ -78,17 +77,7 @@ class EventLoop(Scheduler):
 
     def own_source(self, entity: object) -> Source | None:
         """Return the source for what came with a node, or None where there is nothing to do."""
-        match entity:
-            case Subscription():
-                return sources.SubscriptionSource(entity, entity.callback)
-            case Service():
-                answer = sources.answer_with_own_callback(entity, self.run_task)
-                return sources.ServiceSource(entity, answer)
-            case Client():
-                return sources.ClientSource(entity, self._futures)
-            case EventHandler():
-                return sources.EventSource(entity)
-        return None
+        return sources.source_of(entity, self._futures, self.run_task)
 
     def _add(self, entity: object, source: Source) -> None:
         self.remove(entity)

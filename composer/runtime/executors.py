@@ -4,17 +4,26 @@ from __future__ import annotations
 
 from rclpy.logging import get_logger
 
-from composer.model import Executor
+from composer.model import Executor, ExecutorKind
 from composer.runtime.event_loop import EventLoop
 from composer.runtime.loop import ExceptionHandler, Loop
+from composer.runtime.wait_set_loop import WaitSetLoop
 
 
 def make_loop(executor: Executor, on_exception: ExceptionHandler | None = None) -> Loop:
-    """Return the loop for an executor, not started.
+    """Return the loop for an executor, not started. rclpy must be initialized.
 
     ``on_exception`` is told of every exception that leaves a callback; by default it is logged.
     """
-    return EventLoop(executor.name.value, on_exception or log_exception)
+    name = executor.name.value
+    handler = on_exception or log_exception
+    match executor.kind:
+        case ExecutorKind.EVENTS:
+            return EventLoop(name, handler)
+        case ExecutorKind.SINGLE_THREADED:
+            return WaitSetLoop(name, handler, threads=None)
+        case ExecutorKind.MULTI_THREADED:
+            return WaitSetLoop(name, handler, threads=executor.threads)
 
 
 def log_exception(what: str, error: BaseException) -> None:

@@ -66,8 +66,6 @@ class Scheduler:
 
         Raises ValueError for a period that is not positive.
         """
-        if not period_s > 0:
-            raise ValueError(f"a period must be positive, not {period_s:g} s")
         return self._schedule(ScheduledCall(monotonic() + period_s, period_s, callback))
 
     def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:

@@ -11,6 +11,9 @@ import inspect
 from collections.abc import Callable, Coroutine
 from typing import Any, Protocol
 
+from rclpy.client import Client
+from rclpy.event_handler import EventHandler
+from rclpy.service import Service
 from rclpy.subscription import Subscription
 
 from composer.runtime import readiness
@@ -224,3 +227,20 @@ class EventSource:
     def call(self, taken: Any) -> None:
         """Call with the status."""
         self._handler.callback(taken)
+
+
+def source_of(entity: object, executor: object, run_task: RunTask) -> Source | None:
+    """Return what serves an entity by the callback it was created with.
+
+    None for what is not served that way: timers, guard conditions and actions.
+    """
+    match entity:
+        case Subscription():
+            return SubscriptionSource(entity, entity.callback)
+        case Service():
+            return ServiceSource(entity, answer_with_own_callback(entity, run_task))
+        case Client():
+            return ClientSource(entity, executor)
+        case EventHandler():
+            return EventSource(entity)
+    return None

@@ -19,6 +19,9 @@ class ScheduledCall:
     def __init__(
         self, due_s: float, period_s: float | None, callback: Callable[[], object]
     ) -> None:
+        """Raise ValueError for a period that is not positive."""
+        if period_s is not None and not period_s > 0:
+            raise ValueError(f"a period must be positive, not {period_s:g} s")
         self.due_s = due_s
         self.period_s = period_s
         self.callback = callback

@@ -1,0 +1,61 @@
+"""Timers for a loop that cannot wait for a point in time itself."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from functools import partial
+from time import monotonic
+
+from composer.runtime.timers import ScheduledCall, TimerHeap
+
+
+class TimerThread:
+    """Hands calls to a loop when they are due. A periodic call is never handed over twice."""
+
+    def __init__(self, name: str, call_soon: Callable[[Callable[[], object]], None]) -> None:
+        self._call_soon = call_soon
+        self._timers = TimerHeap()
+        self._changed = threading.Condition()
+        self._stopping = False
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    def add(self, call: ScheduledCall) -> ScheduledCall:
+        """Hand ``call`` over when it is due. From any thread."""
+        with self._changed:
+            self._timers.add(call)
+            self._changed.notify()
+        return call
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Hand nothing over any more."""
+        with self._changed:
+            self._stopping = True
+            self._changed.notify()
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                if self._stopping:
+                    return
+                due_s = self._timers.next_due_s()
+                if due_s is None or due_s > monotonic():
+                    self._changed.wait(None if due_s is None else due_s - monotonic())
+                    continue
+                due = self._timers.take_due()
+            for call in due:
+                self._call_soon(partial(self._call, call))
+
+    def _call(self, call: ScheduledCall) -> None:
+        if call.cancelled or self._stopping:
+            return
+        try:
+            call.callback()
+        finally:
+            with self._changed:
+                self._timers.repeat(call)
+                self._changed.notify()
