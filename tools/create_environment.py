@@ -7,7 +7,7 @@ old. What is missing is said in one sentence on stderr, with exit code 1, before
 """
 
 import importlib.util
-import json
+import os
 import platform
 import re
 import shutil
@@ -15,13 +15,13 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+import urllib.parse
 import urllib.request
 import venv
 from pathlib import Path
 
 OLDEST_PYTHON = (3, 11)
 NEWEST_PYTHON = (3, 14)  # the newest that ROS 2 Jazzy's wheels on PyPI are built for
-PACKAGE_INDEX = "https://pypi.org/simple/"
 TIMEOUT_S = 60
 
 
@@ -63,12 +63,7 @@ def compiler_problem(has_compiler, has_headers, python_name):
         packages.append(f"{python_name}-dev")
     if not packages:
         return None
-    missing = " and ".join(
-        text
-        for text, there in (("a C++ compiler", has_compiler), ("the Python headers", has_headers))
-        if not there
-    )
-    return f"{missing} are missing; run: sudo apt install {' '.join(packages)}"
+    return f"what compiles the interfaces is missing; run: sudo apt install {' '.join(packages)}"
 
 
 def _available_pythons():
@@ -99,24 +94,24 @@ def find_problem():
     )
 
 
-def newest_wheel(files):
-    """Return the index entry of the newest finished, not withdrawn wheel among `files`."""
-    wheels = []
-    for file in files:
-        match = re.fullmatch(r"pip-(\d+(?:\.\d+)*)-py3-none-any\.whl", file["filename"])
-        if match and not file.get("yanked"):
-            wheels.append((tuple(int(number) for number in match.group(1).split(".")), file))
-    return max(wheels, key=lambda entry: entry[0])[1]
+def newest_wheel(page):
+    """Return the link to the newest finished wheel of pip on a page of a package index (PEP 503).
+
+    Raises ValueError when there is none.
+    """
+    links = re.findall(r'href="([^"]*/pip-([\d.]+)-py3-none-any\.whl)[#"]', page)
+    if not links:
+        raise ValueError("the package index names no wheel of pip")
+    return max(links, key=lambda link: [int(number) for number in link[1].split(".")])[0]
 
 
 def _download_pip(folder):
-    """Fetch pip's newest wheel from PyPI and return where it lies."""
-    accept = {"Accept": "application/vnd.pypi.simple.v1+json"}
-    request = urllib.request.Request(PACKAGE_INDEX + "pip/", headers=accept)
-    with urllib.request.urlopen(request, timeout=TIMEOUT_S) as answer:
-        wheel = newest_wheel(json.load(answer)["files"])
-    target = folder / wheel["filename"]
-    with urllib.request.urlopen(wheel["url"], timeout=TIMEOUT_S) as answer:
+    """Fetch pip's newest wheel from the package index and return where it lies."""
+    index = os.environ.get("PIP_INDEX_URL", "https://pypi.org/simple").rstrip("/") + "/pip/"
+    with urllib.request.urlopen(index, timeout=TIMEOUT_S) as answer:
+        link = urllib.parse.urljoin(index, newest_wheel(answer.read().decode()))
+    target = folder / link.rpartition("/")[2]
+    with urllib.request.urlopen(link, timeout=TIMEOUT_S) as answer:
         target.write_bytes(answer.read())
     return target
 
@@ -131,7 +126,7 @@ def _install_pip(python):
 
 
 def create(folder):
-    """Create the environment with pip in it. Raises OSError or CalledProcessError."""
+    """Create the environment with pip in it. Raises OSError, ValueError or CalledProcessError."""
     has_ensurepip = importlib.util.find_spec("ensurepip") is not None
     venv.create(folder, clear=True, symlinks=True, with_pip=has_ensurepip)
     if not has_ensurepip:
@@ -146,7 +141,7 @@ def main():
         return 1
     try:
         create(sys.argv[1])
-    except (OSError, subprocess.CalledProcessError) as error:
+    except (OSError, ValueError, subprocess.CalledProcessError) as error:
         print(
             f"the environment could not be created ({error}); "
             "on Debian and Ubuntu this helps: sudo apt install python3-venv",
