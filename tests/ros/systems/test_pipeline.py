@@ -1,0 +1,155 @@
+"""Tutorial: the pipeline. The numbers mean something, and these tests hold them to it."""
+
+from __future__ import annotations
+
+import math
+import re
+import signal
+from itertools import pairwise
+
+import pytest
+from action_msgs.msg import GoalStatus
+from composer_interfaces.action import Navigate
+from composer_interfaces.srv import PlanTrajectory
+from geometry_msgs.msg import Point, Twist
+from nav_msgs.msg import Odometry, Path
+from rclpy.action import ActionClient
+from rclpy.qos import QoSPresetProfiles
+
+from tests.ros.systems.running import Outsider, RunningSystem
+
+NODES = ("/perception/sensor_simulator", "/planning/planner", "/control/motor_controller")
+MAX_VELOCITY = 1.0  # the motor controller's default, in m/s
+CONFIGURED = 0.02  # of rounding: velocities, in m/s
+
+
+def _seconds(path: Path) -> list[float]:
+    return [pose.header.stamp.sec + pose.header.stamp.nanosec * 1e-9 for pose in path.poses]
+
+
+def _distance(first: Point, second: Point) -> float:
+    return math.dist((first.x, first.y, first.z), (second.x, second.y, second.z))
+
+
+def test_nodes_become_active_in_order_and_end_in_reverse(outsider: Outsider) -> None:
+    with RunningSystem("systems/pipeline.yaml") as system:
+        for node in NODES:
+            outsider.wait_for_state(node, "active")
+        code, took_s = system.stop(signal.SIGINT)
+    activated = _order(system, r"active$|active\b")
+    assert code == 0
+    assert took_s < 2.0
+    assert activated.index("/planning/planner") < activated.index("/control/motor_controller")
+    assert "Traceback" not in system.output
+
+
+def _order(system: RunningSystem, pattern: str) -> list[str]:
+
+    return [
+        node
+        for line in system.lines
+        for node in NODES
+        if node in line and re.search(pattern, line) and "inactive" not in line
+    ]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_every_signal_ends_it_cleanly(outsider: Outsider, number: signal.Signals) -> None:
+    with RunningSystem("systems/pipeline.yaml") as system:
+        outsider.wait_for_state(NODES[-1], "active")
+        code, took_s = system.stop(number)
+    assert (code, took_s < 2.0) == (0, True)
+
+
+def test_the_robot_follows_the_planned_path(outsider: Outsider) -> None:
+    commands = outsider.listen(Twist, "/motor_commands")
+    odometry = outsider.listen(Odometry, "/sensor_data", QoSPresetProfiles.SENSOR_DATA.value)
+    with RunningSystem("systems/pipeline.yaml"):
+        # the first waypoint is (2, 0): straight ahead
+        outsider.spin_until(lambda: any(message.pose.pose.position.x > 1.9 for message in odometry))
+    speeds = [math.hypot(message.linear.x, message.linear.y) for message in commands]
+    assert max(speeds) <= MAX_VELOCITY + CONFIGURED
+    assert max(speeds) > 0.5
+    on_the_way = [m.pose.pose.position for m in odometry if m.pose.pose.position.x < 1.9]
+    assert max(abs(position.y) for position in on_the_way) < 0.05
+    assert all(after.x >= before.x - 1e-6 for before, after in pairwise(on_the_way))
+    for message in odometry:
+        twist = message.twist.twist.linear
+        assert math.hypot(twist.x, twist.y) <= MAX_VELOCITY + CONFIGURED
+
+
+def test_the_planner_answers_another_process(outsider: Outsider) -> None:
+    start, goal = Point(x=1.0, y=1.0), Point(x=4.0, y=5.0)
+    with RunningSystem("systems/pipeline.yaml"):
+        outsider.wait_for_state(NODES[-1], "active")
+        response = outsider.call(
+            PlanTrajectory,
+            "/plan_trajectory",
+            PlanTrajectory.Request(start=start, goal=goal, max_velocity=0.5),
+        )
+        refused = outsider.call(PlanTrajectory, "/plan_trajectory", PlanTrajectory.Request())
+    assert response.success
+    positions = [pose.pose.position for pose in response.path.poses]
+    times_s = _seconds(response.path)
+    assert _distance(positions[0], start) < 1e-9
+    assert _distance(positions[-1], goal) < 1e-9
+    for (before, after), (earlier, later) in zip(
+        pairwise(positions), pairwise(times_s), strict=True
+    ):
+        assert _distance(before, after) / (later - earlier) <= 0.5 + CONFIGURED
+    assert times_s[-1] - times_s[0] == pytest.approx(5.0 / 0.5, abs=0.2)
+    assert not refused.success
+    assert "max_velocity" in refused.message
+
+
+def test_another_process_navigates_and_cancels(outsider: Outsider) -> None:
+    with RunningSystem("systems/pipeline.yaml"):
+        outsider.wait_for_state(NODES[-1], "active")
+        client = ActionClient(outsider.node, Navigate, "/navigate")
+        outsider.spin_until(client.server_is_ready)
+        feedback: list[float] = []
+        goal = Navigate.Goal(target=Point(x=0.0, y=1.0), max_velocity=1.0)
+        outcome = outsider.result(
+            outsider.result(
+                client.send_goal_async(
+                    goal,
+                    feedback_callback=lambda m: feedback.append(m.feedback.progress_percent),
+                )
+            ).get_result_async()
+        )
+        assert outcome.status == GoalStatus.STATUS_SUCCEEDED
+        assert outcome.result.distance_traveled == pytest.approx(1.0, abs=0.5)
+        assert feedback
+        assert feedback[-1] > feedback[0]
+        handle = outsider.result(
+            client.send_goal_async(
+                Navigate.Goal(target=Point(x=50.0, y=50.0), max_velocity=0.5),
+                feedback_callback=lambda m: feedback.append(m.feedback.progress_percent),
+            )
+        )
+        seen = len(feedback)
+        outsider.spin_until(lambda: len(feedback) > seen)
+        busy = outsider.result(client.send_goal_async(goal))
+        assert not busy.accepted
+        outsider.result(handle.cancel_goal_async())
+        outcome = outsider.result(handle.get_result_async())
+        client.destroy()
+    assert outcome.status == GoalStatus.STATUS_CANCELED
+    assert outcome.result.message == "canceled on the way"
+
+
+def test_a_deactivated_planner_says_so_and_nothing_else(outsider: Outsider) -> None:
+    request = PlanTrajectory.Request(goal=Point(x=1.0), max_velocity=0.5)
+    with RunningSystem("systems/pipeline.yaml"):
+        outsider.wait_for_state(NODES[-1], "active")
+        assert outsider.call(PlanTrajectory, "/plan_trajectory", request).success
+        assert outsider.change_state("/planning/planner", "deactivate")
+        refusal = outsider.call(PlanTrajectory, "/plan_trajectory", request)
+        assert not refusal.success
+        assert "/planning/planner" in refusal.message
+        assert "inactive" in refusal.message
+        assert outsider.state("/control/motor_controller") == "active"
+        assert outsider.change_state("/planning/planner", "activate")
+        outsider.spin_until(
+            lambda: outsider.call(PlanTrajectory, "/plan_trajectory", request).success
+        )

@@ -1,0 +1,67 @@
+"""Tutorial: PlanTrajectory with its failures; Navigate with feedback, cancel and reject."""
+
+from __future__ import annotations
+
+from composer_interfaces.action import Navigate
+from geometry_msgs.msg import Point
+from rclpy.action import ActionClient
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Float64, String
+from std_srvs.srv import Trigger
+
+from tests.ros.systems.running import Outsider, RunningSystem
+
+SUCCEEDED = 4
+STATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def test_a_client_gets_paths_refusals_and_silence(outsider: Outsider) -> None:
+    with RunningSystem("systems/trajectory_service.yaml") as system:
+        system.wait_for(r"client.*True: 51 points")
+        system.wait_for(r"client.*False: max_velocity must be above 0 m/s, not 0.0")
+        system.wait_for(r"client.*nobody answered: ")
+        assert outsider.state("/client") == "active"
+
+
+def test_goals_succeed_are_canceled_and_are_rejected(outsider: Outsider) -> None:
+    topics = ("/clients/outcome", "/clients/hasty_outcome", "/clients/dreamer_outcome")
+    outcomes = [outsider.listen(String, topic, STATE) for topic in topics]
+    with RunningSystem("systems/navigation.yaml") as system:
+        outsider.spin_until(lambda: all(outcomes))
+        system.wait_for(r"patient.*100 % of the way")
+        steps = [line for line in system.lines if "patient" in line and "% of the way" in line]
+    assert [heard[0].data for heard in outcomes] == ["succeeded", "canceled", "rejected"]
+    assert len(steps) == 10
+
+
+def test_the_generic_nodes_do_what_they_say(outsider: Outsider) -> None:
+    slow = outsider.listen(Float64, "/reading/slow")
+    large = outsider.listen(Float64, "/reading/large")
+    degrees = outsider.listen(String, "/reading/degrees")
+    relayed = outsider.listen(Float64, "/reading/relayed")
+    with RunningSystem("systems/toolbox.yaml"):
+        outsider.spin_until(lambda: len(large) >= 5)
+        assert outsider.call(Trigger, "/trigger", Trigger.Request()).message == "request 0"
+        assert outsider.call(Trigger, "/trigger", Trigger.Request()).message == "request 1"
+        feedback, result = _navigate(outsider, Point(x=1.0))
+    assert all(message.data > 1.0 for message in large)
+    assert 2.0 < len(relayed) / len(slow) < 6.0  # 20 Hz in, 5 Hz out
+    assert all(message.data.endswith(" degrees") for message in degrees)
+    assert feedback == [10.0 * step for step in range(1, 11)]
+    assert (result.status, result.result.message) == (SUCCEEDED, "arrived")
+
+
+def _navigate(outsider: Outsider, target: Point) -> tuple[list[float], object]:
+    client = ActionClient(outsider.node, Navigate, "/navigate")
+    outsider.spin_until(client.server_is_ready)
+    feedback: list[float] = []
+    goal = outsider.result(
+        client.send_goal_async(
+            Navigate.Goal(target=target, max_velocity=1.0),
+            feedback_callback=lambda message: feedback.append(message.feedback.progress_percent),
+        )
+    )
+    assert goal.accepted
+    result = outsider.result(goal.get_result_async())
+    client.destroy()
+    return feedback, result

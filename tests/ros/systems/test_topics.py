@@ -1,0 +1,73 @@
+"""Tutorial: a minimal node, talker and listener, QoS patterns, executors."""
+
+from __future__ import annotations
+
+import re
+
+from rclpy.qos import QoSPresetProfiles
+from std_msgs.msg import String
+
+from tests.ros.systems.running import REPOSITORY, Outsider, RunningSystem
+
+
+def test_a_minimal_node_says_that_it_has_started(outsider: Outsider) -> None:
+    with RunningSystem("systems/minimal.yaml") as system:
+        system.wait_for(r"minimal_node.*started")
+        outsider.wait_for_state("/minimal_node", "active")
+        code, _ = system.stop()
+    assert code == 0
+
+
+def test_the_talker_is_heard_inside_and_outside(outsider: Outsider) -> None:
+    heard = outsider.listen(String, "/chatter")
+    with RunningSystem("systems/talker_listener.yaml") as system:
+        outsider.spin_until(lambda: len(heard) >= 3)
+        system.wait_for(r"listener.*Received: Sensor reading 0$")
+        system.wait_for(r"listener.*Received: Sensor reading 2$")
+    numbers = [int(message.data.removeprefix("Sensor reading ")) for message in heard]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+
+
+def test_talker_and_listener_are_short_and_without_python() -> None:
+    text = (REPOSITORY / "systems" / "talker_listener.yaml").read_text(encoding="utf-8")
+    assert len(text.splitlines()) < 25
+    assert "behavior" not in text
+
+
+def test_a_late_joiner_gets_the_state_but_not_the_stream_it_missed(outsider: Outsider) -> None:
+    with RunningSystem("systems/qos_patterns.yaml") as system:
+        outsider.wait_for_state("/robot", "active")
+        system.wait_for(r"early_listener.*mode is ready")
+        system.wait_for(r"early_listener.*order 1$")
+        assert outsider.state("/late_joiner") == "unconfigured"
+        assert outsider.change_state("/late_joiner", "configure")
+        assert outsider.change_state("/late_joiner", "activate")
+        system.wait_for(r"late_joiner.*mode is ready")
+        first = system.wait_for(r"late_joiner.*scan \d+")
+        # best effort asks for less than the reliable publisher offers: they do meet
+        system.wait_for(r"late_joiner.*order \d+")
+    assert int(re.findall(r"scan (\d+)", first)[0]) > 5
+
+
+def test_a_late_joiner_from_outside_gets_the_state(outsider: Outsider) -> None:
+    with RunningSystem("systems/qos_patterns.yaml") as system:
+        system.wait_for(r"early_listener.*order 1$")
+        latched = QoSPresetProfiles.SYSTEM_DEFAULT.value
+        latched.depth = 1
+        latched.durability = latched.durability.TRANSIENT_LOCAL
+        heard = outsider.listen(String, "/mode", latched)
+        outsider.spin_until(lambda: len(heard) == 1)
+        assert heard[0].data == "ready"
+
+
+def test_control_stays_on_one_thread_and_perception_uses_several(outsider: Outsider) -> None:
+    cycles = outsider.listen(String, "/control/cycles")
+    frames = outsider.listen(String, "/perception/processed", QoSPresetProfiles.SENSOR_DATA.value)
+    with RunningSystem("systems/executors.yaml"):
+        outsider.spin_until(
+            lambda: (
+                len(cycles) > 100
+                and len({message.data.partition(":")[0] for message in frames}) > 1
+            )
+        )
+    assert len({message.data for message in cycles}) == 1
