@@ -187,7 +187,7 @@ class Task(Generic[T]):
         self._finished = False
         self.future: Future[T] = Future(self._report)
         self.future.add_done_callback(self._cancel)
-        call_soon(partial(self._step, None))
+        call_soon(self._begin)
 
     def close(self) -> None:
         """End the coroutine now, on the calling thread, as when nothing will ever resume it."""
@@ -200,6 +200,10 @@ class Task(Generic[T]):
                 self._report(error)
             self._end()
         self.future.cancel()
+
+    def _begin(self) -> None:
+        if not self.future.cancelled():
+            self._step(None)
 
     def _cancel(self, future: Future[T]) -> None:
         if future.cancelled() and not self._finished:

@@ -1,0 +1,81 @@
+"""rclpy's own futures, awaited by coroutines on the composer's loop."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from rclpy.task import Future as RclpyFuture
+
+from composer.runtime.tasks import Future, Task, wrap_rclpy_future
+
+
+class Calls:
+    def __init__(self) -> None:
+        self.waiting: deque[Callable[[], object]] = deque()
+        self.called = 0
+
+    def run(self) -> None:
+        while self.waiting:
+            self.called += 1
+            self.waiting.popleft()()
+
+
+def start(calls: Calls, awaited: Any) -> Future[Any]:
+    async def inner() -> Any:
+        return await awaited
+
+    async def outer() -> Any:
+        return await inner()
+
+    def report(what: str, error: BaseException) -> None:
+        raise error
+
+    task = Task(outer(), calls.waiting.append, report, lambda _: None)
+    calls.run()
+    return task.future
+
+
+def test_an_rclpy_future_is_not_polled() -> None:
+    calls = Calls()
+    foreign = RclpyFuture()
+    outcome = start(calls, foreign)
+    assert calls.called == 1
+    foreign.set_result("answer")
+    calls.run()
+    assert outcome.result() == "answer"
+    assert calls.called == 2
+
+
+def test_an_rclpy_future_that_failed_raises_where_it_is_awaited() -> None:
+    calls = Calls()
+    foreign = RclpyFuture()
+    outcome = start(calls, foreign)
+    foreign.set_exception(ValueError("broken"))
+    calls.run()
+    with pytest.raises(ValueError, match="broken"):
+        outcome.result()
+
+
+def test_a_wrapped_future_has_the_outcome_of_the_rclpy_future() -> None:
+    foreign = RclpyFuture()
+    future = wrap_rclpy_future(foreign)
+    assert not future.done()
+    foreign.set_result("answer")
+    assert future.result() == "answer"
+    failing = RclpyFuture()
+    failed = wrap_rclpy_future(failing)
+    failing.set_exception(ValueError("broken"))
+    assert isinstance(failed.exception(), ValueError)
+
+
+def test_cancelling_goes_both_ways_through_a_wrapped_future() -> None:
+    foreign = RclpyFuture()
+    wrap_rclpy_future(foreign).cancel()
+    assert foreign.cancelled()
+    foreign = RclpyFuture()
+    future = wrap_rclpy_future(foreign)
+    foreign.cancel()
+    assert future.cancelled()

@@ -1,0 +1,394 @@
+"""Futures and tasks, on the smallest loop there can be."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Coroutine, Generator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+
+from composer.runtime.tasks import (
+    Cancelled,
+    Future,
+    Task,
+    awaited_rclpy_future,
+    sleep,
+    within,
+)
+
+
+class Call:
+    def __init__(self, callback: Callable[[], object]) -> None:
+        self.callback = callback
+        self.cancelled = False
+
+    def cancel(self) -> None:
+        self.cancelled = True
+
+
+class Loop:
+    """Calls until nothing is left to call; its time passes when told."""
+
+    def __init__(self) -> None:
+        self.calls: deque[Callable[[], object]] = deque()
+        self.later: list[Call] = []
+        self.reports: list[tuple[str, BaseException]] = []
+        self.ended = 0
+
+    def call_soon(self, callback: Callable[[], object]) -> None:
+        self.calls.append(callback)
+
+    def call_later(self, delay_s: float, callback: Callable[[], object]) -> Call:
+        self.later.append(Call(callback))
+        return self.later[-1]
+
+    def report(self, what: str, error: BaseException) -> None:
+        self.reports.append((what, error))
+
+    def task(self, coroutine: Coroutine[Any, Any, Any]) -> Task[Any]:
+        return Task(coroutine, self.call_soon, self.report, self.count_end)
+
+    def count_end(self, _: object) -> None:
+        self.ended += 1
+
+    def start(self, coroutine: Coroutine[Any, Any, Any]) -> Future[Any]:
+        future = self.task(coroutine).future
+        self.run()
+        return future
+
+    def run(self) -> None:
+        while self.calls:
+            self.calls.popleft()()
+
+    def pass_time(self) -> None:
+        due, self.later = self.later, []
+        for call in due:
+            if not call.cancelled:
+                self.calls.append(call.callback)
+        self.run()
+
+
+@pytest.fixture
+def loop() -> Loop:
+    return Loop()
+
+
+async def wait_for(future: Any) -> Any:
+    return await future
+
+
+async def answer(value: object) -> object:
+    return value
+
+
+async def fail() -> None:
+    raise ValueError("broken")
+
+
+class TestFuture:
+    def test_the_first_outcome_wins(self) -> None:
+        future: Future[int] = Future()
+        assert future.set_result(1)
+        assert not future.set_result(2)
+        assert not future.set_exception(ValueError())
+        assert not future.cancel()
+        assert future.result() == 1
+        assert future.exception() is None
+
+    def test_has_no_result_before_it_is_done(self) -> None:
+        future: Future[int] = Future()
+        with pytest.raises(RuntimeError, match="no result yet"):
+            future.result()
+
+    def test_result_raises_what_was_set(self) -> None:
+        failed: Future[int] = Future()
+        failed.set_exception(ValueError("broken"))
+        with pytest.raises(ValueError, match="broken"):
+            failed.result()
+        cancelled: Future[int] = Future()
+        cancelled.cancel()
+        assert cancelled.cancelled()
+        with pytest.raises(Cancelled):
+            cancelled.result()
+
+    def test_done_callbacks_are_called_once_before_and_after_the_end(self) -> None:
+        future: Future[int] = Future()
+        seen: list[str] = []
+        future.add_done_callback(lambda done: seen.append(f"early {done.result()}"))
+        future.set_result(3)
+        future.add_done_callback(lambda done: seen.append(f"late {done.result()}"))
+        assert seen == ["early 3", "late 3"]
+
+    def test_a_failing_done_callback_does_not_keep_the_others_from_being_called(self) -> None:
+        future: Future[int] = Future()
+        seen: list[int] = []
+        future.add_done_callback(lambda _: 1 / 0)
+        future.add_done_callback(lambda done: seen.append(done.result()))
+        with pytest.raises(ZeroDivisionError):
+            future.set_result(4)
+        assert seen == [4]
+
+    def test_many_threads_finish_it_once(self) -> None:
+        with ThreadPoolExecutor(4) as pool:
+            for _ in range(200):
+                future: Future[int] = Future()
+                told: list[Future[int]] = []
+                future.add_done_callback(told.append)
+                won = list(pool.map(future.set_result, range(4)))
+                assert won.count(True) == 1
+                assert won[future.result()]
+                assert told == [future]
+
+    def test_an_exception_nobody_asks_for_is_reported_when_the_future_goes(self) -> None:
+        reports: list[BaseException] = []
+        noticed: Future[int] = Future(reports.append)
+        noticed.set_exception(ValueError("noticed"))
+        noticed.exception()
+        del noticed
+        assert reports == []
+        ignored: Future[int] = Future(reports.append)
+        ignored.set_exception(ValueError("ignored"))
+        del ignored
+        assert [str(error) for error in reports] == ["ignored"]
+
+
+class TestTask:
+    def test_runs_to_its_result(self, loop: Loop) -> None:
+        assert loop.start(answer(7)).result() == 7
+        assert loop.ended == 1
+
+    def test_does_not_begin_before_the_loop_calls(self, loop: Loop) -> None:
+        begun: list[bool] = []
+
+        async def begin() -> None:
+            begun.append(True)
+
+        loop.task(begin())
+        assert begun == []
+        loop.run()
+        assert begun == [True]
+
+    def test_waits_for_a_future_without_being_called(self, loop: Loop) -> None:
+        gate: Future[str] = Future()
+        outcome = loop.start(wait_for(gate))
+        assert not outcome.done()
+        assert not loop.calls
+        gate.set_result("open")
+        loop.run()
+        assert outcome.result() == "open"
+
+    def test_a_future_that_is_done_is_no_wait(self, loop: Loop) -> None:
+        gate: Future[str] = Future()
+        gate.set_result("open")
+        assert loop.start(wait_for(gate)).result() == "open"
+
+    def test_an_exception_reaches_who_awaits_and_is_not_reported(self, loop: Loop) -> None:
+        inner = loop.task(fail()).future
+        outer = loop.start(wait_for(inner))
+        assert isinstance(outer.exception(), ValueError)
+        assert loop.reports == []
+
+    def test_an_exception_nobody_awaits_is_reported_by_the_coroutine_s_name(
+        self, loop: Loop
+    ) -> None:
+        loop.start(fail())
+        ((what, error),) = loop.reports
+        assert what == "fail"
+        assert str(error) == "broken"
+
+    @pytest.mark.parametrize("error", [SystemExit, KeyboardInterrupt])
+    def test_an_exit_ends_the_task_and_not_the_loop(
+        self, loop: Loop, error: type[BaseException]
+    ) -> None:
+        async def leave() -> None:
+            raise error
+
+        loop.start(leave())
+        assert [type(error) for _, error in loop.reports] == [error]
+
+    def test_sleep_0_lets_others_run_first(self, loop: Loop) -> None:
+        seen: list[str] = []
+
+        async def step(name: str) -> None:
+            for number in range(2):
+                seen.append(f"{name}{number}")
+                await asyncio.sleep(0)
+
+        loop.task(step("a"))
+        loop.task(step("b"))
+        loop.run()
+        assert seen == ["a0", "b0", "a1", "b1"]
+
+    def test_only_an_rclpy_future_is_taken_for_one(self) -> None:
+        nap = asyncio.sleep(0)
+        nap.send(None)
+        assert awaited_rclpy_future(nap) is None
+        nap.close()
+
+    def test_another_loop_s_awaitable_raises_where_it_is_awaited(self, loop: Loop) -> None:
+        other = asyncio.new_event_loop()
+        foreign = other.create_future()
+        other.close()
+        with pytest.raises(TypeError, match=r"cannot await _asyncio\.Future here"):
+            loop.start(wait_for(foreign)).result()
+
+    def test_a_coroutine_may_go_on_after_a_wrong_await(self, loop: Loop) -> None:
+        class Wrong:
+            def __await__(self) -> Generator[str, None, None]:
+                yield "nonsense"
+
+        async def recover() -> str:
+            with pytest.raises(TypeError):
+                await Wrong()
+            with pytest.raises(TypeError):
+                await Wrong()
+            return "well"
+
+        assert loop.start(recover()).result() == "well"
+
+
+class TestCancelling:
+    def test_throws_into_the_coroutine_where_it_awaits(self, loop: Loop) -> None:
+        seen: list[str] = []
+        gate: Future[None] = Future()
+
+        async def work() -> None:
+            try:
+                await gate
+            except Cancelled:
+                seen.append("cancelled")
+                raise
+            finally:
+                seen.append("cleaned up")
+
+        outcome = loop.start(work())
+        assert outcome.cancel()
+        assert outcome.cancelled()
+        loop.run()
+        assert seen == ["cancelled", "cleaned up"]
+        assert not gate.done()
+        assert loop.reports == []
+
+    def test_before_the_beginning_nothing_runs(self, loop: Loop) -> None:
+        seen: list[bool] = []
+
+        async def work() -> None:
+            seen.append(True)
+
+        loop.task(work()).future.cancel()
+        loop.run()
+        assert seen == []
+        assert loop.ended == 1
+
+    def test_what_was_awaited_does_not_wake_it_any_more(self, loop: Loop) -> None:
+        gate: Future[str] = Future()
+        other: Future[str] = Future()
+        seen: list[str] = []
+
+        async def work() -> None:
+            try:
+                await gate
+            except Cancelled:
+                seen.append(await other)
+
+        outcome = loop.start(work())
+        outcome.cancel()
+        loop.run()
+        gate.set_result("too late")
+        loop.run()
+        assert seen == []
+        other.set_result("cleaned up")
+        loop.run()
+        assert seen == ["cleaned up"]
+
+    def test_an_exception_while_cleaning_up_is_reported(self, loop: Loop) -> None:
+        gate: Future[None] = Future()
+
+        async def work() -> None:
+            try:
+                await gate
+            finally:
+                raise ValueError("while cleaning up")
+
+        loop.start(work()).cancel()
+        loop.run()
+        assert [str(error) for _, error in loop.reports] == ["while cleaning up"]
+
+    def test_awaiting_what_was_cancelled_cancels(self, loop: Loop) -> None:
+        gate: Future[None] = Future()
+        outcome = loop.start(wait_for(gate))
+        gate.cancel()
+        loop.run()
+        assert outcome.cancelled()
+        assert loop.reports == []
+
+    def test_except_exception_does_not_swallow_it(self, loop: Loop) -> None:
+        gate: Future[None] = Future()
+
+        async def work() -> str:
+            try:
+                await gate
+            except Exception:
+                return "swallowed"
+            return "opened"
+
+        outcome = loop.start(work())
+        outcome.cancel()
+        loop.run()
+        with pytest.raises(Cancelled):
+            outcome.result()
+        assert loop.ended == 1
+
+    def test_closing_ends_the_coroutine_at_once(self, loop: Loop) -> None:
+        seen: list[str] = []
+
+        async def work() -> None:
+            try:
+                await Future()
+            finally:
+                seen.append("closed")
+
+        task = loop.task(work())
+        loop.run()
+        task.close()
+        task.close()
+        assert seen == ["closed"]
+        assert task.future.cancelled()
+        assert loop.ended == 1
+
+
+class TestWaiting:
+    def test_sleep_is_done_after_its_time(self, loop: Loop) -> None:
+        outcome = loop.start(wait_for(sleep(loop, 0.5)))
+        assert not outcome.done()
+        loop.pass_time()
+        assert outcome.done()
+
+    def test_a_cancelled_sleep_leaves_no_timer(self, loop: Loop) -> None:
+        sleep(loop, 0.5).cancel()
+        assert [call.cancelled for call in loop.later] == [True]
+
+    def test_within_the_time_the_result_comes_through(self, loop: Loop) -> None:
+        gate: Future[str] = Future()
+        outcome = loop.start(within(loop, gate, 1.0))
+        gate.set_result("answer")
+        loop.run()
+        assert outcome.result() == "answer"
+        assert [call.cancelled for call in loop.later] == [True]
+
+    def test_after_the_time_the_future_is_cancelled(self, loop: Loop) -> None:
+        gate: Future[str] = Future()
+        outcome = loop.start(within(loop, gate, 1.5))
+        loop.pass_time()
+        with pytest.raises(TimeoutError, match=r"no answer within 1\.5 s"):
+            outcome.result()
+        assert gate.cancelled()
+
+    def test_who_is_cancelled_while_waiting_cancels_the_future(self, loop: Loop) -> None:
+        gate: Future[str] = Future()
+        loop.start(within(loop, gate, 1.0)).cancel()
+        loop.run()
+        assert gate.cancelled()
