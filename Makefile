@@ -12,6 +12,8 @@ STAMPS := $(VENV)/stamps
 INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check
 INTERFACES := $(shell find interfaces -type f)
 SOURCES := composer nodes tests tools
+# Only where the system's Python has no headers: fetched, to a place where no compiler looks.
+HEADERS = $(abspath $(shell ls -d $(VENV)/headers/usr/include/python3.* 2>/dev/null))
 
 # A sourced ROS, or a ros wheel in the Python that started make, must not leak into ours.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
@@ -73,7 +75,8 @@ $(STAMPS)/composer: pyproject.toml $(STAMPS)/environment
 
 $(STAMPS)/interfaces: $(INTERFACES) $(STAMPS)/environment
 	@echo "==> the example interfaces, compiled (once, half a minute)"
-	@$(INSTALL) --force-reinstall --no-deps ./interfaces
+	@$(if $(HEADERS),CPATH=$(HEADERS):$(dir $(HEADERS))) $(INSTALL) --force-reinstall --no-deps \
+	  $(addprefix --config-settings=cmake.define.Python3_INCLUDE_DIR=,$(HEADERS)) ./interfaces
 	@touch $@
 
 $(STAMPS)/checks: pyproject.toml $(STAMPS)/environment

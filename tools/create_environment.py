@@ -38,9 +38,9 @@ def python_problem(version, available):
         return None
     wanted = f"{_version_text(OLDEST_PYTHON)} to {_version_text(NEWEST_PYTHON)}"
     if available:
-        remedy = f"run: make PYTHON=python{_version_text(available[0])}"
+        remedy = f"run: make run PYTHON=python{_version_text(available[0])}"
     else:
-        remedy = "install one and run: make PYTHON=/path/to/python"
+        remedy = "install one and run: make run PYTHON=/path/to/python"
     return f"this is Python {_version_text(version)}, and Python {wanted} is needed; {remedy}"
 
 
@@ -54,16 +54,9 @@ def platform_problem(system, machine):
     )
 
 
-def compiler_problem(has_compiler, has_headers, python_name):
-    """Return what is missing to compile the interfaces, as the command that brings it, or None."""
-    packages = []
-    if not has_compiler:
-        packages.append("g++")
-    if not has_headers:
-        packages.append(f"{python_name}-dev")
-    if not packages:
-        return None
-    return f"what compiles the interfaces is missing; run: sudo apt install {' '.join(packages)}"
+def compiler_problem(has_compiler):
+    """Return how to get what compiles the interfaces, or None where it is."""
+    return None if has_compiler else "there is no C++ compiler; run: sudo apt install g++"
 
 
 def _available_pythons():
@@ -86,11 +79,10 @@ def _has_headers():
 
 def find_problem():
     """Return the first thing that keeps this machine from building and running, or None."""
-    name = Path(sys.executable).name
     return (
         platform_problem(platform.system(), platform.machine())
         or python_problem(sys.version_info, _available_pythons())
-        or compiler_problem(_has_compiler(), _has_headers(), name)
+        or compiler_problem(_has_compiler())
     )
 
 
@@ -130,26 +122,43 @@ def create(folder):
     has_ensurepip = importlib.util.find_spec("ensurepip") is not None
     venv.create(folder, clear=True, symlinks=True, with_pip=has_ensurepip)
     if not has_ensurepip:
-        _install_pip(Path(folder) / "bin" / "python")
+        _install_pip(folder / "bin" / "python")
 
 
-def main():
-    """Create the environment named on the command line; return the exit code."""
-    problem = find_problem()
+def fetch_headers(folder):
+    """Unpack Python's headers, as Debian and Ubuntu package them, without installing them.
+
+    Raises OSError or CalledProcessError.
+    """
+    folder.mkdir()
+    package = f"libpython{_version_text(sys.version_info)}-dev"
+    download = ["apt-get", "download", "-qq", package]
+    subprocess.run(download, cwd=folder, check=True, stderr=subprocess.DEVNULL)
+    (archive,) = folder.glob("*.deb")
+    subprocess.run(["dpkg-deb", "--extract", archive.name, "."], cwd=folder, check=True)
+    archive.unlink()
+
+
+def _attempt(step, folder, purpose, package):
+    """Take a step; return why it failed and which package of the system makes up for it."""
+    try:
+        step(folder)
+    except (OSError, ValueError, subprocess.CalledProcessError) as error:
+        return f"{purpose} failed ({error}); run: sudo apt install {package}"
+    return None
+
+
+def main(folder):
+    """Create the environment, print what is in the way, and return the exit code."""
+    problem = find_problem() or _attempt(create, folder, "creating the environment", "python3-venv")
+    if problem is None and not _has_headers():
+        package = f"{Path(sys.executable).name}-dev"
+        problem = _attempt(fetch_headers, folder / "headers", "fetching Python's headers", package)
     if problem:
         print(problem, file=sys.stderr)
-        return 1
-    try:
-        create(sys.argv[1])
-    except (OSError, ValueError, subprocess.CalledProcessError) as error:
-        print(
-            f"the environment could not be created ({error}); "
-            "on Debian and Ubuntu this helps: sudo apt install python3-venv",
-            file=sys.stderr,
-        )
         return 1
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(Path(sys.argv[1])))
