@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from composer.cli import lifecycle
+from composer.cli import graph, lifecycle, run, validate
 from composer.cli.help import examples
 from composer.cli.terminal import write
 
@@ -66,4 +66,7 @@ def compose(
     """
 
 
+app.command("run", epilog=run.EPILOG)(run.run)
+app.command("validate", epilog=validate.EPILOG)(validate.validate)
 app.add_typer(lifecycle.app, name="lifecycle")
+app.command("graph", epilog=graph.EPILOG)(graph.graph)

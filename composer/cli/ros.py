@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -31,19 +29,19 @@ def require_ros(command: str) -> None:
             f"'{command}' needs ROS 2, and rclpy is not installed in this Python",
             hint='pip install "ros2-composer[ros]"   or: source /opt/ros/jazzy/setup.bash',
         )
-    # The ROS wheels lay a whole ROS prefix into the environment, but do not say so.
-    os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
 
 
 @contextmanager
 def ros_session(command: str, timeout_s: float) -> Iterator[tuple[Session, Deadline]]:
     """Join the ROS graph for the length of a ``with`` block; errors of ROS become Failures."""
     require_ros(command)
+    from composer.runtime.environment import StartRefused, prepare_environment
     from composer.runtime.session import Deadline, RosError, Session
 
     deadline = Deadline(timeout_s)
     try:
+        prepare_environment()
         with Session() as session:
             yield session, deadline
-    except RosError as error:
+    except (RosError, StartRefused) as error:
         raise Failure(str(error), hint=error.hint) from error

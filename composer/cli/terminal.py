@@ -33,11 +33,18 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def columns(rows: Sequence[Sequence[str]]) -> str:
-    """Return the rows as lines with their cells aligned, two spaces apart."""
+def columns(rows: Sequence[Sequence[str]], numbers_from: int | None = None) -> str:
+    """Return the rows as lines with their cells aligned, two spaces apart.
+
+    Columns from ``numbers_from`` on (counted from 0) are aligned on the right.
+    """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    numbers = len(widths) if numbers_from is None else numbers_from
     return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        "  ".join(
+            cell.ljust(width) if index < numbers else cell.rjust(width)
+            for index, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
         for row in rows
     )
 

@@ -1,0 +1,67 @@
+"""A system on the command line: read, checked, its findings shown."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.terminal import say, use_color
+
+if TYPE_CHECKING:
+    from composer.loading import Loading
+
+
+def _complete_system(incomplete: str) -> list[str]:
+    """Complete the names of example systems, and paths."""
+    from composer.cli.files import example_systems
+
+    names = [name for name in example_systems() if name.startswith(incomplete)]
+    return [*names, *_paths(incomplete)]
+
+
+def _paths(incomplete: str) -> Iterable[str]:
+    folder = Path(incomplete) if incomplete.endswith("/") else Path(incomplete).parent
+    for path in sorted(folder.glob("*")):
+        text = str(path)
+        if text.startswith(incomplete.removeprefix("./")) and not path.name.startswith("."):
+            if path.is_dir():
+                yield f"{text}/"
+            elif path.suffix in (".yaml", ".yml"):
+                yield text
+
+
+SystemName = Annotated[
+    str,
+    typer.Argument(
+        metavar="SYSTEM",
+        help="A system file, or the name of an example system.",
+        show_default=False,
+        autocompletion=_complete_system,
+    ),
+]
+
+
+def load_system(
+    path: Path,
+    *,
+    shown: str | None = None,
+    parameter_overrides: Iterable[str] = (),
+    namespace: str | None = None,
+) -> Loading:
+    """Read and check the system in ``path``; findings go to stderr, with carets."""
+    from composer.loading import load
+    from composer.report.text import render
+
+    loading = load(
+        path,
+        shown=str(path) if shown is None or not Path(shown).is_file() else shown,
+        parameter_overrides=parameter_overrides,
+        namespace=namespace,
+    )
+    if loading.diagnostics:
+        say(render(loading.diagnostics, color=use_color(sys.stderr)))
+    return loading

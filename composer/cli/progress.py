@@ -1,0 +1,75 @@
+"""What ``compose run`` shows of the host's events, in the manner of the nodes' log lines."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import TextIO
+
+from composer.cli.terminal import columns, use_color
+from composer.runtime.events import (
+    BroughtUp,
+    Event,
+    Fault,
+    NodeSummary,
+    Outcome,
+    RollingBack,
+    StateChanged,
+    Stopping,
+    Stuck,
+    TransitionRefused,
+)
+
+_GREEN, _YELLOW, _RED, _DIM = "32", "33", "31", "2"
+
+
+class Progress:
+    """Prints one line an event. Faults are in the nodes' logs already."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._color = use_color(stream)
+
+    def show(self, event: Event) -> None:
+        """Print the event."""
+        if isinstance(event, Fault):
+            return
+        now = datetime.now().strftime("%Y-%m-%d %H:%M:%S.%f")[:-3]
+        line = f"[{now}] [{_severity(event)}] [compose] {event}"
+        code = _code(event)
+        if self._color and code:
+            line = f"\x1b[{code}m{line}\x1b[0m"
+        print(line, file=self._stream, flush=True)
+
+
+def _severity(event: Event) -> str:
+    match event:
+        case TransitionRefused() | RollingBack() | Stuck():
+            return "ERROR"
+        case _:
+            return "INFO"
+
+
+def _code(event: Event) -> str:
+    match event:
+        case TransitionRefused() | RollingBack() | Stuck():
+            return _RED
+        case BroughtUp():
+            return _GREEN
+        case Stopping():
+            return _YELLOW
+        case StateChanged():
+            return _DIM
+        case _:
+            return ""
+
+
+def summary(outcome: Outcome) -> str:
+    """Return the table that ends a run: what each node did."""
+    head = ("node", "state", "received", "sent", "calls", "dropped", "errors")
+    rows = [head, *map(_row, outcome.nodes)]
+    return f"ran for {outcome.elapsed_s:.1f} s: {outcome.reason}\n{columns(rows, numbers_from=2)}"
+
+
+def _row(node: NodeSummary) -> tuple[str, ...]:
+    counts = (node.received, node.sent, node.calls, node.dropped, node.errors)
+    return (node.node, node.state, *map(str, counts))

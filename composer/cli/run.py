@@ -1,0 +1,154 @@
+"""``compose run``: validate, plan, bring up, keep up, tear down."""
+
+from __future__ import annotations
+
+import os
+import sys
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.failure import FINDINGS, Failure
+from composer.cli.files import system_file
+from composer.cli.help import examples
+from composer.cli.loaded import SystemName, load_system
+from composer.cli.ros import require_ros
+from composer.cli.terminal import say, write
+
+if TYPE_CHECKING:
+    from composer.model import System
+    from composer.plan import Plan
+    from composer.runtime.events import Outcome
+    from composer.runtime.host import HostOptions
+
+EPILOG = examples(
+    "compose run pipeline                                  an example system, until Ctrl-C",
+    "compose run systems/pipeline.yaml --for 10            ten seconds",
+    "compose run pipeline --dry-run                        the plan only, needs no ROS",
+    "compose run pipeline --set planner.max_velocity=0.5   another parameter value",
+    "compose run pipeline --namespace /robot1",
+    "compose run pipeline --autostart inactive             then: compose lifecycle set ...",
+)
+
+
+class Autostart(StrEnum):
+    """How far nodes are brought up."""
+
+    ACTIVE = "active"
+    INACTIVE = "inactive"
+    UNCONFIGURED = "unconfigured"
+
+
+class Level(StrEnum):
+    """rcl's severities."""
+
+    DEBUG = "debug"
+    INFO = "info"
+    WARN = "warn"
+    ERROR = "error"
+    FATAL = "fatal"
+
+
+def run(
+    system: SystemName,
+    *,
+    run_for: Annotated[
+        float | None,
+        typer.Option(
+            "--for",
+            metavar="SECONDS",
+            min=0.0,
+            help="Stop by itself after so long.",
+            show_default=False,
+        ),
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print the plan and its causes, start nothing.")
+    ] = False,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NODE.PARAMETER=VALUE",
+            help="Override a parameter; repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    namespace: Annotated[
+        str | None,
+        typer.Option(metavar="NAMESPACE", help="Instead of the system's.", show_default=False),
+    ] = None,
+    autostart: Annotated[
+        Autostart | None,
+        typer.Option(help="How far to bring the nodes up.", show_default="as the file says"),
+    ] = None,
+    log_level: Annotated[Level, typer.Option(help="What nodes log.")] = Level.INFO,
+) -> None:
+    """Run a system: all nodes in this process, up in dependency order, down in reverse.
+
+    Ctrl-C stops it. Exit code 1 when the system has errors (nothing is started then) or a node
+    failed.
+    """
+    declared = _load(system, settings or [], namespace)
+    from composer.model import PrimaryState
+    from composer.plan import bring_up
+
+    plan = bring_up(declared, PrimaryState(autostart.value) if autostart is not None else None)
+    if dry_run:
+        if plan.steps:
+            write(str(plan))
+        return
+    require_ros("compose run")
+    outcome = _run(declared, plan, run_for, log_level)
+    if outcome.exit_code:
+        raise typer.Exit(outcome.exit_code)
+
+
+def _load(text: str, settings: list[str], namespace: str | None) -> System:
+    path = system_file(text)
+    loading = load_system(path, shown=text, parameter_overrides=settings, namespace=namespace)
+    if loading.system is not None and loading.system.node_type:
+        raise Failure(
+            f"'{text}' is a node type, not a system",
+            hint="a system names it under 'nodes:'; compose validate checks it alone",
+        )
+    if loading.system is None or not loading.runnable:
+        raise typer.Exit(FINDINGS)
+    return loading.system
+
+
+def _run(system: System, plan: Plan, run_for: float | None, level: Level) -> Outcome:
+    from composer.cli.progress import Progress, summary
+    from composer.plan import tear_down
+    from composer.runtime.environment import StartRefused
+    from composer.runtime.host import Host
+
+    progress = Progress(sys.stderr)
+    host = Host(system, plan, tear_down(system), _options(run_for, level), progress.show)
+    try:
+        outcome = host.run()
+    except StartRefused as refusal:
+        raise Failure(str(refusal), hint=refusal.hint) from refusal
+    say(summary(outcome))
+    if outcome.hung:
+        _end_hard(outcome.exit_code)
+    return outcome
+
+
+def _options(run_for: float | None, level: Level) -> HostOptions:
+    from composer.model import LogLevel
+    from composer.runtime.host import HostOptions
+
+    return HostOptions(
+        run_for_s=run_for,
+        log_level=LogLevel(level.value),
+        hard_exit=lambda: _end_hard(FINDINGS),
+    )
+
+
+def _end_hard(exit_code: int) -> None:
+    """End the process although a thread does not."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(exit_code)

@@ -1,0 +1,141 @@
+"""``compose validate``: every finding of every file, in one run."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.failure import FINDINGS, UsageFailure
+from composer.cli.files import yaml_files
+from composer.cli.help import examples
+from composer.cli.terminal import say, use_color, write_raw
+
+if TYPE_CHECKING:
+    from composer.diagnostics import Diagnostic
+
+EPILOG = examples(
+    "compose validate systems nodes",
+    "compose validate systems/pipeline.yaml --strict",
+    "compose validate systems --format sarif > findings.sarif",
+    "compose validate systems --ignore implicit-qos --ignore RC5",
+    "cat pipeline.yaml | compose validate -",
+)
+
+
+_STDIN = Path("-")
+
+
+class Format(StrEnum):
+    """How findings are written."""
+
+    TEXT = "text"
+    JSON = "json"
+    SARIF = "sarif"
+    GITHUB = "github"
+
+
+Rules = Annotated[
+    list[str] | None,
+    typer.Option(metavar="RULE", help="A code (RC301), a band (RC3) or a name; repeatable."),
+]
+
+
+def validate(
+    paths: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="PATH...",
+            help="Files, folders (searched for systems and node types), or - for stdin.",
+            show_default=False,
+        ),
+    ],
+    output_format: Annotated[
+        Format | None,
+        typer.Option(
+            "--format",
+            "-f",
+            help="Default: text; github inside GitHub Actions.",
+            show_default=False,
+        ),
+    ] = None,
+    strict: Annotated[bool, typer.Option("--strict", help="Warnings count as errors do.")] = False,
+    select: Rules = None,
+    ignore: Rules = None,
+) -> None:
+    """Check systems and node types without starting anything. Needs no ROS.
+
+    Exit code 1 when there is an error (with --strict: or a warning).
+    """
+    checked = _check(paths)
+    findings = _chosen(checked.findings, select or [], ignore or [])
+    _print(findings, output_format or _default_format())
+    closing = "" if findings else ": clean"
+    say(f"{checked.files} file{'' if checked.files == 1 else 's'} checked{closing}")
+    if any(_weighs(finding, strict) for finding in findings):
+        raise typer.Exit(FINDINGS)
+
+
+@dataclass(frozen=True, slots=True)
+class _Checked:
+    files: int
+    findings: list[Diagnostic]
+
+
+def _check(paths: Sequence[Path]) -> _Checked:
+    from composer.loading import load, load_bytes
+
+    found = yaml_files([path for path in paths if path != _STDIN])
+    findings = []
+    if _STDIN in paths:
+        content = sys.stdin.buffer.read()
+        findings += load_bytes(content, Path.cwd(), shown="<stdin>").diagnostics
+    for path in found.files:
+        findings += load(path, shown=str(path)).diagnostics
+    if found.ignored:
+        say(f"not checked, no 'system:' or 'node:' in it: {', '.join(map(str, found.ignored))}")
+    files = len(found.files) + (_STDIN in paths)
+    if not files:
+        raise UsageFailure("there is no system and no node type in " + ", ".join(map(str, paths)))
+    return _Checked(files, findings)
+
+
+def _chosen(findings: list[Diagnostic], select: list[str], ignore: list[str]) -> list[Diagnostic]:
+    from composer.diagnostics import registered_rules
+    from composer.report.selection import UnknownRule, chosen
+
+    try:
+        return chosen(findings, list(registered_rules()), select, ignore)
+    except UnknownRule as error:
+        raise UsageFailure(str(error), hint=error.hint) from error
+
+
+def _default_format() -> Format:
+    return Format.GITHUB if os.environ.get("GITHUB_ACTIONS") == "true" else Format.TEXT
+
+
+def _print(findings: list[Diagnostic], output_format: Format) -> None:
+    from composer.report import github, json, sarif, text
+
+    match output_format:
+        case Format.TEXT:
+            if findings:
+                write_raw(text.render(findings, color=use_color(sys.stdout)))
+        case Format.JSON:
+            write_raw(json.render(findings))
+        case Format.SARIF:
+            write_raw(sarif.render(findings))
+        case Format.GITHUB:
+            write_raw(github.render(findings))
+
+
+def _weighs(finding: Diagnostic, strict: bool) -> bool:
+    from composer.diagnostics import Severity
+
+    return finding.severity is Severity.ERROR or (strict and finding.severity is Severity.WARNING)

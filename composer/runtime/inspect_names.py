@@ -1,0 +1,172 @@
+"""What is in the ROS graph: nodes, topics, services, actions and who offers and uses them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from rclpy.action.graph import (
+    get_action_client_names_and_types_by_node,
+    get_action_names_and_types,
+    get_action_server_names_and_types_by_node,
+)
+from rclpy.node import Node
+
+from composer.diagnostics import nearest
+from composer.runtime.session import MISSING_S, Deadline, RosError, Session
+
+T = TypeVar("T")
+
+#: (name, types): more than one type means that somebody has it wrong.
+Named = tuple[str, tuple[str, ...]]
+
+
+class NotThere(RosError):
+    """Nothing of that name is in the graph; the hint says what is close."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeInfo:
+    """What one node offers and uses, each by name."""
+
+    name: str
+    subscriptions: tuple[Named, ...]
+    publishers: tuple[Named, ...]
+    services: tuple[Named, ...]
+    clients: tuple[Named, ...]
+    action_servers: tuple[Named, ...]
+    action_clients: tuple[Named, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ActionInfo:
+    """Who serves an action and who uses it."""
+
+    name: str
+    types: tuple[str, ...]
+    servers: tuple[str, ...]
+    clients: tuple[str, ...]
+
+
+def is_hidden(name: str) -> bool:
+    """Say whether a part of the name begins with an underscore.
+
+    See 'hidden' in the ROS 2 design article 'Topic and Service name mapping'.
+    """
+    return any(part.startswith("_") for part in name.split("/"))
+
+
+class Names:
+    """Looks names up in the graph, all within one time limit."""
+
+    def __init__(self, session: Session, deadline: Deadline) -> None:
+        self._session = session
+        self._deadline = deadline
+        self._node: Node = session.node
+
+    def nodes(self, *, hidden: bool = False) -> tuple[str, ...]:
+        """Return the full names of all nodes; one that is there twice comes twice."""
+        return self._still(lambda: self._nodes(hidden))
+
+    def topics(self, *, hidden: bool = False) -> tuple[Named, ...]:
+        """Return all topics and their types."""
+        return self._still(lambda: _named(self._node.get_topic_names_and_types(), hidden))
+
+    def services(self, *, hidden: bool = False) -> tuple[Named, ...]:
+        """Return all services and their types."""
+        return self._still(lambda: _named(self._node.get_service_names_and_types(), hidden))
+
+    def actions(self) -> tuple[Named, ...]:
+        """Return all actions and their types."""
+        return self._still(lambda: _named(get_action_names_and_types(self._node), hidden=False))
+
+    def node(self, name: str, *, hidden: bool = False) -> NodeInfo:
+        """Return what a node offers and uses. Raises NotThere."""
+        full_name = self.find("node", name, lambda: self._nodes(hidden=True))
+        return self._still(lambda: self._node_info(full_name, hidden))
+
+    def action(self, name: str) -> ActionInfo:
+        """Return who serves and uses an action. Raises NotThere."""
+        types = self.types("action", name)
+        return self._still(lambda: self._action_info(name, types))
+
+    def types(self, kind: str, name: str) -> tuple[str, ...]:
+        """Return the types of a topic, service or action. Raises NotThere."""
+        look = {
+            "topic": self._node.get_topic_names_and_types,
+            "service": self._node.get_service_names_and_types,
+            "action": lambda: get_action_names_and_types(self._node),
+        }[kind]
+        full_name = self.find(kind, name, lambda: tuple(found for found, _ in look()))
+        return dict(_named(look(), hidden=True))[full_name]
+
+    def find(self, kind: str, name: str, look: Callable[[], tuple[str, ...]]) -> str:
+        """Wait until ``name`` is among what ``look`` finds, and return it. Raises NotThere.
+
+        A name without a leading slash means the one in the root namespace.
+        """
+        wanted = name if name.startswith("/") else f"/{name}"
+        patience = Deadline(min(MISSING_S, self._deadline.left_s))
+        if self._session.wait_for(lambda: wanted in look() or None, patience):
+            return wanted
+        known = [found for found in look() if not is_hidden(found)]
+        raise NotThere(f"there is no {kind} '{wanted}'", _what_is_there(kind, wanted, known))
+
+    def _still(self, look: Callable[[], T]) -> T:
+        return self._session.wait_until_still(look, self._deadline)
+
+    def _nodes(self, hidden: bool) -> tuple[str, ...]:
+        names = (
+            f"{namespace.rstrip('/')}/{name}"
+            for name, namespace in self._node.get_node_names_and_namespaces()
+        )
+        return tuple(sorted(name for name in names if hidden or not is_hidden(name)))
+
+    def _node_info(self, full_name: str, hidden: bool) -> NodeInfo:
+        namespace, _, name = full_name.rpartition("/")
+        where = (name, namespace or "/")
+
+        def named(look: Callable[..., Iterable[Any]]) -> tuple[Named, ...]:
+            return _named(look(*where), hidden)
+
+        node = self._node
+        return NodeInfo(
+            full_name,
+            named(node.get_subscriber_names_and_types_by_node),
+            named(node.get_publisher_names_and_types_by_node),
+            named(node.get_service_names_and_types_by_node),
+            named(node.get_client_names_and_types_by_node),
+            named(lambda *at: get_action_server_names_and_types_by_node(node, *at)),
+            named(lambda *at: get_action_client_names_and_types_by_node(node, *at)),
+        )
+
+    def _action_info(self, name: str, types: tuple[str, ...]) -> ActionInfo:
+        servers, clients = [], []
+        for node in self._nodes(hidden=True):
+            info = self._node_info(node, hidden=True)
+            servers += [node for found, _ in info.action_servers if found == name]
+            clients += [node for found, _ in info.action_clients if found == name]
+        return ActionInfo(name, types, tuple(servers), tuple(clients))
+
+
+def _named(found: Iterable[tuple[str, list[str]]], hidden: bool) -> tuple[Named, ...]:
+    return tuple(
+        sorted((name, tuple(types)) for name, types in found if hidden or not is_hidden(name))
+    )
+
+
+def _what_is_there(kind: str, wanted: str, known: list[str]) -> str:
+    if not known:
+        return (
+            f"no {kind} was found at all: is the system running, with the same ROS_DOMAIN_ID and"
+            " discovery range?"
+        )
+    close = nearest(wanted, known)
+    if close is None:
+        last_parts = {name.rpartition("/")[2]: name for name in known}
+        match = nearest(wanted.rpartition("/")[2], last_parts)
+        close = last_parts[match] if match is not None else None
+    if close is not None:
+        return f"did you mean '{close}'?"
+    return "there are: " + ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")
