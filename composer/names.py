@@ -4,6 +4,9 @@ The rules are those of design.ros2.org "Topic and Service name mapping" as rcl a
 (``rcl_validate_topic_name``, ``rmw_validate_namespace``, ``rmw_validate_node_name``). Functions
 that end in ``_problem`` return None for a valid name, else what is wrong with it, to be read
 after the name ("contains a space").
+
+In two things this keeps to the design page where rcl is lax: no ``__`` in topic names and
+namespaces, and nothing but a ``/`` behind ``~``.
 """
 
 from __future__ import annotations
@@ -15,8 +18,7 @@ MAXIMUM_NODE_NAME_LENGTH = 255
 MAXIMUM_NAMESPACE_LENGTH = 245
 MAXIMUM_TOPIC_NAME_LENGTH = 247
 
-_NAME_CHARACTER = re.compile(r"[A-Za-z0-9_]", re.ASCII)
-_SUBSTITUTION = re.compile(r"\{([^{}]*)\}")
+_FOREIGN_CHARACTER = re.compile(r"[^A-Za-z0-9_]")
 
 
 def node_name_problem(name: str) -> str | None:
@@ -64,15 +66,10 @@ def parameter_name_problem(name: str) -> str | None:
     """
     if not name:
         return "is empty"
-    for token in name.split("."):
-        if not token:
-            return "has an empty part between dots"
-        problem = _character_problem(token) or (
-            f"has a part that begins with a digit: '{token}'" if token[0].isdigit() else None
-        )
-        if problem is not None:
-            return problem
-    return None
+    tokens = name.split(".")
+    if not all(tokens):
+        return "has an empty part between dots"
+    return next((found for found in map(_token_problem, tokens) if found), None)
 
 
 def expand_name(name: str, node_name: str, namespace: str) -> str:
@@ -109,25 +106,27 @@ def _length_problem(name: str, maximum: int) -> str | None:
 
 
 def _character_problem(text: str) -> str | None:
-    for character in text:
-        if not _NAME_CHARACTER.match(character):
-            return f"contains {_shown(character)}; letters, digits and '_' are allowed"
-    return None
+    match = _FOREIGN_CHARACTER.search(text)
+    if match is None:
+        return None
+    return f"contains {_shown(match[0])}; letters, digits and '_' are allowed"
 
 
 def _path_problem(path: str) -> str | None:
     """Judge the parts between slashes."""
-    if path.endswith("/"):
+    *_, last = tokens = path.split("/")
+    if not last:
         return "ends with '/'"
-    for token in path.split("/"):
-        if not token:
-            return "has nothing between two '/'"
-        problem = _character_problem(token)
-        if problem is not None:
-            return problem
-        if token[0].isdigit():
-            return f"has a part that begins with a digit: '{token}'"
-    return "contains '__'" if "__" in path else None
+    problem = next((found for found in map(_token_problem, tokens) if found), None)
+    return problem or ("contains '__'" if "__" in path else None)
+
+
+def _token_problem(token: str) -> str | None:
+    if not token:
+        return "has nothing between two '/'"
+    return _character_problem(token) or (
+        f"has a part that begins with a digit: '{token}'" if token[0].isdigit() else None
+    )
 
 
 def _shown(character: str) -> str:

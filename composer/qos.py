@@ -58,7 +58,9 @@ class QosProfile:
 #: ``sensor_data``, ``services_default`` and ``parameters`` are those of rmw/qos_profiles.h.
 #: ``command`` and ``state`` are the other two patterns of ROS 2 practice: orders that must arrive,
 #: and a latest value that late joiners get. ``system_default`` leaves the choice to the middleware
-#: in ROS; a declared system says what it means, so here it is ROS's own default for topics.
+#: in ROS, and Fast DDS chooses differently for each end (publishers reliable and transient local,
+#: subscriptions best effort and volatile); a declared system says what it means, so here it is
+#: what rclpy takes for a topic unless told otherwise.
 PRESETS: Mapping[str, QosProfile] = {
     "sensor_data": QosProfile(depth=5, reliability=Reliability.BEST_EFFORT),
     "command": QosProfile(),
