@@ -1,0 +1,65 @@
+"""What a schema wants where it finds something else, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from typing import Any
+
+_SUBSTITUTION = r"\$\{"
+_EXPRESSION = r"\{"
+_WORDS = {
+    "object": "a map",
+    "array": "a list",
+    "string": "text",
+    "number": "a number",
+    "integer": "a whole number",
+    "boolean": "true or false",
+    "null": "null",
+}
+_WORDS_FOR_TRUTH = frozenset({"yes", "no", "on", "off"})
+
+
+def expected(schema: dict[str, Any]) -> str:
+    """Return what ``schema`` takes, as ``a number or an '{expression}'``.
+
+    That a load-time variable may stand anywhere goes without saying.
+    """
+    words = [_WORDS[kind] for kind in _types(schema)]
+    if schema.get("pattern") == _EXPRESSION:
+        words.append("an '{expression}'")
+    *most, last = words
+    return f"{', '.join(most)} or {last}" if most else last
+
+
+def type_hint(schema: dict[str, Any], found: object) -> str | None:
+    """Return how to mend ``found`` where it is plain."""
+    wanted = _types(schema)
+    match found:
+        case str():
+            return _text_hint(schema, wanted.keys(), found)
+        case bool() | int() | float() if wanted.keys() == {"string"}:
+            return "put it in quotes if it is a text"
+        case list() if wanted.keys() == {"object"}:
+            return "write 'name: ...' for each, without a dash"
+        case None if wanted.keys() == {"object"}:
+            return "an empty map is written '{}'"
+    return None
+
+
+def _text_hint(schema: dict[str, Any], wanted: Set[str], found: str) -> str | None:
+    if "boolean" in wanted:
+        return "write true or false" if found.casefold() in _WORDS_FOR_TRUTH else None
+    if found[:1].isdigit() and wanted & {"number", "integer"}:
+        return "write the number alone; the key names the unit"
+    if "object" in wanted and schema.get("pattern") == _EXPRESSION:
+        return "name the field: {data: ...}"
+    return "write a list: [...]" if "array" in wanted else None
+
+
+def _types(schema: dict[str, Any]) -> dict[str, None]:
+    """Return the JSON types that ``schema`` takes, in order, without text of some patterns only."""
+    types = schema.get("type", [])
+    kinds = dict.fromkeys([types] if isinstance(types, str) else types)
+    if "pattern" in schema and len(kinds) > 1:
+        kinds.pop("string", None)
+    return kinds

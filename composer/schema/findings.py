@@ -1,0 +1,237 @@
+"""What jsonschema says, in words of the language and at the place that is meant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from composer.diagnostics import Diagnostic, Label, nearest, shown
+from composer.document.words import described
+from composer.schema import rules
+from composer.schema.expectations import expected, type_hint
+from composer.schema.mistakes import advice, meant
+from composer.schema.places import Place, Places
+from composer.source import Span
+
+if TYPE_CHECKING:
+    from jsonschema import ValidationError
+
+Path = tuple[str | int, ...]
+
+#: Keys that decide which shape the rest must have, and what has such keys, by title.
+_DECIDING = frozenset({"type", "topic", "service", "action"})
+_DECIDED = frozenset({"inline node", "connection"})
+
+#: What to write for a key that is missing, by the title of what it is missing in.
+_EXAMPLES = {
+    **dict.fromkeys(
+        (("publisher", "type"), ("subscription", "type")),
+        "std_msgs/msg/String",
+    ),
+    **dict.fromkeys((("service", "type"), ("client", "type")), "std_srvs/srv/Trigger"),
+    **dict.fromkeys(
+        (("action server", "type"), ("action client", "type")),
+        "composer_interfaces/action/Navigate",
+    ),
+    ("parameter", "type"): "double",
+    ("feedback", "count"): "10",
+    ("feedback", "period_ms"): "100",
+    ("system", "nodes"): "{talker: {type: timer_source}}",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Error:
+    """An error of jsonschema, and where it is."""
+
+    path: Path
+    validator: str
+    wanted: Any  # what the schema says under the keyword
+    instance: Any
+    schema: dict[str, Any]
+    place: Place
+    places: Places
+
+    @property
+    def owner(self) -> str:
+        """The value as messages call it: ``timer 'tick'``."""
+        title = self.schema.get("title")
+        name = self.path[-1] if self.path else None
+        if title is None:
+            return f"'{shown(name)}'" if isinstance(name, str) else "this"
+        if not isinstance(name, str) or name == title:
+            return f"a {title}" if not self.path else f"this {title}"
+        return f"{title} '{shown(name)}'"
+
+    @property
+    def owner_span(self) -> Span:
+        """Where the value begins, or its key; for a whole file, the key that says what it is."""
+        first = next(iter(self.places.root), None)
+        if not self.path and first is not None:
+            return first.key.span
+        return self.place.owner_span
+
+    @property
+    def subject(self) -> str:
+        """Where a value of the wrong kind stands: `` for 'period_ms'``."""
+        if not self.path:
+            return ""
+        if isinstance(self.path[-1], str):
+            return f" for '{shown(self.path[-1])}'"
+        return f" in '{shown(self.path[-2])}'" if len(self.path) > 1 else ""
+
+    @property
+    def unknown(self) -> list[str]:
+        """The keys that do not belong here."""
+        return [key for key in self.instance if key not in self.schema["properties"]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Misspelt:
+    """Right names of keys that were written wrong: what is said of those is not said again."""
+
+    keys: set[tuple[Path, str]]
+    deciding: set[Path]  # where the wrong key would have decided what the others mean
+
+    @classmethod
+    def among(cls, errors: Iterable[_Error]) -> _Misspelt:
+        keys = set()
+        deciding = set()
+        for error in errors:
+            if error.validator != "additionalProperties":
+                continue
+            found = {_meant(error, name) for name in error.unknown} - {None}
+            keys |= {(error.path, str(key)) for key in found}
+            if error.schema.get("title") in _DECIDED and found & _DECIDING:
+                deciding.add(error.path)
+        return cls(keys, deciding)
+
+    def covers(self, error: _Error) -> bool:
+        """Say whether ``error`` may only be there because of a misspelt key."""
+        if error.validator == "additionalProperties" and error.path in self.deciding:
+            return False
+        return bool(self.deciding) and any(
+            error.path[:length] in self.deciding for length in range(1, len(error.path) + 1)
+        )
+
+
+def findings_of(errors: Iterable[ValidationError], places: Places) -> list[Diagnostic]:
+    """Return the findings for ``errors``, without those that only follow from another."""
+    located = [_located(error, places) for error in errors]
+    misspelt = _Misspelt.among(located)
+    findings = (
+        finding
+        for error in located
+        if not misspelt.covers(error)
+        for finding in _FINDINGS[error.validator](error, misspelt)
+    )
+    return list(dict.fromkeys(findings))
+
+
+def _located(error: ValidationError, places: Places) -> _Error:
+    path = tuple(error.absolute_path)
+    schema = error.schema if isinstance(error.schema, dict) else {}
+    return _Error(
+        path,
+        str(error.validator),
+        error.validator_value,
+        error.instance,
+        schema,
+        places.find(path),
+        places,
+    )
+
+
+def _meant(error: _Error, name: str) -> str | None:
+    key = meant(name, error.schema["properties"])
+    return key if key is not None and key not in error.instance else None
+
+
+def _unknown_keys(error: _Error, misspelt: _Misspelt) -> Iterator[Diagnostic]:
+    entries = error.places.entries(error.place.tree)
+    valid = error.schema["properties"]
+    for name in error.unknown:
+        if error.path in misspelt.deciding and _meant(error, name) not in _DECIDING:
+            continue
+        message = f"'{shown(name)}' is not a key of {error.owner}"
+        hint = advice(name, error.schema.get("title", ""), set(valid) - set(error.instance))
+        yield Diagnostic(rules.UNKNOWN_KEY, message, entries[name].key.span, hint=hint)
+
+
+def _missing_keys(error: _Error, misspelt: _Misspelt) -> Iterator[Diagnostic]:
+    for name in error.wanted:
+        if name not in error.instance and (error.path, name) not in misspelt.keys:
+            message = f"{error.owner} needs the key '{name}'"
+            example = _EXAMPLES.get((error.schema.get("title", ""), name))
+            hint = f"for example '{name}: {example}'" if example is not None else None
+            yield Diagnostic(rules.MISSING_KEY, message, error.owner_span, hint=hint)
+
+
+def _missing_choice(error: _Error, misspelt: _Misspelt) -> Iterator[Diagnostic]:
+    names = [name for choice in error.wanted for name in choice["required"]]
+    if not any((error.path, name) in misspelt.keys for name in names):
+        message = f"{error.owner} needs {_any_of(names)}"
+        yield Diagnostic(rules.MISSING_KEY, message, error.owner_span)
+
+
+def _excluding_keys(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
+    entries = error.places.entries(error.place.tree)
+    first, second = sorted(
+        (entries[name].key for name in error.wanted["required"]), key=lambda key: key.span
+    )
+    message = f"{error.owner} has both '{first.value}' and '{second.value}'"
+    label = Label(first.span, "the same is said here")
+    hint = "keep one of them"
+    yield Diagnostic(rules.KEYS_EXCLUDE_EACH_OTHER, message, second.span, (label,), hint)
+
+
+def _wrong_type(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
+    wanted = expected(error.schema)
+    found = described(error.place.tree)
+    message = f"expected {wanted}{error.subject}, found {found}"
+    hint = type_hint(error.schema, error.instance)
+    yield Diagnostic(rules.WRONG_TYPE, message, error.place.value_span, hint=hint)
+
+
+def _unknown_word(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
+    found = described(error.place.tree)
+    message = f"expected {_any_of(error.wanted)}{error.subject}, found {found}"
+    close = nearest(error.instance, error.wanted) if isinstance(error.instance, str) else None
+    hint = f"did you mean '{close}'?" if close is not None else None
+    yield Diagnostic(rules.UNKNOWN_WORD, message, error.place.value_span, hint=hint)
+
+
+def _too_small(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
+    limit = "a number above" if error.validator == "exclusiveMinimum" else "at least"
+    message = f"expected {limit} {error.wanted}{error.subject}, found {shown(error.instance)}"
+    yield Diagnostic(rules.OUT_OF_RANGE, message, error.place.value_span)
+
+
+def _nothing_there(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
+    name = error.path[-1] if error.path else "this"
+    message = f"'{shown(name)}' is empty"
+    yield Diagnostic(rules.NOTHING_THERE, message, error.owner_span, hint="name at least one")
+
+
+def _any_of(names: Iterable[str]) -> str:
+    *most, last = (f"'{name}'" for name in names)
+    return f"{', '.join(most)} or {last}" if most else last
+
+
+_FINDINGS: dict[str, Callable[[_Error, _Misspelt], Iterator[Diagnostic]]] = {
+    "additionalProperties": _unknown_keys,
+    "required": _missing_keys,
+    "anyOf": _missing_choice,
+    "not": _excluding_keys,
+    "type": _wrong_type,
+    "pattern": _wrong_type,
+    "enum": _unknown_word,
+    "minimum": _too_small,
+    "exclusiveMinimum": _too_small,
+    "minItems": _nothing_there,
+    "minProperties": _nothing_there,
+}
+
+#: Every keyword of the schemas that can fail has its words here; a test holds them together.
+KEYWORDS = frozenset(_FINDINGS)

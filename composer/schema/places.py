@@ -1,0 +1,60 @@
+"""Where in a file the things are that jsonschema names by their path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from composer.source import Span
+from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A value in a tree. ``key`` is what it stands under; None for the root and items of lists."""
+
+    tree: Tree
+    key: Scalar | None
+
+    @property
+    def owner_span(self) -> Span:
+        """The place of the whole: its key, else where it begins."""
+        return self.key.span if self.key is not None else self.tree.span
+
+    @property
+    def value_span(self) -> Span:
+        """The place of the value; that of its key where nothing is written."""
+        if self.key is not None and isinstance(self.tree, Scalar) and self.tree.value is None:
+            return self.key.span
+        return self.tree.span
+
+
+@dataclass(slots=True)
+class Places:
+    """Finds values by path, each map's keys being looked through once."""
+
+    root: Mapping
+    _entries: dict[int, dict[str, Entry]] = field(default_factory=dict)
+
+    def find(self, path: Iterable[str | int]) -> Place:
+        """Return the value at ``path``, which must exist."""
+        place = Place(self.root, None)
+        for step in path:
+            match place.tree, step:
+                case Mapping(), str():
+                    entry = self.entries(place.tree)[step]
+                    place = Place(entry.value, entry.key)
+                case Sequence(), int():
+                    place = Place(place.tree.items[step], None)
+                case _:
+                    raise KeyError(step)
+        return place
+
+    def entries(self, tree: Tree) -> dict[str, Entry]:
+        """Return the entries of a map by name; none for anything else."""
+        if not isinstance(tree, Mapping):
+            return {}
+        # By identity, for comparing trees is not free; the root keeps every one of them alive.
+        if id(tree) not in self._entries:
+            self._entries[id(tree)] = {entry.name: entry for entry in tree}
+        return self._entries[id(tree)]
