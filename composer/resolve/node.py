@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from composer.catalog import Catalog
 from composer.diagnostics import Diagnostic
 from composer.model import (
     Dependency,
@@ -34,7 +33,6 @@ class Surroundings:
 
     folder: Path
     namespace: Located[str]  # absolute
-    catalog: Catalog
     types: NodeTypes
     qos: QosTable
     joints: Joints
@@ -141,7 +139,7 @@ def _inline(tree: Mapping, around: Surroundings) -> Made:
 
 def _typed(type_entry: Entry, tree: Mapping, around: Surroundings) -> Made:
     name = text(type_entry.value)
-    path = around.catalog.find(name.value) if name is not None else None
+    path = around.types.find(name.value) if name is not None else None
     if path is None:
         return Made(_NOTHING, type_found=False, complete=False)
     made = around.types.make(path, tree.get("variables"))

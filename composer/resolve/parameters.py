@@ -11,6 +11,7 @@ from composer.resolve.reading import (
     OPAQUE,
     entries,
     flag,
+    is_opaque,
     key,
     number,
     plain_text,
@@ -18,6 +19,9 @@ from composer.resolve.reading import (
 )
 from composer.source import Located
 from composer.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree, plain
+
+#: The type of a parameter whose bare value tells none, such as an empty list.
+UNTOLD = ""
 
 
 def declarations(tree: Tree | None) -> tuple[Parameter, ...]:
@@ -110,7 +114,7 @@ def _declaration(entry: Entry) -> Parameter:
 
 
 def _bare(entry: Entry) -> Parameter:
-    kind = inferred_type(plain(entry.value)) or OPAQUE
+    kind = _bare_type(plain(entry.value))
     value = _value(entry.value, kind)
     return Parameter(
         name=key(entry),
@@ -119,6 +123,13 @@ def _bare(entry: Entry) -> Parameter:
         default=value,
         span=entry.key.span,
     )
+
+
+def _bare_type(value: Plain) -> str:
+    items = value if isinstance(value, list) else [value]
+    if value is None or any(isinstance(item, str) and is_opaque(item) for item in items):
+        return OPAQUE
+    return inferred_type(value) or UNTOLD
 
 
 def _with_value(parameter: Parameter, tree: Tree) -> Parameter:

@@ -13,7 +13,7 @@ from composer.model import (
     Timer,
 )
 from composer.resolve.qos import QosTable, implicit_qos
-from composer.resolve.reactions import Events, expression, nested, reaction, template
+from composer.resolve.reactions import RULE, Events, expression, nested, reaction, template
 from composer.resolve.reading import (
     entries,
     flag,
@@ -25,7 +25,7 @@ from composer.resolve.reading import (
     text_or_opaque,
 )
 from composer.source import Located, Span
-from composer.templates import Computed
+from composer.templates import Computed, Text
 from composer.tree import Entry, Mapping, Scalar, Tree
 
 #: What clients wait for their server and its answer unless they say otherwise.
@@ -155,4 +155,7 @@ def _written_period(tree: Tree, unit: PeriodUnit, findings: list[Diagnostic]) ->
     compiled = template(tree, findings) if isinstance(tree, Scalar) else None
     if isinstance(compiled, Computed):
         return Period(compiled.expression, unit, compiled.span)
+    if isinstance(compiled, Text):
+        message = f"'{unit}' takes a number or one '{{expression}}', not text around it"
+        findings.append(Diagnostic(RULE, message, tree.span))
     return Period(1000.0, PeriodUnit.MILLISECONDS, tree.span)

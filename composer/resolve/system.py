@@ -47,7 +47,7 @@ def resolve_system(
     namespace = _system_namespace(tree, overrides)
     joined, joints = connections(tree.get("connections"), namespace.value, qos)
     types = NodeTypes(catalog, qos, findings)
-    around = Surroundings(folder, namespace, catalog, types, qos, joints, overrides, findings)
+    around = Surroundings(folder, namespace, types, qos, joints, overrides, findings)
     nodes = tuple(node(entry, around) for entry in entries(tree.get("nodes")))
     lifecycle = tree.get("lifecycle")
     autostart = state(lifecycle.get("autostart")) if isinstance(lifecycle, Mapping) else None

@@ -37,8 +37,15 @@ class NodeTypes:
     catalog: Catalog
     qos: QosTable
     findings: list[Diagnostic]
+    _found: dict[str, Path | None] = field(default_factory=dict)
     _read: dict[Path, Mapping | None] = field(default_factory=dict)
     _made: dict[tuple[Path, str], NodeType | None] = field(default_factory=dict)
+
+    def find(self, name: str) -> Path | None:
+        """Return the file of the node type called ``name``, or None."""
+        if name not in self._found:
+            self._found[name] = self.catalog.find(name)
+        return self._found[name]
 
     def make(self, path: Path, variables: Tree | None) -> NodeType | None:
         """Return the type in the file ``path`` made with ``variables``, or None.

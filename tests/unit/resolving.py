@@ -1,0 +1,52 @@
+"""What the tests of ``resolve`` share: from YAML text to the model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from textwrap import dedent
+
+from composer.expand import expand
+
+from composer.catalog import Catalog
+from composer.diagnostics import Diagnostic
+from composer.document import parse_document
+from composer.model import System
+from composer.resolve import read_overrides, resolve
+from composer.source import SourceFile, Span
+
+NOWHERE = Path("/nowhere")
+
+
+def resolve_text(
+    text: str,
+    folder: Path = NOWHERE,
+    settings: Iterable[str] = (),
+    namespace: str | None = None,
+) -> tuple[System, list[Diagnostic]]:
+    """Resolve a text; node types are looked for in ``folder``."""
+    source = SourceFile("robot.yaml", dedent(text))
+    tree, findings = parse_document(source)
+    assert tree is not None, [finding.message for finding in findings]
+    expanded, _ = expand(tree, {})
+    overrides, found = read_overrides(settings, namespace)
+    system, more = resolve(expanded, source, Catalog((folder,)), folder=folder, overrides=overrides)
+    assert system is not None
+    return system, [*found, *more]
+
+
+def system_of(
+    text: str,
+    folder: Path = NOWHERE,
+    settings: Iterable[str] = (),
+    namespace: str | None = None,
+) -> System:
+    """Resolve a text that has nothing wrong in it."""
+    system, findings = resolve_text(text, folder, settings, namespace)
+    assert [finding.message for finding in findings] == []
+    return system
+
+
+def quoted(span: Span) -> str:
+    """Return the text that a span covers."""
+    return span.file.line(span.line)[span.column - 1 : span.column - 1 + span.length]
