@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from typing import TextIO
 
 from composer.cli.terminal import columns, use_color
@@ -10,6 +9,7 @@ from composer.runtime.events import (
     BroughtUp,
     Event,
     Fault,
+    Logged,
     NodeSummary,
     Outcome,
     RollingBack,
@@ -33,8 +33,9 @@ class Progress:
         """Print the event."""
         if isinstance(event, Fault):
             return
-        now = datetime.now().strftime("%Y-%m-%d %H:%M:%S.%f")[:-3]
-        line = f"[{now}] [{_severity(event)}] [compose] {event}"
+        line = f"[{event.elapsed_s:.3f}] [{_severity(event)}] [compose] {event}"
+        if isinstance(event, Logged):
+            line = str(event)
         code = _code(event)
         if self._color and code:
             line = f"\x1b[{code}m{line}\x1b[0m"

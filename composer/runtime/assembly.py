@@ -1,0 +1,102 @@
+"""Builds the ports and timers of a node from its model and binds reactions and handlers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from composer.model import Event, Node, Port, PortKind, Reaction
+from composer.runtime.behaviors import method
+from composer.runtime.core import Core
+from composer.runtime.messages import interface_class
+from composer.runtime.ports.action_client import ActionClientPort
+from composer.runtime.ports.action_server import ActionServerPort, Handlers
+from composer.runtime.ports.client import ClientPort
+from composer.runtime.ports.port import RunningPort
+from composer.runtime.ports.publisher import PublisherPort
+from composer.runtime.ports.service import ServicePort
+from composer.runtime.ports.subscription import SubscriptionPort
+from composer.runtime.ports.timer import TimerPort
+from composer.runtime.reactions import Caller, RunningReaction
+
+
+@dataclass(slots=True)
+class Assembly:
+    """The entities of a configured node, by name, and its reactions to transitions."""
+
+    core: Core
+    publishers: dict[str, PublisherPort] = field(default_factory=dict)
+    clients: dict[str, ClientPort] = field(default_factory=dict)
+    action_clients: dict[str, ActionClientPort] = field(default_factory=dict)
+    action_servers: dict[str, ActionServerPort] = field(default_factory=dict)
+    subscriptions: dict[str, SubscriptionPort] = field(default_factory=dict)
+    services: dict[str, ServicePort] = field(default_factory=dict)
+    timers: dict[str, TimerPort] = field(default_factory=dict)
+    transitions: dict[Event, RunningReaction] = field(default_factory=dict)
+
+    @property
+    def ports(self) -> Iterator[RunningPort]:
+        """Everything: first what sends, then what takes, then what drives."""
+        yield from self.publishers.values()
+        yield from self.clients.values()
+        yield from self.action_clients.values()
+        yield from self.subscriptions.values()
+        yield from self.services.values()
+        yield from self.action_servers.values()
+        yield from self.timers.values()
+
+    def build(self, model: Node, behavior: object | None) -> None:
+        """Create the entities of ``model``. What was created is kept when one of them cannot be.
+
+        Raises MessageError, PeriodError, and what rclpy raises.
+        """
+        for port in model.ports_of(PortKind.PUBLISHER):
+            self.publishers[port.name.value] = PublisherPort(self.core, port)
+        for port in model.ports_of(PortKind.CLIENT):
+            self.clients[port.name.value] = ClientPort(self.core, port)
+        for port in model.ports_of(PortKind.ACTION_CLIENT):
+            self.action_clients[port.name.value] = ActionClientPort(self.core, port)
+        self._bind_answers(model)
+        for port in model.ports_of(PortKind.SUBSCRIPTION, PortKind.SERVICE, PortKind.ACTION_SERVER):
+            self._add_receiver(port, behavior)
+        for timer in model.timers:
+            name = timer.name.value
+            reaction = self._reaction(timer.reaction)
+            handler = method(behavior, f"on_{name}")
+            self.timers[name] = TimerPort(self.core, timer, reaction, handler)
+        for event, declared in model.reactions:
+            self.transitions[event] = self._compile(declared)
+
+    def _bind_answers(self, model: Node) -> None:
+        for port in model.ports_of(PortKind.CLIENT):
+            for event, declared in port.reactions:
+                self.clients[port.name.value].react(event, self._compile(declared))
+        for port in model.ports_of(PortKind.ACTION_CLIENT):
+            for event, declared in port.reactions:
+                self.action_clients[port.name.value].react(event, self._compile(declared))
+
+    def _add_receiver(self, port: Port, behavior: object | None) -> None:
+        name = port.name.value
+        handler = method(behavior, f"on_{name}")
+        match port.kind:
+            case PortKind.SUBSCRIPTION:
+                reaction = self._reaction(port.reaction(Event.MESSAGE))
+                self.subscriptions[name] = SubscriptionPort(self.core, port, reaction, handler)
+            case PortKind.SERVICE:
+                response_type = interface_class(port.interface.value).Response
+                reaction = self._reaction(port.reaction(Event.REQUEST), response_type)
+                self.services[name] = ServicePort(self.core, port, reaction, handler)
+            case PortKind.ACTION_SERVER:
+                reaction = self._reaction(port.reaction(Event.GOAL))
+                handlers = Handlers(handler, method(behavior, f"accept_{name}"))
+                self.action_servers[name] = ActionServerPort(self.core, port, reaction, handlers)
+
+    def _reaction(
+        self, declared: Reaction | None, response_type: Any = None
+    ) -> RunningReaction | None:
+        return None if declared is None else self._compile(declared, response_type)
+
+    def _compile(self, declared: Reaction, response_type: Any = None) -> RunningReaction:
+        callers: dict[str, Caller] = {**self.clients, **self.action_clients}
+        return RunningReaction(self.core, declared, self.publishers, callers, response_type)

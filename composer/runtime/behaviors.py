@@ -1,0 +1,121 @@
+"""Finds the Python class that a node names, and gives it what the composer promised."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from composer.behavior import CallCancelled
+from composer.model import BehaviorReference
+from composer.runtime.core import Core
+from composer.runtime.tasks import Future, sleep
+
+#: A behaviour's method, or None where it has none of that name.
+Method = Callable[..., Any]
+
+
+class BehaviorError(Exception):
+    """A behaviour that cannot be loaded; the text says which and why."""
+
+
+def behavior_class(reference: BehaviorReference) -> type[Any]:
+    """Return the class that ``module:Class`` names.
+
+    A module beside the YAML file is looked for first, then an installed one. Raises BehaviorError
+    when there is no such module or class, and whatever importing the module raises.
+    """
+    module = _module(reference)
+    found = getattr(module, reference.class_name, None)
+    if not isinstance(found, type):
+        raise BehaviorError(
+            f"behavior '{reference.text}': {module.__file__} has no class '{reference.class_name}'"
+        )
+    return found
+
+
+def method(behavior: object | None, name: str) -> Method | None:
+    """Return the method ``name`` of ``behavior``, or None."""
+    found = getattr(behavior, name, None) if behavior is not None else None
+    return found if callable(found) else None
+
+
+def _module(reference: BehaviorReference) -> ModuleType:
+    path = reference.folder.joinpath(*reference.module.split(".")).with_suffix(".py")
+    if path.is_file():
+        return _module_of_file(path)
+    try:
+        return importlib.import_module(reference.module)
+    except ModuleNotFoundError as error:
+        raise BehaviorError(
+            f"behavior '{reference.text}': there is neither a file {path} nor an installed module"
+        ) from error
+
+
+def _module_of_file(path: Path) -> ModuleType:
+    """Import a file under a name of its own, so that ``planner.py`` of two folders are two."""
+    mark = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
+    name = f"_composer_behavior_{mark}_{path.stem}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise BehaviorError(f"{path} is not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses and pickles look their module up there
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+class Named:
+    """``self.publishers``, ``self.clients``: things of one kind, by name."""
+
+    def __init__(self, kind: str, entries: Mapping[str, Any]) -> None:
+        self._kind = kind
+        self._entries = entries
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self._entries[name]
+        except KeyError:
+            known = ", ".join(sorted(self._entries)) or "none"
+            raise AttributeError(f"no {self._kind} '{name}'; there is: {known}") from None
+
+    def __getitem__(self, name: str) -> Any:
+        return self._entries[name]
+
+    def __dir__(self) -> list[str]:
+        return sorted(self._entries)
+
+
+class NodeClock:
+    """A behaviour's ``clock``; see :class:`composer.behavior.Clock`."""
+
+    def __init__(self, core: Core) -> None:
+        self._core = core
+
+    def now(self) -> float:
+        """Return the time in seconds."""
+        return self._core.now_s()
+
+    def stamp(self) -> Any:
+        """Return the time as a builtin_interfaces/msg/Time."""
+        return self._core.node.get_clock().now().to_msg()
+
+    def sleep(self, seconds: float) -> Future[None]:
+        """Let other callbacks run for so long. Raises CallCancelled when the node leaves active."""
+        gate = self._core.gate
+        if gate.waiting:
+            return gate.hold(sleep(self._core.loop, max(0.0, seconds)))
+        ended: Future[None] = Future()
+        ended.set_exception(CallCancelled(gate.refusal))
+        return ended

@@ -1,0 +1,88 @@
+"""What the parts of one running node share."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Coroutine
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from rclpy.node import Node
+
+from composer.behavior import CallCancelled
+from composer.runtime.gate import Gate
+from composer.runtime.log import Faults, Log
+from composer.runtime.loop import Loop
+from composer.runtime.statistics import Statistics
+from composer.runtime.strand import Strand
+from composer.runtime.tasks import Cancelled, Future
+
+T = TypeVar("T")
+
+_NANOSECONDS = 1e-9
+
+
+@dataclass(slots=True)
+class Core:
+    """One node's ROS handle, loop, gate, log and counters.
+
+    ``names`` is what every expression of the node may use: ``parameters``, ``state``, ``node``.
+    """
+
+    node: Node
+    loop: Loop
+    gate: Gate
+    strand: Strand
+    log: Log
+    faults: Faults
+    statistics: Statistics
+    names: dict[str, Any]
+    tasks: set[Future[Any]] = field(default_factory=set)
+
+    def now_s(self) -> float:
+        """Return the node's time in seconds."""
+        return float(self.node.get_clock().now().nanoseconds) * _NANOSECONDS
+
+    def spawn(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
+        """Run ``coroutine`` on the node's loop; it ends at the latest with the node's entities."""
+        task = self.loop.run_task(coroutine)
+        self.tasks.add(task)
+        task.add_done_callback(self.tasks.discard)
+        return task
+
+    def cancel_tasks(self) -> None:
+        """End every coroutine of the node's ports."""
+        for task in tuple(self.tasks):
+            task.cancel()
+
+    def call(
+        self, name: str, function: Callable[..., Any], *arguments: Any
+    ) -> Coroutine[Any, Any, None] | None:
+        """Call user code whose result nobody wants; whatever it raises becomes a fault of ``name``.
+
+        Returns the rest of it where it is ``async``.
+        """
+        try:
+            result = function(*arguments)
+        except BaseException as error:
+            self.faults.take(name, error)
+            return None
+        return self._rest(name, result) if isinstance(result, Awaitable) else None
+
+    async def _rest(self, name: str, result: Awaitable[Any]) -> None:
+        try:
+            await result
+        except BaseException as error:
+            self.take(name, error)
+
+    def take(self, name: str, error: BaseException) -> None:
+        """Make ``error``, caught from user code that was awaited, a fault of ``name``.
+
+        Raises it again when it is what ends the coroutine; that a call or a sleep was ended because
+        the node left *active* is no fault.
+        """
+        if isinstance(error, (Cancelled, GeneratorExit)):
+            raise error
+        if isinstance(error, CallCancelled) and not self.gate.incoming:
+            self.log.debug(f"{name}: {error}")
+        else:
+            self.faults.take(name, error)

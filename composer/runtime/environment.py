@@ -1,0 +1,89 @@
+"""The environment variables that ROS reads: checked before anything starts.
+
+rclpy starts without complaint with a domain id of -1 or a discovery range nobody knows, and runs
+unsecured where security was asked for and is not there. We do not.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import MutableMapping
+from pathlib import Path
+
+from composer.diagnostics import nearest
+
+#: See rcl's domain_id.c; above 101 the ports of a participant may meet the ephemeral ones of Linux.
+HIGHEST_DOMAIN_ID = 232
+DISCOVERY_RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
+#: Tokens: https://docs.ros.org/en/jazzy/Tutorials/Demos/Logging-and-logger-configuration.html
+CONSOLE_FORMAT = "[{severity}] [{name}] {message}"
+
+
+class StartRefused(Exception):
+    """The environment does not allow a start. ``hint`` says what to do."""
+
+    def __init__(self, message: str, hint: str) -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+def check_environment(environment: MutableMapping[str, str]) -> None:
+    """Look at everything ROS will read. Raises StartRefused."""
+    _check_domain_id(environment.get("ROS_DOMAIN_ID", ""))
+    _check_discovery_range(environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", ""))
+    _check_security(environment)
+
+
+def complete_environment(environment: MutableMapping[str, str]) -> None:
+    """Fill in what rclpy from PyPI leaves unset, and the format of log lines."""
+    if Path(sys.prefix, "share", "ament_index").is_dir():
+        environment.setdefault("AMENT_PREFIX_PATH", sys.prefix)
+    environment.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", CONSOLE_FORMAT)
+
+
+def prepare_environment() -> None:
+    """Check and complete the environment of this process. Raises StartRefused."""
+    check_environment(os.environ)
+    complete_environment(os.environ)
+
+
+def _check_domain_id(text: str) -> None:
+    if not text:
+        return
+    if not (text.isascii() and text.isdigit() and int(text) <= HIGHEST_DOMAIN_ID):
+        raise StartRefused(
+            f"ROS_DOMAIN_ID is '{text}', which is no domain id",
+            f"set it to a number from 0 to {HIGHEST_DOMAIN_ID} (up to 101 is safe everywhere)",
+        )
+
+
+def _check_discovery_range(text: str) -> None:
+    if text and text not in DISCOVERY_RANGES:
+        close = nearest(text, DISCOVERY_RANGES)
+        meant = f"did you mean {close}? " if close else ""
+        raise StartRefused(
+            f"ROS_AUTOMATIC_DISCOVERY_RANGE is '{text}', which is no discovery range",
+            f"{meant}valid values: {', '.join(DISCOVERY_RANGES)}",
+        )
+
+
+def _check_security(environment: MutableMapping[str, str]) -> None:
+    """Refuse to run unsecured when security is asked for.
+
+    rcl asks for it when ROS_SECURITY_ENABLE is exactly ``true``; with the strategy Permissive it
+    goes on without when the middleware has none.
+    """
+    if environment.get("ROS_SECURITY_ENABLE") != "true":
+        return
+    if not environment.get("ROS_SECURITY_KEYSTORE"):
+        raise StartRefused(
+            "ROS_SECURITY_ENABLE is true, but ROS_SECURITY_KEYSTORE names no keystore",
+            "create one with 'ros2 security create_keystore', or unset ROS_SECURITY_ENABLE",
+        )
+    if environment.get("ROS_SECURITY_STRATEGY") != "Enforce":
+        raise StartRefused(
+            "ROS_SECURITY_ENABLE is true, but the strategy is not Enforce: nodes without "
+            "keys would run unsecured",
+            "set ROS_SECURITY_STRATEGY=Enforce, or unset ROS_SECURITY_ENABLE",
+        )

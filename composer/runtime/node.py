@@ -1,0 +1,250 @@
+"""The generic lifecycle node: any node of any system, made from its model.
+
+It builds its ports when it is configured, opens them when it is activated, and gives all of them
+back when it is cleaned up, shut down or has failed (DESIGN: The runtime, Lifecycle).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+from copy import deepcopy
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.node import Node as RosNode
+
+from composer.behavior import TransitionFailed
+from composer.model import Event, LogLevel, Node
+from composer.runtime.assembly import Assembly
+from composer.runtime.behaviors import Named, NodeClock, behavior_class, method
+from composer.runtime.core import Core
+from composer.runtime.gate import Gate
+from composer.runtime.lifecycle import Lifecycle, Result
+from composer.runtime.log import Faults, Log, Write, describe
+from composer.runtime.loop import Loop
+from composer.runtime.parameters import Parameters
+from composer.runtime.ports.timer import PeriodError, period_s
+from composer.runtime.statistics import Statistics
+from composer.runtime.strand import Direct, Turns
+
+_EVENTS = {
+    "configure": Event.CONFIGURE,
+    "activate": Event.ACTIVATE,
+    "deactivate": Event.DEACTIVATE,
+    "cleanup": Event.CLEANUP,
+}
+
+
+class WrongReturn(Exception):
+    """A lifecycle handler returned something that says neither yes nor no."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeOptions:
+    """How a node is run. ``parallel`` is true when its loop has several threads."""
+
+    parallel: bool = False
+    log_level: LogLevel = LogLevel.INFO
+    transition_timeout_s: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Listener:
+    """Who is told what a node does.
+
+    ``on_rest(transition, state)``: a transition has ended; ``on_fault(callback, text)``: user code
+    failed; ``write_log(level, logger, message)``: a line for the log.
+    """
+
+    on_rest: Callable[[str, str], None]
+    on_fault: Callable[[str, str], None]
+    write_log: Write
+
+
+class RunningNode:
+    """One node of a running system. To be created before its loop is started, or on it."""
+
+    def __init__(
+        self,
+        model: Node,
+        loop: Loop,
+        options: NodeOptions,
+        listener: Listener,
+    ) -> None:
+        """Join the ROS graph, unconfigured. Raises ParameterError."""
+        self.model = model
+        self.loop = loop
+        self.statistics = Statistics()
+        self._listener = listener
+        self._ros = RosNode(
+            model.name.value,
+            namespace=model.namespace.value,
+            use_global_arguments=False,
+            enable_rosout=False,  # its log has a publisher of its own
+        )
+        log = Log(self._ros, options.log_level, listener.write_log)
+        self._core = Core(
+            node=self._ros,
+            loop=loop,
+            gate=Gate(model.full_name),
+            strand=Turns(loop.call_soon) if options.parallel else Direct(),
+            log=log,
+            faults=Faults(log, self.statistics, listener.on_fault),
+            statistics=self.statistics,
+            names={"parameters": {}, "state": {}, "node": model.full_name},
+        )
+        parameters = Parameters(
+            self._ros, model.parameters, objection=self._objection, changed=self._changed
+        )
+        self._core.names["parameters"] = parameters.values
+        self._behavior: Any = None
+        self._assembly = Assembly(self._core)
+        loop.add_node(self._ros)
+        self._lifecycle = Lifecycle(self._core, self, timeout_s=options.transition_timeout_s)
+
+    @property
+    def full_name(self) -> str:
+        """The name ROS knows the node by."""
+        return self.model.full_name
+
+    @property
+    def state(self) -> str:
+        """The label of the lifecycle state, as ROS tools see it."""
+        return self._lifecycle.state
+
+    @property
+    def legal(self) -> Mapping[str, int]:
+        """The transitions that the state allows."""
+        return self._lifecycle.legal
+
+    async def change(self, transition: str) -> Result:
+        """Make a transition when no other one is under way. Raises nothing."""
+        return await self._lifecycle.change(transition)
+
+    def destroy(self) -> None:
+        """Give back everything, whatever the state. No transition can be made afterwards."""
+        self._release()
+        self._lifecycle.destroy()
+        self.loop.remove_node(self._ros)
+        self._ros.destroy_node()
+
+    # --- what the lifecycle asks for
+
+    async def on_transition(self, transition: str, start: str) -> None:
+        """Do the work of ``transition``; raise what goes wrong."""
+        gate = self._core.gate
+        gate.state = self.state
+        gate.waiting = True
+        if transition == "configure":
+            self._configure()
+        elif transition == "activate":
+            gate.outgoing = True
+        elif start == "active":
+            await self._leave_active()
+        await self._tell(transition)
+
+    async def on_error(self, cause: BaseException) -> None:
+        """Let the behaviour know why the node failed."""
+        await self._leave_active()
+        self._core.gate.waiting = True
+        await self._tell("error", cause)
+
+    def on_rest(self, state: str, transition: str) -> None:
+        """Open or shut everything as ``state`` wants it."""
+        gate = self._core.gate
+        gate.state = state
+        if state == "active":
+            gate.open()
+            for port in self._assembly.ports:
+                port.activate()
+        else:
+            for port in self._assembly.ports:
+                port.deactivate()
+            gate.close()
+        if state in ("unconfigured", "finalized"):
+            self._release()
+        self._listener.on_rest(transition, state)
+
+    # --- transitions
+
+    def _configure(self) -> None:
+        """Make the behaviour and the entities anew, so that nothing of an earlier life is left."""
+        state = self._core.names["state"]
+        state.clear()
+        state.update({name.value: deepcopy(value) for name, value in self.model.state})
+        if self.model.behavior is not None:
+            self._behavior = behavior_class(self.model.behavior)()
+        self._assembly = Assembly(self._core)
+        self._assembly.build(self.model, self._behavior)
+        if self._behavior is not None:
+            self._equip(self._behavior)
+
+    def _equip(self, behavior: Any) -> None:
+        assembly = self._assembly
+        behavior.name = self.full_name
+        behavior.log = self._core.log
+        behavior.clock = NodeClock(self._core)
+        behavior.parameters = Named("parameter", self._core.names["parameters"])
+        behavior.publishers = Named("publisher", assembly.publishers)
+        behavior.clients = Named("client", assembly.clients)
+        behavior.action_clients = Named("action client", assembly.action_clients)
+
+    async def _leave_active(self) -> None:
+        """Take nothing more in, end what is under way. Publishers stay open for a last word."""
+        self._core.gate.incoming = False
+        for port in self._assembly.ports:
+            port.deactivate()
+        self._core.gate.end_pending()
+        for server in self._assembly.action_servers.values():
+            await server.drain()
+
+    async def _tell(self, transition: str, *arguments: Any) -> None:
+        event = _EVENTS.get(transition)
+        reaction = self._assembly.transitions.get(event) if event is not None else None
+        if reaction is not None:
+            reaction.run()
+        name = f"on_{transition}"
+        handler = method(self._behavior, name)
+        if handler is None:
+            return
+        result = handler(*arguments)
+        if isinstance(result, Awaitable):
+            result = await result
+        if result is None or result is True:
+            return
+        if result is False:
+            raise TransitionFailed(f"{name} returned False")
+        raise WrongReturn(f"{name} returned {result!r:.80}; None and True mean done, False refused")
+
+    def _release(self) -> None:
+        self._core.cancel_tasks()
+        for port in reversed(tuple(self._assembly.ports)):
+            try:
+                port.destroy()
+            except Exception as error:
+                self._core.log.error(f"cannot destroy {type(port).__name__}: {describe(error)}")
+        self._assembly = Assembly(self._core)
+        self._behavior = None
+
+    # --- parameters
+
+    def _objection(self, values: Mapping[str, Any]) -> str | None:
+        """Return why a timer could not go on with the new parameter values, or None."""
+        for timer in self.model.timers:
+            try:
+                period_s(timer.period, values)
+            except PeriodError as error:
+                return f"timer '{timer.name}': {error}"
+        return None
+
+    def _changed(self, changes: Mapping[str, Any]) -> None:
+        self._core.strand.post(lambda: self._follow_parameters(changes))
+
+    def _follow_parameters(self, changes: Mapping[str, Any]) -> None:
+        for timer in self._assembly.timers.values():
+            timer.follow_parameters()
+        handler = method(self._behavior, "on_parameters")
+        if handler is not None:
+            rest = self._core.call("on_parameters", handler, changes)
+            if rest is not None:
+                self._core.spawn(self._core.strand.wrap(rest))

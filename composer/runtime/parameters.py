@@ -1,0 +1,205 @@
+"""A node's parameters: declared to ROS with all that is known of them, checked when they change."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.exceptions import InvalidParameterException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+
+from composer.model import Parameter, ParameterType
+
+_ROS_TYPES = {
+    ParameterType.BOOL: RosParameter.Type.BOOL,
+    ParameterType.INTEGER: RosParameter.Type.INTEGER,
+    ParameterType.DOUBLE: RosParameter.Type.DOUBLE,
+    ParameterType.STRING: RosParameter.Type.STRING,
+    ParameterType.BYTE_ARRAY: RosParameter.Type.BYTE_ARRAY,
+    ParameterType.BOOL_ARRAY: RosParameter.Type.BOOL_ARRAY,
+    ParameterType.INTEGER_ARRAY: RosParameter.Type.INTEGER_ARRAY,
+    ParameterType.DOUBLE_ARRAY: RosParameter.Type.DOUBLE_ARRAY,
+    ParameterType.STRING_ARRAY: RosParameter.Type.STRING_ARRAY,
+}
+_LOWEST_INTEGER, _HIGHEST_INTEGER = -(2**63), 2**63 - 1
+_HIGHEST_DOUBLE = sys.float_info.max
+
+#: Says why the new values cannot be, or None when they can.
+Objection = Callable[[Mapping[str, Any]], str | None]
+#: Told of the values that have changed.
+Changed = Callable[[Mapping[str, Any]], None]
+
+
+class ParameterError(Exception):
+    """A parameter that cannot be declared with the value it has."""
+
+
+class Parameters:
+    """The parameters of one node. ``values`` is kept up to date in place."""
+
+    def __init__(
+        self,
+        node: Node,
+        declared: Iterable[Parameter],
+        *,
+        objection: Objection,
+        changed: Changed,
+    ) -> None:
+        """Declare them. Raises ParameterError."""
+        self._declared = {parameter.name.value: parameter for parameter in declared}
+        self._objection = objection
+        self._changed = changed
+        self.values: dict[str, Any] = {}
+        for parameter in self._declared.values():
+            self.values[parameter.name.value] = _declare(node, parameter)
+        node.add_pre_set_parameters_callback(self._widen)
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._take_over)
+
+    def _widen(self, changes: list[RosParameter]) -> list[RosParameter]:
+        """Let an integer be given where a floating-point number is declared."""
+        return [self._widened(change) for change in changes]
+
+    def _widened(self, change: RosParameter) -> RosParameter:
+        parameter = self._declared.get(change.name)
+        if parameter is None:
+            return change
+        wanted = _ROS_TYPES[ParameterType(parameter.type.value)]
+        if wanted is RosParameter.Type.DOUBLE and change.type_ is RosParameter.Type.INTEGER:
+            return RosParameter(change.name, wanted, float(change.value))
+        if (
+            wanted is RosParameter.Type.DOUBLE_ARRAY
+            and change.type_ is RosParameter.Type.INTEGER_ARRAY
+        ):
+            return RosParameter(change.name, wanted, [float(item) for item in change.value])
+        return change
+
+    def _check(self, changes: list[RosParameter]) -> SetParametersResult:
+        values = {change.name: _plain(change.value) for change in changes}
+        reason = self._first_objection(values)
+        return SetParametersResult(successful=reason is None, reason=reason or "")
+
+    def _first_objection(self, values: Mapping[str, Any]) -> str | None:
+        for name, value in values.items():
+            parameter = self._declared.get(name)
+            reason = _out_of_bounds(parameter, value) if parameter is not None else None
+            if reason is not None:
+                return reason
+        return self._objection({**self.values, **values})
+
+    def _take_over(self, changes: list[RosParameter]) -> None:
+        values = {
+            change.name: _plain(change.value) for change in changes if change.name in self._declared
+        }
+        if values:
+            self.values.update(values)
+            self._changed(values)
+
+
+def _declare(node: Node, parameter: Parameter) -> Any:
+    name = parameter.name.value
+    if parameter.value is None:
+        raise ParameterError(f"parameter '{name}' is required and has no value")
+    value = _ros_value(parameter)
+    reason = _out_of_bounds(parameter, value)
+    if reason is not None:
+        raise ParameterError(reason)
+    try:
+        node.declare_parameter(name, value, _descriptor(parameter))
+    except (InvalidParameterException, InvalidParameterValueException, TypeError) as error:
+        raise ParameterError(f"parameter '{name}': {error}") from error
+    return _plain(value)
+
+
+def _ros_value(parameter: Parameter) -> Any:
+    """Return the value as rclpy wants it for the declared type."""
+    value: Any = parameter.value.value if parameter.value is not None else None
+    match parameter.type.value:
+        case ParameterType.DOUBLE if isinstance(value, int) and not isinstance(value, bool):
+            return float(value)
+        case ParameterType.DOUBLE_ARRAY:
+            return [float(item) for item in value]
+        case ParameterType.BYTE_ARRAY:
+            return [bytes([item]) for item in value]
+        case _:
+            return value
+
+
+def _plain(value: Any) -> Any:
+    """Return the value of a ROS parameter as behaviours and expressions get it."""
+    if isinstance(value, (str, bytes)) or not hasattr(value, "__iter__"):
+        return value
+    items = list(value)
+    if items and all(isinstance(item, bytes) for item in items):
+        return b"".join(items)
+    return items
+
+
+def _descriptor(parameter: Parameter) -> ParameterDescriptor:
+    unit = f" [{parameter.unit}]" if parameter.unit else ""
+    descriptor = ParameterDescriptor(
+        name=parameter.name.value,
+        type=_ROS_TYPES[ParameterType(parameter.type.value)].value,
+        description=f"{parameter.description}{unit}".strip(),
+        additional_constraints=_constraints(parameter),
+        read_only=parameter.read_only,
+    )
+    if parameter.minimum is None and parameter.maximum is None:
+        return descriptor
+    # rclpy counts steps from the lower bound: without one it has nothing to count from.
+    step = 0.0 if parameter.step is None or parameter.minimum is None else parameter.step.value
+    low = None if parameter.minimum is None else parameter.minimum.value
+    high = None if parameter.maximum is None else parameter.maximum.value
+    if parameter.type.value == ParameterType.INTEGER:
+        descriptor.integer_range = [
+            IntegerRange(
+                from_value=_LOWEST_INTEGER if low is None else int(low),
+                to_value=_HIGHEST_INTEGER if high is None else int(high),
+                step=int(step),
+            )
+        ]
+    elif parameter.type.value == ParameterType.DOUBLE:
+        descriptor.floating_point_range = [
+            FloatingPointRange(
+                from_value=-_HIGHEST_DOUBLE if low is None else float(low),
+                to_value=_HIGHEST_DOUBLE if high is None else float(high),
+                step=float(step),
+            )
+        ]
+    return descriptor
+
+
+def _constraints(parameter: Parameter) -> str:
+    if parameter.choices is None:
+        return ""
+    return "one of: " + ", ".join(str(choice) for choice in parameter.choices.value)
+
+
+def _out_of_bounds(parameter: Parameter, value: Any) -> str | None:
+    """Return what is wrong with ``value`` beyond its type, or None.
+
+    For arrays, minimum and maximum hold for every item.
+    """
+    name = parameter.name.value
+    choices = parameter.choices
+    if choices is not None and value not in choices.value:
+        return f"parameter '{name}' must be {_constraints(parameter)}; not {value}"
+    low, high = parameter.minimum, parameter.maximum
+    for item in value if isinstance(value, list) else [value]:
+        if isinstance(item, bool) or not isinstance(item, (int, float)):
+            continue
+        if item != item:  # noqa: PLR0124 - only NaN differs from itself
+            return f"parameter '{name}' must be a number"
+        if low is not None and item < low.value:
+            return f"parameter '{name}' must be at least {low.value}, not {item}"
+        if high is not None and item > high.value:
+            return f"parameter '{name}' must be at most {high.value}, not {item}"
+    return None

@@ -1,0 +1,104 @@
+"""The service client port."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from composer.behavior import CallCancelled, CallError
+from composer.model import Event, Port
+from composer.runtime.core import Core
+from composer.runtime.messages import interface_class
+from composer.runtime.ports.profiles import rclpy_profile
+from composer.runtime.ports.waiting import Waiting
+from composer.runtime.reactions import RunningReaction
+from composer.runtime.tasks import Future, wrap_rclpy_future
+
+#: The limit of a call when the YAML names none.
+DEFAULT_TIMEOUT_MS = 5000.0
+
+
+class ClientPort:
+    """Calls a service. What comes back goes to the caller and to the port's own reactions."""
+
+    def __init__(self, core: Core, port: Port) -> None:
+        self._core = core
+        self._name = port.name.value
+        self._timeout_ms = DEFAULT_TIMEOUT_MS if port.timeout_ms is None else port.timeout_ms.value
+        self._what = f"service '{port.full_name}'"
+        self.service_type: Any = interface_class(port.interface.value)
+        self._reactions: dict[Event, RunningReaction] = {}
+        self._client = core.node.create_client(
+            self.service_type, port.full_name, qos_profile=rclpy_profile(port.qos.profile)
+        )
+        core.loop.add_client(self._client)
+
+    @property
+    def content_type(self) -> Any:
+        """The class of requests."""
+        return self.service_type.Request
+
+    def react(self, event: Event, reaction: RunningReaction) -> None:
+        """Run ``reaction`` on every response or failure of the port."""
+        self._reactions[event] = reaction
+
+    def call(self, request: Any, *, timeout_ms: float | None = None) -> Future[Any]:
+        """Send ``request`` now; the future is the response.
+
+        It ends with ServerUnavailable, CallTimeout or CallCancelled. Raises TypeError.
+        """
+        if not isinstance(request, self.content_type):
+            raise TypeError(
+                f"client '{self._name}' takes a {self.service_type.__name__}.Request, "
+                f"not {type(request).__name__}"
+            )
+        limit_ms = self._timeout_ms if timeout_ms is None else timeout_ms
+        return self._core.spawn(self._call(request, limit_ms))
+
+    def send(self, content: Any) -> None:
+        """Send a request for a reaction; failures without ``on_failure`` are logged."""
+        self._core.spawn(self._send(content))
+
+    def activate(self) -> None:
+        """Do nothing: calls get out as soon as the gate is open."""
+
+    def deactivate(self) -> None:
+        """Do nothing: the gate ends the calls that wait."""
+
+    def destroy(self) -> None:
+        """Leave."""
+        self._core.loop.remove(self._client)
+        self._core.node.destroy_client(self._client)
+
+    async def _call(self, request: Any, timeout_ms: float) -> Any:
+        try:
+            waiting = Waiting(self._core, self._what, timeout_ms)
+            await waiting.until_there(self._client.service_is_ready)
+            self._core.statistics.calls += 1
+            answer = wrap_rclpy_future(self._client.call_async(request))
+            response = await waiting.until_done(answer)
+        except CallError as error:
+            self._react(Event.FAILURE, failure=str(error))
+            raise
+        self._react(Event.RESPONSE, response=response, request=request)
+        return response
+
+    async def _send(self, request: Any) -> None:
+        try:
+            await self._call(request, self._timeout_ms)
+        except CallCancelled as error:
+            self._core.log.debug(f"client '{self._name}': {error}")
+        except CallError as error:
+            if Event.FAILURE not in self._reactions:
+                self._core.faults.note(f"client '{self._name}'", str(error))
+
+    def _react(self, event: Event, **values: Any) -> None:
+        reaction = self._reactions.get(event)
+        if reaction is None or not self._core.gate.incoming:
+            return
+        self._core.strand.post(lambda: self._run(reaction, event, values))
+
+    def _run(self, reaction: RunningReaction, event: Event, values: dict[str, Any]) -> None:
+        try:
+            reaction.run(**values)
+        except Exception as error:
+            self._core.faults.take(f"client '{self._name}' on_{event}", error)

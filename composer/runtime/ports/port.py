@@ -1,0 +1,27 @@
+"""What a node asks of each of its ports and timers."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from rclpy.callback_groups import CallbackGroup, ReentrantCallbackGroup
+
+from composer.model import Port
+
+
+class RunningPort(Protocol):
+    """A port or timer between the configuration and the clean-up of its node."""
+
+    def activate(self) -> None:
+        """Begin: the node is active now."""
+
+    def deactivate(self) -> None:
+        """Take nothing more and give up what waits: the node is leaving *active*."""
+
+    def destroy(self) -> None:
+        """Give back everything."""
+
+
+def callback_group(port: Port) -> CallbackGroup | None:
+    """Return the callback group of the port: its node's own, which is exclusive, as None."""
+    return ReentrantCallbackGroup() if port.reentrant else None

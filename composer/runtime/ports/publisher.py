@@ -1,0 +1,52 @@
+"""The publisher port."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from composer.model import Port
+from composer.runtime.core import Core
+from composer.runtime.messages import interface_class
+from composer.runtime.ports.profiles import rclpy_profile
+
+
+class PublisherPort:
+    """Publishes while the node is active; drops, counts and says so once while it is not."""
+
+    def __init__(self, core: Core, port: Port) -> None:
+        self._core = core
+        self._gate = core.gate
+        self._statistics = core.statistics
+        self._name = port.name.value
+        self.message_type: Any = interface_class(port.interface.value)
+        self._publisher = core.node.create_publisher(
+            self.message_type, port.full_name, rclpy_profile(port.qos.profile)
+        )
+        self._send = self._publisher.publish
+        self._warned = False
+
+    def publish(self, message: Any) -> None:
+        """Send ``message``. Raises TypeError when it is not of the topic's type."""
+        if not self._gate.outgoing:
+            self._drop()
+            return
+        self._send(message)
+        self._statistics.sent += 1
+
+    def activate(self) -> None:
+        """Warn again at the next message that is dropped."""
+        self._warned = False
+
+    def deactivate(self) -> None:
+        """Nothing waits in a publisher."""
+
+    def destroy(self) -> None:
+        """Leave the topic."""
+        self._core.node.destroy_publisher(self._publisher)
+
+    def _drop(self) -> None:
+        self._statistics.dropped += 1
+        if not self._warned:
+            self._warned = True
+            reason = self._gate.refusal
+            self._core.log.warn(f"publisher '{self._name}' drops its messages: {reason}")

@@ -1,0 +1,96 @@
+"""The subscription port."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from composer.model import Port
+from composer.qos import Durability, History, QosProfile
+from composer.runtime.core import Core
+from composer.runtime.line import Line
+from composer.runtime.messages import interface_class
+from composer.runtime.ports.port import callback_group
+from composer.runtime.ports.profiles import rclpy_profile
+from composer.runtime.reactions import RunningReaction
+
+
+class SubscriptionPort:
+    """Hands messages to the port's reaction and handler while the node is active.
+
+    Messages that come at other times are dropped and counted, except on a transient-local topic:
+    what is latched there comes once, so the last ones are kept for the activation.
+    """
+
+    def __init__(
+        self,
+        core: Core,
+        port: Port,
+        reaction: RunningReaction | None,
+        handler: Callable[[Any], Any] | None,
+    ) -> None:
+        self._core = core
+        self._gate = core.gate
+        self._statistics = core.statistics
+        self._name = port.name.value
+        self._reaction = reaction
+        self._handler = handler
+        depth = queue_depth(port.qos.profile)
+        self._line = Line(core, self._work, depth=depth, reentrant=port.reentrant)
+        self._latched: deque[Any] | None = None
+        if port.qos.profile.durability is Durability.TRANSIENT_LOCAL:
+            self._latched = deque(maxlen=depth)
+        self._subscription = core.node.create_subscription(
+            interface_class(port.interface.value),
+            port.full_name,
+            self.receive,
+            rclpy_profile(port.qos.profile),
+            callback_group=callback_group(port),
+        )
+        core.loop.add_subscription(self._subscription, self.receive)
+
+    def receive(self, message: Any) -> None:
+        """Take a message that has come."""
+        if not self._gate.incoming:
+            if self._latched is None:
+                self._statistics.dropped += 1
+            else:
+                self._latched.append(message)
+            return
+        self._statistics.received += 1
+        if self._line.put(message) is not None:
+            self._statistics.dropped += 1
+
+    def activate(self) -> None:
+        """Take what was latched meanwhile."""
+        while self._latched:
+            self.receive(self._latched.popleft())
+
+    def deactivate(self) -> None:
+        """Drop what waits."""
+        left = self._line.clear()
+        if self._latched is None:
+            self._statistics.dropped += len(left)
+        else:
+            self._latched.extend(left)
+
+    def destroy(self) -> None:
+        """Leave the topic."""
+        self._core.loop.remove(self._subscription)
+        self._core.node.destroy_subscription(self._subscription)
+
+    def _work(self, message: Any) -> Coroutine[Any, Any, None] | None:
+        if self._reaction is not None:
+            try:
+                self._reaction.run(message=message)
+            except Exception as error:
+                self._core.faults.take(f"subscription '{self._name}'", error)
+        if self._handler is None:
+            return None
+        return self._core.call(f"on_{self._name}", self._handler, message)
+
+
+def queue_depth(profile: QosProfile) -> int | None:
+    """Return how many messages may wait; None where the history keeps all."""
+    return None if profile.history is History.KEEP_ALL else max(profile.depth, 1)

@@ -1,0 +1,135 @@
+"""One callback of a node at a time, whichever threads its loop has.
+
+A loop of one thread gives that by itself; on several threads a node's callbacks take turns here,
+without holding up a thread while they wait.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Coroutine, Generator
+from functools import partial
+from types import coroutine as awaitable_generator
+from typing import Any, Protocol, TypeVar
+
+from composer.runtime.tasks import Future
+
+T = TypeVar("T")
+
+
+class Strand(Protocol):
+    """Runs the callbacks of one node. Callbacks given to it must not raise."""
+
+    def post(self, call: Callable[[], None]) -> None:
+        """Run ``call`` now, or when those before it are through."""
+
+    def wrap(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
+        """Return a coroutine each step of which is a turn of its own."""
+
+
+class Direct:
+    """The strand of a node whose loop has one thread, and of ports that may overlap."""
+
+    def post(self, call: Callable[[], None]) -> None:
+        """Run ``call`` now."""
+        call()
+
+    def wrap(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
+        """Return ``coroutine`` itself."""
+        return coroutine
+
+
+class Turns:
+    """The strand of a node whose loop has several threads."""
+
+    def __init__(self, call_soon: Callable[[Callable[[], None]], None]) -> None:
+        self._call_soon = call_soon
+        self._lock = threading.Lock()
+        self._taken = False
+        # A waiting coroutine is a future: finishing it hands the turn over.
+        self._queue: deque[Callable[[], None] | Future[None]] = deque()
+
+    def post(self, call: Callable[[], None]) -> None:
+        """Run ``call`` now, or when those before it are through."""
+        with self._lock:
+            if self._taken:
+                self._queue.append(call)
+                return
+            self._taken = True
+        self._run(call)
+
+    def wrap(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
+        """Return a coroutine each step of which is a turn of its own."""
+        return _in_turns(self, coroutine)
+
+    def enter(self) -> Future[None] | None:
+        """Take the turn; where it is taken, return the future that will give it."""
+        with self._lock:
+            if self._taken:
+                turn: Future[None] = Future()
+                self._queue.append(turn)
+                return turn
+            self._taken = True
+            return None
+
+    def leave(self) -> None:
+        """Give the turn to whoever is next."""
+        while True:
+            with self._lock:
+                if not self._queue:
+                    self._taken = False
+                    return
+                following = self._queue.popleft()
+            if isinstance(following, Future):
+                if following.set_result(None):
+                    return
+                continue  # it gave up waiting
+            self._call_soon(partial(self._run, following))
+            return
+
+    def _run(self, call: Callable[[], None]) -> None:
+        try:
+            call()
+        finally:
+            self.leave()
+
+
+async def _in_turns(turns: Turns, coroutine: Coroutine[Any, Any, T]) -> T:
+    return await _steps(turns, coroutine)
+
+
+@awaitable_generator
+def _steps(turns: Turns, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
+    """Drive ``coroutine``, taking a turn for every step of it."""
+    raised: BaseException | None = None
+    try:
+        while True:
+            yield from _entered(turns)
+            try:
+                yielded = coroutine.send(None) if raised is None else coroutine.throw(raised)
+            except StopIteration as stop:
+                return stop.value  # type: ignore[no-any-return]
+            finally:
+                turns.leave()
+            raised = None
+            try:
+                yield yielded
+            except GeneratorExit:
+                raise
+            except BaseException as error:
+                raised = error
+    finally:
+        coroutine.close()
+
+
+def _entered(turns: Turns) -> Generator[Any, Any, None]:
+    turn = turns.enter()
+    if turn is None:
+        return
+    try:
+        yield from turn.__await__()
+    except BaseException:
+        if not turn.cancel():  # the turn had come already
+            turns.leave()
+        raise
