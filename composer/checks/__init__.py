@@ -1,0 +1,35 @@
+"""What can be wrong with a system: one rule, one file.
+
+A module here that has a function ``check`` is a rule: it is found by being here. It has ``RULE``
+too, with all that people are told of it (CONTRIBUTING says how to add one). A check looks at one
+thing only, and stays silent where what it needs is itself wrong: that finding is another rule's.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Callable, Iterator
+from functools import cache
+from importlib import import_module
+
+from composer.checks.context import Context
+from composer.diagnostics import Diagnostic, in_order
+
+Check = Callable[[Context], Iterator[Diagnostic]]
+
+
+def run_checks(context: Context) -> list[Diagnostic]:
+    """Return every finding of every rule, sorted by place."""
+    return in_order(finding for check in all_checks() for finding in check(context))
+
+
+@cache
+def all_checks() -> tuple[Check, ...]:
+    """Return the ``check`` function of every rule, by the names of their modules."""
+    modules = (
+        import_module(f"{__name__}.{found.name}") for found in pkgutil.iter_modules(__path__)
+    )
+    return tuple(module.check for module in modules if hasattr(module, "check"))
+
+
+__all__ = ["Check", "Context", "all_checks", "run_checks"]

@@ -1,0 +1,51 @@
+"""A client of a service or action that nobody serves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.checks.context import Context
+from composer.checks.wiring import lonely_ends
+from composer.checks.words import end_name, nearest_channel
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.model import PortKind
+
+RULE = register(
+    Rule(
+        code="RC322",
+        name="client-without-server",
+        severity=Severity.WARNING,
+        summary="Nothing in the system serves what a client calls.",
+        why=(
+            "Every call ends in a timeout: most often a name differs on the two sides. Where the "
+            "server is outside, 'external: true' says so."
+        ),
+        bad="""\
+system: unserved
+nodes:
+  operator:
+    clients: {reset: {type: std_srvs/srv/Trigger}}
+""",
+        good="""\
+system: unserved
+nodes:
+  operator:
+    clients: {reset: {type: std_srvs/srv/Trigger, external: true}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look for services and actions with clients only."""
+    for kind in (PortKind.CLIENT, PortKind.ACTION_CLIENT):
+        for end in lonely_ends(context, kind):
+            if end.port.required is None:
+                yield Diagnostic(
+                    RULE,
+                    f"nobody in this system serves '{end.port.full_name}', "
+                    f"which '{end_name(end)}' calls",
+                    end.port.name.span,
+                    hint=nearest_channel(context.channels, end)
+                    or "say 'external: true' if somebody outside does",
+                )

@@ -1,0 +1,70 @@
+"""A connection or a dependency that names a node the system does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.checks.context import Context, is_opaque
+from composer.checks.places import part_of
+from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.model import Endpoint, Node
+
+RULE = register(
+    Rule(
+        code="RC202",
+        name="unknown-node",
+        severity=Severity.ERROR,
+        summary="A connection or a dependency names a node that is not in this system.",
+        why="The connection would join nothing, and the dependency could never be met.",
+        bad="""\
+system: dependency
+nodes:
+  planner: {on_activate: {log: ready}}
+  motor_controller: {lifecycle: {depends_on: [planer]}}
+""",
+        good="""\
+system: dependency
+nodes:
+  planner: {on_activate: {log: ready}}
+  motor_controller: {lifecycle: {depends_on: [planner]}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the ends of connections and at what nodes depend on."""
+    for connection in context.system.connections:
+        for endpoint in (*connection.sources, *connection.sinks):
+            yield from _endpoint(context, endpoint)
+    for node in context.system.nodes:
+        yield from _dependencies(context, node)
+
+
+def _endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
+    name = endpoint.node
+    if is_opaque(endpoint.text.value) or context.system.node(name) is not None:
+        return
+    yield Diagnostic(
+        RULE,
+        f"'{endpoint.text}' names node '{name}', which is not a node of this system",
+        part_of(endpoint.text, 0, len(name)),
+        hint=suggestion(name, _names(context)),
+    )
+
+
+def _dependencies(context: Context, node: Node) -> Iterator[Diagnostic]:
+    for dependency in node.depends_on:
+        name = dependency.node
+        if is_opaque(name.value) or context.system.node(name.value) is not None:
+            continue
+        yield Diagnostic(
+            RULE,
+            f"node '{node.name}' depends on '{name}', which is not a node of this system",
+            name.span,
+            hint=suggestion(name.value, _names(context) - {node.name.value}),
+        )
+
+
+def _names(context: Context) -> set[str]:
+    return {node.name.value for node in context.system.nodes}

@@ -1,0 +1,63 @@
+"""A part of the node's own memory that was not declared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.checks.context import Context
+from composer.checks.places import part_of_path
+from composer.checks.reactions import reactions
+from composer.checks.sites import sites
+from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.model import Node
+from composer.source import Span
+
+RULE = register(
+    Rule(
+        code="RC210",
+        name="unknown-state",
+        severity=Severity.ERROR,
+        summary="A name under 'state' is used or set that the node does not declare.",
+        why="What a node remembers is declared with its first value, so that it always has one.",
+        bad="""\
+system: memory
+nodes:
+  counter:
+    state: {last: 0.0}
+    timers: {tick: {period_ms: 100, set: {lost: "{now}"}}}
+""",
+        good="""\
+system: memory
+nodes:
+  counter:
+    state: {last: 0.0}
+    timers: {tick: {period_ms: 100, set: {last: "{now}"}}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at what reactions set and at what expressions read."""
+    known = {
+        node.name.value: frozenset(name.value for name, _ in node.state)
+        for node in context.system.nodes
+    }
+    for found in reactions(context.system):
+        for name, _ in found.reaction.state:
+            if name.value not in known[found.node.name.value]:
+                yield _finding(found.node, name.value, name.span)
+    for site in sites(context.system):
+        for path in site.expression.paths:
+            if path.root != "state" or "state" not in site.names or len(path.parts) < 2:
+                continue
+            read = str(path.parts[1])
+            if read not in known[site.node.name.value]:
+                span = part_of_path(site.span, site.expression, path, 1)
+                yield _finding(site.node, read, span)
+
+
+def _finding(node: Node, name: str, span: Span) -> Diagnostic:
+    names = [known.value for known, _ in node.state]
+    hint = suggestion(name, names) or f"declare it: 'state: {{{name}: 0}}'"
+    return Diagnostic(RULE, f"the node declares no state '{name}'", span, hint=hint)

@@ -1,0 +1,68 @@
+"""How messages put things."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from composer.diagnostics import nearest
+from composer.model import Channel, Port, PortKind, PortOfNode
+
+
+def a(kind: PortKind) -> str:
+    """Return the kind with its article: ``an action server``."""
+    return f"{'an' if kind.value.startswith('a') else 'a'} {kind}"
+
+
+def either(kinds: Sequence[PortKind]) -> str:
+    """Return the kinds as alternatives: ``a client or an action client``."""
+    return " or ".join(a(kind) for kind in kinds)
+
+
+def listed(names: Sequence[str], limit: int = 3) -> str:
+    """Return names in quotes, with ``and``; of many the first ones and how many more."""
+    quoted = [f"'{name}'" for name in names]
+    if len(quoted) > limit:
+        quoted[limit - 1 :] = [f"{len(quoted) - limit + 1} others"]
+    if len(quoted) == 1:
+        return quoted[0]
+    return f"{', '.join(quoted[:-1])} and {quoted[-1]}"
+
+
+def number(value: float) -> str:
+    """Return a number without needless digits: ``50``, not ``50.0``; ``0.1``."""
+    return f"{value:.6g}"
+
+
+def safe_name(name: str) -> str:
+    """Return a valid ROS name made of what can be kept of ``name``."""
+    kept = "".join(character if _is_safe(character) else "_" for character in name)
+    joined = re.sub("__+", "_", kept).strip("_")
+    return f"n{joined}" if not joined or joined[0].isdigit() else joined
+
+
+def _is_safe(character: str) -> bool:
+    return character.isascii() and (character.isalnum() or character == "_")
+
+
+def end_name(end: PortOfNode) -> str:
+    """Return a port as connections name it: ``planner.sensor_data``."""
+    return f"{end.node.name}.{end.port.name}"
+
+
+def nearest_channel(channels: Sequence[Channel], end: PortOfNode) -> str | None:
+    """Return a hint at the channel of the same kind and type that a lonely port may have meant."""
+    port = end.port
+    names = [
+        channel.name
+        for channel in channels
+        if channel.kind is port.kind.channel
+        and channel.name != port.full_name
+        and any(_could_meet(port, other.port) for other in channel.ends)
+    ]
+    close = nearest(port.full_name, names)
+    return f"did you mean '{close}'?" if close is not None else None
+
+
+def _could_meet(one: Port, other: Port) -> bool:
+    return one.kind is not other.kind and one.interface == other.interface

@@ -1,0 +1,18 @@
+"""Write docs/rules.md from the rules."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from composer.report.catalogue import all_rules, page
+
+PAGE = Path(__file__).parents[1] / "docs" / "rules.md"
+
+
+def main() -> None:
+    """Write the page anew."""
+    PAGE.write_text(page(all_rules()), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
