@@ -75,11 +75,15 @@ _SENDING = (PortKind.PUBLISHER, PortKind.CLIENT, PortKind.ACTION_CLIENT)
 
 
 def _label(channel: Channel, end: PortOfNode) -> tuple[str, ...]:
-    """Say what was chosen: the rate of a publisher, and the QoS where the file names one."""
+    """Say the rate of a publisher, and the QoS; a subscription's only if it differs from that."""
+    if channel.kind is not ChannelKind.TOPIC:
+        return ()
     lines = []
     hertz = publishing_rate_hz(end.node, end.port)
     if end.port.kind is PortKind.PUBLISHER and hertz is not None:
         lines.append(rate(hertz))
-    if channel.kind is ChannelKind.TOPIC and end.port.qos.explicit:
+    offered = {source.port.qos.profile for source in channel.sources}
+    is_told = end.port.kind is PortKind.SUBSCRIPTION and offered == {end.port.qos.profile}
+    if end.port.qos.explicit and not is_told:
         lines.append(qos_label(end.port.qos.profile))
     return tuple(lines)
