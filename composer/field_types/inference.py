@@ -45,6 +45,7 @@ class Complaint:
     offset: int
     length: int
     hint: str | None = None
+    missing: bool = False
 
 
 @dataclass(slots=True)
@@ -91,12 +92,15 @@ def _path(node: ast.expr, inference: Inference) -> ValueType:
     if path.root not in inference.scope:
         hint = suggestion(path.root, inference.scope)
         message = f"there is no '{path.root}' here"
-        inference.complaints.append(Complaint(message, path.offset, len(path.root), hint))
+        inference.complaints.append(
+            Complaint(message, path.offset, len(path.root), hint, missing=True)
+        )
         return ANYTHING
     found = resolve_path(inference.scope[path.root], path.parts[1:], inference.interfaces)
     if isinstance(found, PathProblem):
         offset, length = _part(path, found.index + 1)
-        inference.complaints.append(Complaint(found.message, offset, length, found.hint))
+        complaint = Complaint(found.message, offset, length, found.hint, missing=True)
+        inference.complaints.append(complaint)
         return ANYTHING
     return found
 

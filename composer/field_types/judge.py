@@ -84,6 +84,7 @@ class Judge:
                 complaint.message,
                 span.part(complaint.offset, complaint.length) if spelled_out else span,
                 complaint.hint,
+                complaint.missing,
             )
             for complaint in complaints
         ]
@@ -94,7 +95,8 @@ class Judge:
             field = message.field(name.value)
             if field is None:
                 problem = f"{message.name} has no field '{name.value}'"
-                yield Problem(problem, name.span, suggestion(name.value, message.field_names))
+                hint = suggestion(name.value, message.field_names)
+                yield Problem(problem, name.span, hint, missing=True)
                 yield from self.text(content)
             else:
                 yield from self._field(content, field.type)

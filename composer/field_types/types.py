@@ -50,11 +50,15 @@ _SECONDS = frozenset(("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Dur
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What is wrong, where, and how to mend it."""
+    """What is wrong, where, and how to mend it.
+
+    ``missing`` tells a field or element that is not there from a value that does not fit.
+    """
 
     message: str
     span: Span
     hint: str | None = None
+    missing: bool = False
 
 
 @dataclass(frozen=True, slots=True)
