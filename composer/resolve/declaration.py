@@ -84,7 +84,7 @@ def refined(declared: Mapping, instance: Mapping) -> Mapping:
 
 def unknown_keys(declared: Mapping, instance: Mapping) -> tuple[UnknownKey, ...]:
     """Return the ports and timers that the instance refines and its type does not have."""
-    unknown = []
+    unknown: list[UnknownKey] = []
     for section in _REFINED_SECTIONS:
         given = entries(instance.get(section))
         if not given:

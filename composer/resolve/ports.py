@@ -29,7 +29,7 @@ from composer.templates import Computed, Text
 from composer.tree import Entry, Mapping, Scalar, Tree
 
 #: What clients wait for their server and its answer unless they say otherwise.
-DEFAULT_TIMEOUT_MS = 5000
+DEFAULT_TIMEOUT_MS = 5000.0
 
 _CLIENTS = frozenset({PortKind.CLIENT, PortKind.ACTION_CLIENT})
 _INLINE_EVENTS = {
@@ -96,8 +96,10 @@ def _required(tree: Tree | None) -> bool | None:
 
 
 def _timeout(kind: PortKind, tree: Mapping, span: Span) -> Located[float] | None:
-    default = Located(DEFAULT_TIMEOUT_MS, span) if kind in _CLIENTS else None
-    return number(tree.get("timeout_ms")) or default
+    timeout_ms = number(tree.get("timeout_ms"))
+    if timeout_ms is None and kind in _CLIENTS:
+        return Located(DEFAULT_TIMEOUT_MS, span)
+    return timeout_ms
 
 
 def _reactions(kind: PortKind, entry: Entry, tree: Mapping, findings: list[Diagnostic]) -> Events:

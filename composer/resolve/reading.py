@@ -61,9 +61,9 @@ def integer(tree: Tree | None) -> Located[int] | None:
 
 def number(tree: Tree | None) -> Located[float] | None:
     """Return a number with its place; a whole number stays one."""
-    if isinstance(tree, Scalar) and isinstance(tree.value, float):
-        return Located(tree.value, tree.span)
-    return integer(tree)
+    if isinstance(tree, Scalar) and isinstance(tree.value, int | float):
+        return None if isinstance(tree.value, bool) else Located(tree.value, tree.span)
+    return None
 
 
 def flag(tree: Tree | None, default: bool) -> bool:

@@ -6,11 +6,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from textwrap import dedent
 
-from composer.expand import expand
-
 from composer.catalog import Catalog
 from composer.diagnostics import Diagnostic
 from composer.document import parse_document
+from composer.expand import expand
 from composer.model import System
 from composer.resolve import read_overrides, resolve
 from composer.source import SourceFile, Span

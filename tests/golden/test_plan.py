@@ -1,0 +1,29 @@
+"""The plans of the example systems, as they print. ``plan/<system>.txt`` is what is expected."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.loading import load
+from composer.plan import bring_up, tear_down
+from composer.resources import systems_folder
+
+EXPECTED = Path(__file__).parent / "plan"
+
+
+SYSTEMS = sorted(systems_folder().glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", SYSTEMS, ids=[path.stem for path in SYSTEMS])
+def test_plan(path: Path) -> None:
+    system = load(path).system
+    assert system is not None
+    printed = f"# up\n{bring_up(system)}\n# down\n{tear_down(system)}\n"
+    assert printed == (EXPECTED / f"{path.stem}.txt").read_text(encoding="utf-8")
+
+
+def test_every_expected_plan_is_one_of_a_system() -> None:
+    expected = {path.stem for path in EXPECTED.glob("*.txt")}
+    assert expected == {path.stem for path in SYSTEMS}

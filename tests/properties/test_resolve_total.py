@@ -1,0 +1,77 @@
+"""Resolving takes every tree, whatever stands where: nothing raises, and plans end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from composer.catalog import Catalog
+from composer.model.dependencies import dependency_cycles
+from composer.plan import bring_up, tear_down
+from composer.resolve import read_overrides, resolve
+from composer.source import SourceFile, Span
+from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
+
+SOURCE = SourceFile("robot.yaml", "")
+SPAN = Span(SOURCE, 1, 1)
+FOLDER = Path("/nowhere")
+
+KEYS = [
+    *("system", "node", "type", "namespace", "nodes", "connections", "qos_profiles", "executors"),
+    *("lifecycle", "autostart", "depends_on", "parameters", "remappings", "publishers"),
+    *("subscriptions", "services", "clients", "action_servers", "action_clients", "timers"),
+    *("state", "qos", "extends", "depth", "reliability", "deadline_ms", "topic", "service"),
+    *("action", "from", "to", "server", "period_ms", "rate_hz", "when", "set", "log", "publish"),
+    *("call", "respond", "accept", "feedback", "result", "count", "message", "on_response"),
+    *("on_activate", "default", "minimum", "choices", "kind", "threads", "a", "b", "relay"),
+]
+TEXTS = [
+    "a", "b", "a.b", "relay", "sensor_data", "active", "inactive", "", ".", "~", "/", "//", "~x",
+    "${x}", "{x}", "{", "}", "{{", "{count:.2f}", "message.data", "1 +", "double", "\x00", "ü" * 50,
+]  # fmt: skip
+
+numbers = st.integers(-(2**63), 2**64) | st.floats(allow_nan=False, allow_infinity=False)
+scalars = st.one_of(
+    st.none(), st.booleans(), numbers, st.sampled_from(TEXTS), st.text(max_size=8)
+).map(lambda value: Scalar(value, SPAN))
+
+
+def mappings(values: st.SearchStrategy[Tree]) -> st.SearchStrategy[Mapping]:
+    return st.dictionaries(st.sampled_from(KEYS), values, max_size=6).map(
+        lambda items: Mapping(
+            tuple(Entry(Scalar(name, SPAN), value) for name, value in items.items()), SPAN
+        )
+    )
+
+
+trees = st.recursive(
+    scalars,
+    lambda inner: (
+        mappings(inner)
+        | st.lists(inner, max_size=3).map(lambda items: Sequence(tuple(items), SPAN))
+    ),
+    max_leaves=25,
+)
+
+
+@st.composite
+def files(draw: st.DrawFn) -> Mapping:
+    """Draw a file that is a system or a node type by its first key, and anything behind it."""
+    first = Entry(Scalar(draw(st.sampled_from(["system", "node"])), SPAN), draw(scalars))
+    nodes = Entry(Scalar("nodes", SPAN), draw(mappings(mappings(trees))))
+    rest = draw(mappings(trees))
+    kept = [entry for entry in rest if entry.name not in {"system", "node", "nodes"}]
+    return Mapping((first, nodes, *kept), SPAN)
+
+
+@settings(max_examples=300, deadline=None)
+@given(tree=files(), text=st.sampled_from(TEXTS) | st.text(max_size=12))
+def test_every_tree_has_a_model_and_a_plan(tree: Mapping, text: str) -> None:
+    overrides, _ = read_overrides([f"a.b={text}", text], text)
+    system, _ = resolve(tree, SOURCE, Catalog((FOLDER,)), folder=FOLDER, overrides=overrides)
+    assert system is not None
+    assert dependency_cycles(system) is not None
+    assert len(tear_down(system).steps) == 3 * len(system.nodes)
+    assert len(bring_up(system).steps) <= 2 * len(system.nodes)
