@@ -11,7 +11,6 @@ BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check
 INTERFACES := $(shell find interfaces -type f)
-SOURCES := composer nodes tests tools
 # Only where the system's Python has no headers: fetched, to a place where no compiler looks.
 HEADERS = $(abspath $(shell ls -d $(VENV)/headers/usr/include/python3.* 2>/dev/null))
 
@@ -45,14 +44,14 @@ check: lint test
 
 lint: $(STAMPS)/composer $(STAMPS)/checks
 	@echo "==> ruff, mypy, import-linter"
-	@$(BIN)/ruff check --quiet $(SOURCES)
-	@$(BIN)/ruff format --quiet --check $(SOURCES)
+	@$(BIN)/ruff check --quiet
+	@$(BIN)/ruff format --quiet --check
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports --no-logo
 
 format: $(STAMPS)/checks
-	@$(BIN)/ruff check --quiet --fix $(SOURCES)
-	@$(BIN)/ruff format $(SOURCES)
+	@$(BIN)/ruff check --quiet --fix
+	@$(BIN)/ruff format
 
 bench: $(STAMPS)/composer $(STAMPS)/interfaces
 	@$(BIN)/python -m benchmarks
