@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -170,12 +171,19 @@ class Judge:
 def _fits_array(found: ValueType, target: ValueType) -> bool:
     if not isinstance(found, FieldType) or not isinstance(target, FieldType) or not found.is_array:
         return False
-    sizes = {found.array_size, target.array_size} - {None}
-    if len(sizes) > 1:
+    (given_least, given_most), (least, most) = _lengths(found), _lengths(target)
+    if given_least > most or given_most < least:
         return False
     if target.is_primitive:
         return _fits_primitive(found.element, target.element)
     return found.name == target.name
+
+
+def _lengths(array: FieldType) -> tuple[float, float]:
+    """Return how many elements an array has at least and at most."""
+    if array.array_size is not None:
+        return array.array_size, array.array_size
+    return 0, math.inf if array.array_bound is None else array.array_bound
 
 
 def _fits_primitive(found: ValueType, target: FieldType) -> bool:
