@@ -1,0 +1,106 @@
+"""Load-time variables: ``${name}`` in a file, and what is put in its place.
+
+A scalar that is just ``${name}`` becomes the value, whatever it is; inside a text the value's own
+text is put in; ``$${`` is a plain ``${``. A declared variable without a value stays as written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Mapping as Map
+
+from composer.diagnostics import Diagnostic, Label, shown
+from composer.expand import rules
+from composer.expand.order import dependency_order
+from composer.expand.scope import Scope, measured, read_scope
+from composer.expand.substitution import Substitution, TooLarge
+from composer.expand.text import references
+from composer.schema import kind_of
+from composer.tree import Mapping, Scalar, Tree
+
+__all__ = ["expand", "missing_variables"]
+
+_SECTION = "variables"
+_LONGEST_CIRCLE = 8  # names told of one
+
+
+def expand(tree: Mapping, given: Map[str, Tree]) -> tuple[Mapping, list[Diagnostic]]:
+    """Return ``tree`` with its variables put in, and what is wrong with them.
+
+    ``given`` goes before what the file itself says: the arguments that a system has for a node
+    type. A value that stands for ``${name}`` alone keeps the place where it was written, so that
+    a finding points at the argument; a text with values in it keeps its own. The section
+    ``variables`` stays as it is. Takes time in proportion to the expanded file, which is bounded.
+    """
+    scope = read_scope(tree, is_node_type=kind_of(tree) == "node")
+    substitution = Substitution(scope)
+    findings = list(_unknown_arguments(tree, scope, given))
+    try:
+        findings += _work_out(substitution, given)
+        expanded = _without_section(substitution, tree)
+    except TooLarge as stopped:
+        return tree, [*findings, *substitution.findings, stopped.finding]
+    return expanded, [*findings, *substitution.findings, *_unused(scope)]
+
+
+def missing_variables(tree: Mapping, given: Map[str, Tree]) -> tuple[str, ...]:
+    """Return the variables of a node type that have no default and are not ``given``."""
+    declared = read_scope(tree, is_node_type=True).declared
+    return tuple(
+        name for name, variable in declared.items() if variable.value is None and name not in given
+    )
+
+
+def _work_out(substitution: Substitution, given: Map[str, Tree]) -> list[Diagnostic]:
+    """Give every variable its value, each after those it uses; return the circles."""
+    scope = substitution.scope
+    scope.values.update((name, measured(value)) for name, value in given.items())
+    own = {
+        name: variable.value
+        for name, variable in scope.declared.items()
+        if variable.value is not None and name not in given
+    }
+    order, circles = dependency_order({name: set(references(own[name])) for name in own})
+    for name in order:
+        scope.values[name] = substitution.put_into(own[name])
+    return [_circle(circle, scope) for circle in circles]
+
+
+def _without_section(substitution: Substitution, tree: Mapping) -> Mapping:
+    entries = tuple(entry for entry in tree if entry.name != _SECTION)
+    expanded = substitution.put_into(Mapping(entries, tree.span)).tree
+    values = {entry.name: entry for entry in expanded} if isinstance(expanded, Mapping) else {}
+    return Mapping(tuple(values.get(entry.name, entry) for entry in tree), tree.span)
+
+
+def _unknown_arguments(tree: Mapping, scope: Scope, given: Map[str, Tree]) -> Iterator[Diagnostic]:
+    if not scope.is_known:
+        return
+    name = tree.get("node")
+    for argument, value in given.items():
+        if argument not in scope.declared:
+            owner = f"'{shown(name.value)}'" if isinstance(name, Scalar) else "this file"
+            message = f"{owner} has no variable '{shown(argument)}'"
+            hint = scope.hint(argument) or "leave it out"
+            yield Diagnostic(rules.UNKNOWN_VARIABLE, message, value.span, hint=hint)
+
+
+def _circle(names: list[str], scope: Scope) -> Diagnostic:
+    first, *others = names[:_LONGEST_CIRCLE]
+    rest = ["..."] if len(names) > _LONGEST_CIRCLE else []
+    written = " -> ".join([*map(shown, (first, *others)), *rest, shown(first)])
+    message = f"variable '{shown(first)}' stands for itself: {written}"
+    labels = tuple(Label(scope.declared[name].key.span, "by way of this") for name in others)
+    span = scope.declared[first].key.span
+    return Diagnostic(rules.CYCLIC_VARIABLES, message, span, labels)
+
+
+def _unused(scope: Scope) -> Iterator[Diagnostic]:
+    for variable in scope.declared.values():
+        # Of what was not worked out: defaults that an argument replaced, and circles.
+        scope.used.update(references(variable.value) if variable.value is not None else ())
+    for name, variable in scope.declared.items():
+        if name not in scope.used:
+            message = f"variable '{shown(name)}' is never used"
+            hint = f"use it as '${{{shown(name)}}}', or leave it out"
+            yield Diagnostic(rules.UNUSED_VARIABLE, message, variable.key.span, hint=hint)

@@ -1,0 +1,74 @@
+"""The rules of load-time variables (RC28x)."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from composer.diagnostics import Rule, Severity, register
+
+_error = partial(Rule, severity=Severity.ERROR)
+
+UNKNOWN_VARIABLE = register(
+    _error(
+        code="RC281",
+        name="unknown-variable",
+        summary="A variable is used, or given to a node type, that is not declared.",
+        why="Nothing can be put in its place, and a value that nobody asks for is a mistake.",
+        bad="variables: {rate_hz: 10}\nnodes: {talker: {timers: {tick: {rate_hz: '${rate}'}}}}",
+        good="variables: {rate_hz: 10}\nnodes: {talker: {timers: {tick: {rate_hz: '${rate_hz}'}}}}",
+    )
+)
+MALFORMED_VARIABLE = register(
+    _error(
+        code="RC282",
+        name="malformed-variable",
+        summary="What stands behind '${' is not a name and a closing brace.",
+        why=(
+            "'${name}' is put in when a file is loaded, '{expression}' is worked out at run time; "
+            "there is nothing between the two."
+        ),
+        bad='log: "${count + 1}"',
+        good='log: "{count + 1}"',
+    )
+)
+CYCLIC_VARIABLES = register(
+    _error(
+        code="RC283",
+        name="cyclic-variables",
+        summary="Variables stand for each other in a circle.",
+        why="None of them can be worked out before the others.",
+        bad="variables: {first: '${second}', second: '${first}'}",
+        good="variables: {first: 10, second: '${first}'}",
+    )
+)
+NOT_A_TEXT = register(
+    _error(
+        code="RC284",
+        name="variable-not-text",
+        summary="A variable that stands for a map or list is used inside a text.",
+        why="Maps and lists have no text of their own; alone, '${name}' stands for all of them.",
+        bad="variables: {point: {x: 1}}\nlog: 'at ${point}'",
+        good="variables: {x: 1}\nlog: 'at ${x}'",
+    )
+)
+TOO_LARGE = register(
+    _error(
+        code="RC285",
+        name="variables-too-large",
+        summary="With its variables put in, a file says too much.",
+        why="Variables of variables let a few lines stand for more than a program can go through.",
+        bad="variables: {a: '${b}${b}', b: '${c}${c}', c: '${d}${d}'}  # and so on",
+        good="variables: {a: some text}",
+    )
+)
+UNUSED_VARIABLE = register(
+    Rule(
+        code="RC286",
+        name="unused-variable",
+        severity=Severity.INFO,
+        summary="A variable is declared and never used.",
+        why="It may be misspelt where it was meant, and changing it does nothing.",
+        bad="variables: {rate_hz: 10}\ntimers: {tick: {rate_hz: 10}}",
+        good="variables: {rate_hz: 10}\ntimers: {tick: {rate_hz: '${rate_hz}'}}",
+    )
+)

@@ -1,0 +1,148 @@
+"""Putting variables into a tree, within limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from composer.diagnostics import Diagnostic, Rule, shown
+from composer.document.limits import MAX_BYTES, MAX_DEPTH, MAX_VALUES
+from composer.expand import rules
+from composer.expand.scope import Scope, Sized
+from composer.expand.text import Reference, has_reference, pieces
+from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
+
+
+class TooLarge(Exception):
+    """The variables make the file grow beyond all limits; the finding says where."""
+
+    def __init__(self, finding: Diagnostic) -> None:
+        super().__init__(finding.message)
+        self.finding = finding
+
+
+@dataclass(slots=True)
+class Substitution:
+    """Puts the variables of one file into its trees, and keeps count of what that adds."""
+
+    scope: Scope
+    findings: list[Diagnostic] = field(default_factory=list)
+    _values: int = 0
+    _characters: int = 0
+
+    def put_into(self, tree: Tree, depth: int = 0) -> Sized:
+        """Return ``tree``, which stands in ``depth`` maps and lists, with variables put in.
+
+        A value keeps the place where it was written. Raises TooLarge.
+        """
+        self._values = 0
+        return self._tree(tree, depth)
+
+    def _tree(self, tree: Tree, depth: int) -> Sized:
+        match tree:
+            case Scalar():
+                return self._scalar(tree, depth)
+            case Sequence():
+                return self._sequence(tree, depth)
+            case Mapping():
+                return self._mapping(tree, depth)
+
+    def _sequence(self, tree: Sequence, depth: int) -> Sized:
+        self._grow(1, tree)
+        parts = [self._tree(item, depth + 1) for item in tree.items]
+        if any(part.tree is not item for part, item in zip(parts, tree.items, strict=True)):
+            tree = Sequence(tuple(part.tree for part in parts), tree.span)
+        return _sized(tree, parts, keys=0)
+
+    def _mapping(self, tree: Mapping, depth: int) -> Sized:
+        self._grow(1 + len(tree.entries), tree)
+        parts = [self._tree(entry.value, depth + 1) for entry in tree]
+        pairs = list(zip(parts, tree.entries, strict=True))
+        if any(part.tree is not entry.value for part, entry in pairs):
+            entries = tuple(Entry(entry.key, part.tree) for part, entry in pairs)
+            tree = Mapping(entries, tree.span)
+        return _sized(tree, parts, keys=len(parts))
+
+    def _scalar(self, scalar: Scalar, depth: int) -> Sized:
+        if not isinstance(scalar.value, str) or not has_reference(scalar.value):
+            self._grow(1, scalar)
+            return Sized(scalar, 1, 0)
+        match pieces(scalar.value):
+            case [Reference() as reference]:
+                return self._whole(reference, scalar, depth)
+            case parts:
+                self._grow(1, scalar)
+                text = "".join(self._part(part, scalar) for part in parts)
+                return Sized(Scalar(text, scalar.span, verbatim=False), 1, 0)
+
+    def _whole(self, reference: Reference, scalar: Scalar, depth: int) -> Sized:
+        """Return what stands for a scalar that is one reference."""
+        found = self._find(reference, scalar)
+        if found is None:
+            self._grow(1, scalar)
+            return Sized(scalar, 1, 0)
+        self._grow(found.values, scalar)
+        if depth + found.height > MAX_DEPTH:
+            raise self._too_large(
+                scalar, f"with its variables, more than {MAX_DEPTH} maps and lists are nested here"
+            )
+        return found
+
+    def _part(self, part: str | Reference, scalar: Scalar) -> str:
+        """Return the text that stands for a part of a text."""
+        if isinstance(part, str):
+            return part
+        found = self._find(part, scalar)
+        if found is None:
+            return part.written
+        if not isinstance(found.tree, Scalar):
+            kind = "map" if isinstance(found.tree, Mapping) else "list"
+            message = f"'{part.written}' stands for a {kind}, which has no place inside a text"
+            self._report(rules.NOT_A_TEXT, message, part, scalar)
+            return part.written
+        text = found.tree.value if isinstance(found.tree.value, str) else shown(found.tree.value)
+        self._characters += len(text)
+        if self._characters > MAX_BYTES:
+            raise self._too_large(
+                scalar, f"variables put more than {MAX_BYTES:,} characters into the file"
+            )
+        return text
+
+    def _find(self, reference: Reference, scalar: Scalar) -> Sized | None:
+        name = reference.name
+        if name is None:
+            message = f"'{shown(reference.written)}' is no variable: expected '${{name}}'"
+            hint = "write '$${' for a plain '${', and '{...}' for an expression"
+            self._report(rules.MALFORMED_VARIABLE, message, reference, scalar, hint)
+            return None
+        self.scope.used.add(name)
+        if name not in self.scope.declared and self.scope.is_known:
+            message = f"there is no variable '{shown(name)}'"
+            hint = self.scope.hint(name) or "declare it under 'variables'"
+            self._report(rules.UNKNOWN_VARIABLE, message, reference, scalar, hint)
+        return self.scope.values.get(name)
+
+    def _grow(self, values: int, tree: Tree) -> None:
+        self._values += values
+        if self._values > MAX_VALUES:
+            raise self._too_large(
+                tree, f"with its variables, this file says more than {MAX_VALUES:,} things"
+            )
+
+    def _too_large(self, tree: Tree, message: str) -> TooLarge:
+        return TooLarge(Diagnostic(rules.TOO_LARGE, message, tree.span))
+
+    def _report(
+        self,
+        rule: Rule,
+        message: str,
+        reference: Reference,
+        scalar: Scalar,
+        hint: str | None = None,
+    ) -> None:
+        span = scalar.part(reference.start, len(reference.written))
+        self.findings.append(Diagnostic(rule, message, span, hint=hint))
+
+
+def _sized(tree: Tree, parts: list[Sized], keys: int) -> Sized:
+    values = 1 + keys + sum(part.values for part in parts)
+    return Sized(tree, values, 1 + max((part.height for part in parts), default=0))

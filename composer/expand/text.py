@@ -1,0 +1,60 @@
+"""``${name}`` in a text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from composer.tree import Mapping, Scalar, Sequence, Tree
+
+_MARK = "${"
+_PIECE = re.compile(
+    r"(?P<literal>\$\$\{)"  # stands for itself
+    r"|\$\{(?P<name>[A-Za-z_][A-Za-z0-9_]*)\}"
+    r"|\$\{[^}]*\}?"  # looks like a reference and is none
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A ``${name}`` and where in its text it stands. ``name`` is None where there is none."""
+
+    name: str | None
+    start: int
+    written: str
+
+
+def pieces(text: str) -> list[str | Reference]:
+    """Return the texts and references that ``text`` is made of; ``$${`` is a literal ``${``."""
+    found: list[str | Reference] = []
+    end = 0
+    for match in _PIECE.finditer(text):
+        found.append(text[end : match.start()])
+        if match["literal"] is not None:
+            found.append(_MARK)
+        else:
+            found.append(Reference(match["name"], match.start(), match[0]))
+        end = match.end()
+    found.append(text[end:])
+    return [piece for piece in found if piece != ""]
+
+
+def has_reference(text: str) -> bool:
+    """Say whether ``text`` has anything that is not to be taken as it stands."""
+    return _MARK in text
+
+
+def references(tree: Tree) -> Iterator[str]:
+    """Yield the names that the texts of ``tree`` refer to."""
+    match tree:
+        case Scalar(value=str() as text) if has_reference(text):
+            for piece in pieces(text):
+                if isinstance(piece, Reference) and piece.name is not None:
+                    yield piece.name
+        case Sequence():
+            for item in tree.items:
+                yield from references(item)
+        case Mapping():
+            for entry in tree:
+                yield from references(entry.value)
