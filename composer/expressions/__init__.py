@@ -16,6 +16,7 @@ from composer.expressions.errors import EvaluationError, ExpressionError
 from composer.expressions.expression import Expression, FieldPath
 from composer.expressions.operations import CONSTANTS, FUNCTIONS
 from composer.expressions.syntax import MAXIMUM_LENGTH, MAXIMUM_NODES
+from composer.expressions.values import map_key
 
 __all__ = [
     "CONSTANTS",
@@ -27,5 +28,6 @@ __all__ = [
     "ExpressionError",
     "FieldPath",
     "compile_expression",
+    "map_key",
     "path_of",
 ]

@@ -123,11 +123,26 @@ def _path(node: ast.expr, paths: list[FieldPath]) -> ast.expr:
     paths.append(path)
     scope = _at(node, ast.Name(SCOPE, ast.Load()))
     root = _at(node, ast.Subscript(scope, _at(node, ast.Constant(path.root)), ast.Load()))
-    steps = path.parts[1:]
-    if not steps:
-        return root
-    operation = "read_fields" if all(isinstance(step, str) for step in steps) else "read_path"
-    return _call(operation, node, root, _at(node, _tuple(steps)))
+    match _steps(path.parts[1:]):
+        case ():
+            return root
+        case (tuple() as names,):
+            return _call("read_fields", node, root, _at(node, _tuple(names)))
+        case steps:
+            return _call("read_path", node, root, _at(node, _tuple(steps)))
+
+
+def _steps(parts: tuple[str | int, ...]) -> tuple[tuple[str, ...] | int, ...]:
+    """Return the parts with field names that follow each other in one tuple."""
+    steps: list[tuple[str, ...] | int] = []
+    names: tuple[str, ...] = ()
+    for part in parts:
+        if isinstance(part, str):
+            names += (part,)
+            continue
+        steps += [names, part] if names else [part]
+        names = ()
+    return (*steps, names) if names else tuple(steps)
 
 
 def _arithmetic(node: ast.BinOp, paths: list[FieldPath]) -> ast.expr:
@@ -244,7 +259,7 @@ def _at(origin: ast.expr, node: Built) -> Built:
     return ast.copy_location(node, origin)
 
 
-def _tuple(values: tuple[bool | int | float | str, ...]) -> ast.Constant:
+def _tuple(values: tuple[bool | int | float | str | tuple[str, ...], ...]) -> ast.Constant:
     return ast.Constant(values)  # type: ignore[arg-type]  # compile() takes tuples of constants
 
 

@@ -7,7 +7,7 @@ reached. A ``byte``, which rclpy keeps as ``bytes`` of one, is an integer here.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping, Sequence
 from enum import Enum
 from functools import lru_cache
 from typing import Any, cast
@@ -88,30 +88,46 @@ def plain(value: Any) -> Any:
     return value.item() if kind_of(type(value)) is Kind.ELEMENT else value
 
 
+def map_key(known: Container[str], names: Sequence[str]) -> tuple[str, int]:
+    """Return the key of a map that ``names`` begin with, and how many of them it takes.
+
+    Names of ROS parameters may have dots in them, so ``parameters.camera.fps`` reads ``camera.fps``
+    where there is such a key. The longest key wins; without any the first name is returned.
+    """
+    for count in range(len(names), 1, -1):
+        key = ".".join(names[:count])
+        if key in known:
+            return key, count
+    return names[0], 1
+
+
 def read_fields(value: Any, names: tuple[str, ...]) -> Any:
     """Return what is reached through the field names."""
+    if message_fields(type(value)) is None:
+        value, names = _read_maps(value, names)
     for name in names:
         known = message_fields(type(value))
-        if known is not None and name in known:
-            value = getattr(value, name)
-        else:
-            value = _read_key(value, name)
+        if known is None or name not in known:
+            raise Refusal(f"{describe(value)} has no field '{name}'")
+        value = getattr(value, name)
     return plain(value) if type(value) is bytes else value
 
 
-def read_path(value: Any, parts: tuple[str | int, ...]) -> Any:
-    """Return what is reached through field names and indices."""
-    for part in parts:
-        value = read_fields(value, (part,)) if isinstance(part, str) else _read_index(value, part)
+def read_path(value: Any, steps: tuple[tuple[str, ...] | int, ...]) -> Any:
+    """Return what is reached through runs of field names and indices between them."""
+    for step in steps:
+        value = _read_index(value, step) if isinstance(step, int) else read_fields(value, step)
     return value
 
 
-def _read_key(value: Any, name: str) -> Any:
-    if kind_of(type(value)) is Kind.MAPPING:
-        if name in value:
-            return value[name]
-        raise Refusal(f"there is no '{name}'")
-    raise Refusal(f"{describe(value)} has no field '{name}'")
+def _read_maps(value: Any, names: tuple[str, ...]) -> tuple[Any, tuple[str, ...]]:
+    """Return what is reached before the first value that is no map, and the names left then."""
+    while names and kind_of(type(value)) is Kind.MAPPING:
+        key, count = map_key(value, names)
+        if key not in value:
+            raise Refusal(f"there is no '{key}'")
+        value, names = value[key], names[count:]
+    return value, names
 
 
 def _read_index(value: Any, index: int) -> Any:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import TypeAlias
 
 from composer.diagnostics import suggestion
+from composer.expressions import map_key
 from composer.interfaces import (
     FLOATS,
     INTEGER_RANGES,
@@ -97,13 +99,22 @@ def resolve_path(
     root: ValueType, parts: tuple[str | int, ...], interfaces: Interfaces
 ) -> ValueType | PathProblem:
     """Return the type of what ``parts`` lead to from ``root``, or where they go wrong."""
-    found = root
-    for index, part in enumerate(parts):
-        step = _element(found, part) if isinstance(part, int) else _field(found, part, interfaces)
+    found, index = root, 0
+    while index < len(parts):
+        name, taken = _next_name(found, parts[index:])
+        step = _element(found, name) if isinstance(name, int) else _field(found, name, interfaces)
         if isinstance(step, _Refused):
             return PathProblem(step.message, index, step.hint)
-        found = step
+        found, index = step, index + taken
     return found
+
+
+def _next_name(type_: ValueType, parts: tuple[str | int, ...]) -> tuple[str | int, int]:
+    """Return the next field, key or index of a path, and how many parts it takes."""
+    if not isinstance(type_, Mapping) or isinstance(parts[0], int):
+        return parts[0], 1
+    names = takewhile(lambda part: isinstance(part, str), parts)
+    return map_key(type_, [str(name) for name in names])
 
 
 def fields_of(type_: ValueType, interfaces: Interfaces) -> Message | None:

@@ -59,6 +59,7 @@ SCOPE: Scope = {
         "rate_hz": parameter_type("double"),
         "names": parameter_type("string_array"),
         "odd": parameter_type("oddity"),
+        "camera.fps": parameter_type("integer"),
     },
     "state": {"last_s": type_of(0), "seen": type_of(True), "free": type_of(None)},
 }

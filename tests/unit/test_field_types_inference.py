@@ -49,6 +49,7 @@ TYPES = [
     ("missing", "of unknown type"),
     ("message", "demo_msgs/msg/Everything"),
     ("parameters", "a map"),
+    ("parameters.camera.fps", "int64"),
     ("abs(-1)", "int64"),
     ("atan2(1, 2)", "float64"),
     ("bool(1)", "bool"),
