@@ -12,7 +12,7 @@ from pathlib import Path
 
 from composer.catalog import Catalog, interface_folders
 from composer.checks import Context, run_checks
-from composer.diagnostics import Diagnostic, has_errors, in_order
+from composer.diagnostics import Diagnostic, Severity, has_errors, in_order
 from composer.document import parse_bytes, read_document
 from composer.expand import expand
 from composer.interfaces import Interfaces
@@ -102,7 +102,9 @@ def _load(
     system, findings = _resolved(tree, source, known, overrides) if tree else (None, [])
     findings = [*found, *findings]
     if system is not None:
-        findings.extend(run_checks(Context(system, known.interfaces, known.catalog)))
+        refused = tuple(item.primary for item in findings if item.severity is Severity.ERROR)
+        context = Context(system, known.interfaces, known.catalog, refused)
+        findings.extend(run_checks(context))
     return Loading(system, in_order(findings), source, known.catalog, known.interfaces)
 
 

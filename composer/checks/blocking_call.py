@@ -66,6 +66,7 @@ _BLOCKING = re.compile(
 #: rclpy's own synchronous call; those of the composer's clients are awaited.
 _SYNCHRONOUS_CALL = re.compile(r"(.+\.)?\w*(client|cli)\.call")
 
+
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at what the handlers of every behaviour call, also through their own methods."""
     for node, source in context.once(behaviors):

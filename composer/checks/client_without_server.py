@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
-from composer.checks.wiring import lonely_ends
+from composer.checks.wiring import lonely_ends, place_of
 from composer.checks.words import end_name, nearest_channel
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import PortKind
@@ -41,11 +41,13 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for kind in (PortKind.CLIENT, PortKind.ACTION_CLIENT):
         for end in lonely_ends(context, kind):
             if end.port.required is None:
+                place, labels = place_of(context, end)
                 yield Diagnostic(
                     RULE,
                     f"nobody in this system serves '{end.port.full_name}', "
                     f"which '{end_name(end)}' calls",
-                    end.port.name.span,
-                    hint=nearest_channel(context.channels, end)
+                    place,
+                    labels,
+                    nearest_channel(context.channels, end)
                     or "say 'external: true' if somebody outside does",
                 )

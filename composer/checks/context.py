@@ -22,11 +22,16 @@ _DEFINITIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """A system, and what there is to hold it against."""
+    """A system, and what there is to hold it against.
+
+    ``refused`` are the places of the errors that earlier stages found: what they stand in came into
+    the model in part or not at all.
+    """
 
     system: System
     interfaces: Interfaces
     catalog: Catalog
+    refused: tuple[Span, ...] = ()
     _answers: dict[Callable[[Context], Any], Any] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )

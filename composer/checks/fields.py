@@ -34,7 +34,8 @@ class _Names(dict[str, ValueType]):
         return ANYTHING
 
     def __contains__(self, name: object) -> bool:
-        return True
+        # A name with dots is a parameter's, and not the field of what the part before it holds.
+        return super().__contains__(name) or "." not in str(name)
 
     def get(self, name: str, _default: Any = None) -> Any:
         return self[name]

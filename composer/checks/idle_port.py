@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from composer.checks.behaviors import handlers
 from composer.checks.context import Context
+from composer.checks.doubt import doubt
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import Node, PortKind
 
@@ -43,8 +44,9 @@ _HINTS = {
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at nodes without behaviour."""
+    suspects = context.once(doubt).nodes
     for node in context.system.nodes:
-        if node.behavior is None and node.complete:
+        if node.behavior is None and node.complete and node.name.value not in suspects:
             yield from _node(node)
 
 

@@ -24,13 +24,16 @@ RULE = register(
 system: names
 nodes:
   talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command, topic: /news//today}}
+    publishers:
+      chatter:
+        {type: std_msgs/msg/String, qos: command, topic: /news//today, external: true}
 """,
         good="""\
 system: names
 nodes:
   talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command, topic: /news/today}}
+    publishers:
+      chatter: {type: std_msgs/msg/String, qos: command, topic: /news/today, external: true}
 """,
     )
 )

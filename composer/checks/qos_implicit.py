@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
+from composer.checks.doubt import doubt
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import ChannelKind
 
@@ -37,8 +38,9 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the ends of topics; services and actions have one usual profile."""
+    suspects = context.once(doubt).nodes
     for node in context.system.nodes:
-        for port in node.ports:
+        for port in node.ports if node.name.value not in suspects else ():
             if port.kind.channel is ChannelKind.TOPIC and not port.qos.explicit:
                 yield Diagnostic(
                     RULE,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
-from composer.checks.wiring import lonely_ends
+from composer.checks.wiring import lonely_ends, place_of
 from composer.checks.words import end_name, nearest_channel
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import PortKind
@@ -45,11 +45,13 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Look for topics with subscriptions only."""
     for end in lonely_ends(context, PortKind.SUBSCRIPTION):
         if end.port.required is None:
+            place, labels = place_of(context, end)
             yield Diagnostic(
                 RULE,
                 f"nobody in this system publishes '{end.port.full_name}', "
                 f"which '{end_name(end)}' subscribes to",
-                end.port.name.span,
-                hint=nearest_channel(context.channels, end)
+                place,
+                labels,
+                nearest_channel(context.channels, end)
                 or "say 'external: true' if somebody outside does",
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
-from composer.checks.wiring import lonely_ends
+from composer.checks.wiring import lonely_ends, place_of
 from composer.checks.words import end_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import PortKind
@@ -40,10 +40,12 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Look for topics with publishers only."""
     for end in lonely_ends(context, PortKind.PUBLISHER):
         if end.port.required is None:
+            place, labels = place_of(context, end)
             yield Diagnostic(
                 RULE,
                 f"nobody in this system subscribes to '{end.port.full_name}', "
                 f"which '{end_name(end)}' publishes",
-                end.port.name.span,
-                hint="say 'external: true' if somebody outside does",
+                place,
+                labels,
+                "say 'external: true' if somebody outside does",
             )

@@ -15,18 +15,18 @@ RULE = register(
         summary="A node's type is neither in the project's nodes/ nor one of the composer's own.",
         why="Without its type nothing is known of the node: neither its ports nor its behaviour.",
         bad="""\
-system: relays
+system: stubs
 nodes:
-  first:
-    type: rellay
-    variables: {message_type: std_msgs/msg/String}
+  planner:
+    type: servce_stub
+    variables: {service_type: std_srvs/srv/Trigger}
 """,
         good="""\
-system: relays
+system: stubs
 nodes:
-  first:
-    type: relay
-    variables: {message_type: std_msgs/msg/String}
+  planner:
+    type: service_stub
+    variables: {service_type: std_srvs/srv/Trigger}
 """,
     )
 )

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
+from composer.checks.doubt import doubt
 from composer.checks.places import part_of_path
 from composer.checks.sites import sites
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.source import Span
 
 RULE = register(
     Rule(
@@ -25,6 +27,7 @@ nodes:
   source:
     type: timer_source
     variables: {message_type: std_msgs/msg/String}
+    publishers: {output: {external: true}}
     parameters: {rate: 2.0}
 """,
         good="""\
@@ -33,6 +36,7 @@ nodes:
   source:
     type: timer_source
     variables: {message_type: std_msgs/msg/String}
+    publishers: {output: {external: true}}
     parameters: {rate_hz: 2.0}
 """,
     )
@@ -50,21 +54,25 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     unknown.name.span,
                     hint=suggestion(unknown.name.value, unknown.known),
                 )
+    doubts = context.once(doubt)
     known = {
         node.name.value: [parameter.name.value for parameter in node.parameters]
         for node in context.system.nodes
     }
     names = {node: frozenset(declared) for node, declared in known.items()}
+    for node_name, name, span in _uses(context):
+        if name not in names[node_name] and not doubts.may_have(node_name, "parameters"):
+            yield Diagnostic(
+                RULE,
+                f"the node declares no parameter '{name}'",
+                span,
+                hint=suggestion(name, known[node_name]),
+            )
+
+
+def _uses(context: Context) -> Iterator[tuple[str, str, Span]]:
     for site in sites(context.system):
         for path in site.expression.paths:
-            if path.root != "parameters" or len(path.parts) < 2:
-                continue
-            name = str(path.parts[1])
-            node_name = site.node.name.value
-            if name not in names[node_name]:
-                yield Diagnostic(
-                    RULE,
-                    f"the node declares no parameter '{name}'",
-                    part_of_path(site.span, site.expression, path, 1),
-                    hint=suggestion(name, known[node_name]),
-                )
+            if path.root == "parameters" and len(path.parts) > 1:
+                span = part_of_path(site.span, site.expression, path, 1)
+                yield site.node.name.value, str(path.parts[1]), span

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context, is_opaque
+from composer.checks.doubt import PORT_SECTIONS, doubt
 from composer.checks.places import part_of
 from composer.checks.reactions import sends
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
@@ -21,14 +22,14 @@ RULE = register(
 system: ports
 nodes:
   talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
     timers: {tick: {period_ms: 1000, publish: {chattter: {data: hello}}}}
 """,
         good="""\
 system: ports
 nodes:
   talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
     timers: {tick: {period_ms: 1000, publish: {chatter: {data: hello}}}}
 """,
     )
@@ -43,12 +44,16 @@ _SENDERS = {
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the ends of connections, at what reactions send through, at what instances refine."""
+    doubts = context.once(doubt)
     for connection in context.system.connections:
         for endpoint in (*connection.sources, *connection.sinks):
-            yield from _endpoint(context, endpoint)
+            if not doubts.may_have(endpoint.node, *PORT_SECTIONS):
+                yield from _endpoint(context, endpoint)
     for site, key, send in sends(context.system):
         name = send.port
         if not site.node.complete or is_opaque(name.value):
+            continue
+        if doubts.may_have(site.node.name.value, *PORT_SECTIONS):
             continue
         if site.node.port(name.value) is not None:
             continue

@@ -23,13 +23,13 @@ RULE = register(
 system: profile
 nodes:
   talker:
-    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_dada}}
+    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_dada, external: true}}
 """,
         good="""\
 system: profile
 nodes:
   talker:
-    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
+    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, external: true}}
 """,
     )
 )

@@ -21,14 +21,14 @@ RULE = register(
 system: renamed
 nodes:
   talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
     remappings: {chater: news}
 """,
         good="""\
 system: renamed
 nodes:
   talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
     remappings: {chatter: news}
 """,
     )

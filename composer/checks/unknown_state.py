@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
+from composer.checks.doubt import doubt
 from composer.checks.places import part_of_path
 from composer.checks.reactions import reactions
 from composer.checks.sites import sites
@@ -39,25 +40,25 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at what reactions set and at what expressions read."""
+    doubts = context.once(doubt)
     known = {
         node.name.value: frozenset(name.value for name, _ in node.state)
         for node in context.system.nodes
     }
+    for node, name, span in _uses(context):
+        of_node = node.name.value
+        if name not in known[of_node] and not doubts.may_have(of_node, "state"):
+            names = [declared.value for declared, _ in node.state]
+            hint = suggestion(name, names) or f"declare it: 'state: {{{name}: 0}}'"
+            yield Diagnostic(RULE, f"the node declares no state '{name}'", span, hint=hint)
+
+
+def _uses(context: Context) -> Iterator[tuple[Node, str, Span]]:
     for found in reactions(context.system):
         for name, _ in found.reaction.state:
-            if name.value not in known[found.node.name.value]:
-                yield _finding(found.node, name.value, name.span)
+            yield found.node, name.value, name.span
     for site in sites(context.system):
         for path in site.expression.paths:
-            if path.root != "state" or "state" not in site.names or len(path.parts) < 2:
-                continue
-            read = str(path.parts[1])
-            if read not in known[site.node.name.value]:
+            if path.root == "state" and "state" in site.names and len(path.parts) > 1:
                 span = part_of_path(site.span, site.expression, path, 1)
-                yield _finding(site.node, read, span)
-
-
-def _finding(node: Node, name: str, span: Span) -> Diagnostic:
-    names = [known.value for known, _ in node.state]
-    hint = suggestion(name, names) or f"declare it: 'state: {{{name}: 0}}'"
-    return Diagnostic(RULE, f"the node declares no state '{name}'", span, hint=hint)
+                yield site.node, str(path.parts[1]), span

@@ -20,6 +20,7 @@ nodes:
   source:
     type: timer_source
     variables: {message_type: std_msgs/msg/String}
+    publishers: {output: {external: true}}
     timers: {tock: {rate_hz: 2}}
 """,
         good="""\
@@ -28,6 +29,7 @@ nodes:
   source:
     type: timer_source
     variables: {message_type: std_msgs/msg/String}
+    publishers: {output: {external: true}}
     timers: {tick: {rate_hz: 2}}
 """,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
+from composer.checks.doubt import doubt
 from composer.checks.unknown_executor import DEFAULT
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
@@ -37,7 +38,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Hold the executors against the nodes. One called ``default`` is that of all other nodes."""
     used = {node.executor.value if node.executor else DEFAULT for node in context.system.nodes}
     known = {executor.name.value for executor in context.system.executors} | {DEFAULT}
-    if not used <= known:
+    if not used <= known or context.once(doubt).any:
         return  # the unknown name may be meant for the unused one
     for executor in context.system.executors:
         if executor.name.value not in used:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
+from composer.checks.doubt import doubt
 from composer.checks.unknown_qos_profile import unknown_profiles
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
@@ -36,7 +37,11 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Hold the profiles against their uses."""
-    if context.once(unknown_profiles) or not all(node.complete for node in context.system.nodes):
+    if (
+        context.once(doubt).any
+        or context.once(unknown_profiles)
+        or not all(node.complete for node in context.system.nodes)
+    ):
         return  # what is unknown there may be meant for the unused one
     used = {reference.name.value for reference in context.system.qos_references}
     for profile in context.system.qos_profiles:
