@@ -46,7 +46,7 @@ class Row:
 
 def _wall_time_ms(arguments: Sequence[str]) -> float:
     start = time.perf_counter()
-    subprocess.run([sys.executable, *arguments], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, *arguments], cwd=ROOT, check=True, capture_output=True)
     return (time.perf_counter() - start) * 1000
 
 
