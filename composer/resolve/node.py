@@ -142,7 +142,7 @@ def _typed(type_entry: Entry, tree: Mapping, around: Surroundings) -> Made:
     path = around.types.find(name.value) if name is not None else None
     if path is None:
         return Made(_NOTHING, type_found=False, complete=False)
-    made = around.types.make(path, tree.get("variables"))
+    made = around.types.make(path, tree.get("variables"), type_entry.value.span)
     if made is None:
         return Made(_NOTHING, complete=False)
     unknown = unknown_keys(made.tree, tree) if made.complete else ()

@@ -1,20 +1,37 @@
-"""Node types: their files are read once, and declared once for every set of variables."""
+"""Node types: their files are read once, and made anew for the arguments of each instance."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from composer.catalog import Catalog, shown_path
-from composer.diagnostics import Diagnostic, has_errors
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, has_errors, register
 from composer.document import read_document
-from composer.expand import expand
+from composer.expand import expand, missing_variables
 from composer.resolve.declaration import Declaration, declare
 from composer.resolve.kinds import NODE, check_kind
 from composer.resolve.qos import QosTable
 from composer.resolve.reading import entries
 from composer.schema import check_schema
+from composer.source import Span
 from composer.tree import Mapping, Plain, Tree, plain
+
+RULE = register(
+    Rule(
+        code="RC287",
+        name="missing-variable",
+        severity=Severity.ERROR,
+        summary="A node is not given a variable that its type needs.",
+        why="A variable without default is one that the node type cannot be made without.",
+        bad="system: demo\nnodes:\n  relay: {type: relay}",
+        good=(
+            "system: demo\nnodes:\n"
+            "  relay: {type: relay, variables: {message_type: std_msgs/msg/String}}"
+        ),
+    )
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +56,8 @@ class NodeTypes:
     findings: list[Diagnostic]
     _found: dict[str, Path | None] = field(default_factory=dict)
     _read: dict[Path, Mapping | None] = field(default_factory=dict)
-    _made: dict[tuple[Path, str], NodeType | None] = field(default_factory=dict)
+    _without_variables: dict[Path, NodeType | None] = field(default_factory=dict)
+    _shapes: set[tuple[Path, str]] = field(default_factory=set)
 
     def find(self, name: str) -> Path | None:
         """Return the file of the node type called ``name``, or None."""
@@ -47,27 +65,42 @@ class NodeTypes:
             self._found[name] = self.catalog.find(name)
         return self._found[name]
 
-    def make(self, path: Path, variables: Tree | None) -> NodeType | None:
+    def make(self, path: Path, variables: Tree | None, span: Span) -> NodeType | None:
         """Return the type in the file ``path`` made with ``variables``, or None.
 
-        None stands for a file that cannot be read as a node type; the findings say why.
+        None stands for a file that cannot be read as a node type; the findings say why. ``span``
+        is where the type is asked for.
         """
-        given = {entry.name: entry.value for entry in entries(variables)}
-        values: dict[str, Plain] = {name: plain(value) for name, value in given.items()}
-        made = (path, repr(values))
-        if made not in self._made:
-            self._made[made] = self._make(path, given)
-        return self._made[made]
-
-    def _make(self, path: Path, given: dict[str, Tree]) -> NodeType | None:
         tree = self._document(path)
         if tree is None:
             return None
+        given = {entry.name: entry.value for entry in entries(variables)}
+        if variables is None or isinstance(variables, Mapping):
+            self.findings.extend(_missing(tree, given, span))
+        if given:
+            # Not shared: what an argument stands for is placed where that argument is written.
+            return self._make(path, tree, given)
+        if path not in self._without_variables:
+            self._without_variables[path] = self._make(path, tree, {})
+        return self._without_variables[path]
+
+    def _make(self, path: Path, tree: Mapping, given: dict[str, Tree]) -> NodeType:
         expanded, found = expand(tree, given)
-        found = [*found, *check_schema(expanded, NODE)]
+        found = [*found, *self._misshapen(path, expanded, given)]
         declaration = declare(expanded, path.parent, self.qos, found)
         self.findings.extend(found)
         return NodeType(expanded, path.parent, declaration, complete=not has_errors(found))
+
+    def _misshapen(self, path: Path, expanded: Mapping, given: dict[str, Tree]) -> list[Diagnostic]:
+        """Hold a type against its schema, unless it passed with the very same values before."""
+        values: dict[str, Plain] = {name: plain(value) for name, value in given.items()}
+        shape = (path, repr(values))
+        if shape in self._shapes:
+            return []
+        found = check_schema(expanded, NODE)
+        if not found:
+            self._shapes.add(shape)
+        return found
 
     def _document(self, path: Path) -> Mapping | None:
         if path not in self._read:
@@ -84,3 +117,17 @@ class NodeTypes:
             self.findings.append(wrong_kind)
             return None
         return tree
+
+
+def _missing(tree: Mapping, given: dict[str, Tree], span: Span) -> Iterator[Diagnostic]:
+    declared = {entry.name: entry for entry in entries(tree.get("variables"))}
+    owner = tree.get("node")
+    name = plain(owner) if owner is not None else ""
+    for variable in missing_variables(tree, given):
+        yield Diagnostic(
+            RULE,
+            f"node type '{name}' needs a value for its variable '{variable}'",
+            span,
+            (Label(declared[variable].key.span, "declared without default"),),
+            f"add 'variables: {{{variable}: ...}}' to the node",
+        )

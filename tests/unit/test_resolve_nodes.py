@@ -236,7 +236,7 @@ def test_a_type_file_with_errors_tells_them_once_and_is_not_complete(nodes: Path
 
 def test_an_error_in_an_expression_of_a_type_is_told_once(nodes: Path) -> None:
     (nodes / "broken.yaml").write_text(
-        "node: broken\nvariables: {text: {default: a}}\n"
+        "node: broken\nvariables: {text: {default: a}}\ndescription: ${text}\n"
         "timers: {tick: {period_ms: 5, when: 1 +}}\n"
         "publishers: {out: {type: std_msgs/msg/String}}\n"
     )
@@ -290,3 +290,51 @@ def test_a_file_that_is_neither_has_a_finding() -> None:
     assert system is None
     assert finding.message == "'compose.yaml' is neither a system nor a node type"
     assert quoted(finding.primary) == "nodes"
+
+
+def test_a_variable_without_default_must_be_given(tmp_path: Path) -> None:
+    (tmp_path / "relay.yaml").write_text(
+        "node: relay\nvariables: {kind: {}}\nsubscriptions: {in: {type: '${kind}'}}\n"
+    )
+    system, findings = resolve_text(
+        """\
+        system: robot
+        nodes:
+          good: {type: relay, variables: {kind: x/msg/X}}
+          bad: {type: relay}
+          worse: {type: relay}
+        """,
+        tmp_path,
+    )
+    assert [(finding.rule.name, finding.primary.line) for finding in findings] == [
+        ("missing-variable", 4),
+        ("missing-variable", 5),
+    ]
+    assert findings[0].message == "node type 'relay' needs a value for its variable 'kind'"
+    assert quoted(findings[0].primary) == "relay"
+    assert quoted(findings[0].related[0].span) == "kind"
+    assert [node.ports[0].interface.value for node in system.nodes] == [
+        "x/msg/X",
+        "${kind}",
+        "${kind}",
+    ]
+
+
+def test_what_is_wrong_in_an_argument_is_told_at_every_argument(tmp_path: Path) -> None:
+    (tmp_path / "filter.yaml").write_text(
+        "node: filter\nvariables: {condition: {}, count: {default: 1}}\n"
+        "subscriptions: {in: {type: x/msg/X, when: '${condition}', required: '${count}'}}\n"
+    )
+    _, findings = resolve_text(
+        """\
+        system: robot
+        nodes:
+          one: {type: filter, variables: {condition: 1 +, count: true}}
+          two: {type: filter, variables: {condition: 1 +, count: true}}
+          three: {type: filter, variables: {condition: count > 1, count: [1]}}
+          four: {type: filter, variables: {condition: count > 1, count: [1]}}
+        """,
+        tmp_path,
+    )
+    assert [finding.primary.line for finding in findings] == [3, 4, 5, 6]
+    assert {finding.primary.file.path for finding in findings} == {"robot.yaml"}
