@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.client import Client
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.subscription import Subscription
@@ -17,7 +19,7 @@ from composer.runtime.loop import ExceptionHandler, Reply
 from composer.runtime.node_executor import NodeExecutor
 from composer.runtime.scheduler import Scheduler
 from composer.runtime.slots import Slot
-from composer.runtime.sources import Source
+from composer.runtime.sources import Source, comes_by_itself
 
 _EXPIRY_PERIOD_S = 1.0  # how often action servers drop the results that nobody fetched
 
@@ -30,18 +32,22 @@ class EventLoop(Scheduler):
         self._slots_of: dict[object, Slot] = {}  # by the entity that was added
         self._nodes: dict[Node, _NodeEntities] = {}
         self._futures = NodeExecutor(self, lambda: None)
+        # An entity has one announcement only, so two threads must not hand it to two slots.
+        self._changing = threading.RLock()
 
     def add_node(self, node: Node) -> None:
-        """Serve what every node brings along: its services, its clients, its QoS events."""
-        self._nodes[node] = _NodeEntities(self, node)
+        """Serve what every node brings along: its services, its clock, its QoS events."""
+        with self._changing:
+            self._nodes[node] = _NodeEntities(self, node, self._changing)
 
     def remove_node(self, node: Node) -> None:
         """Stop serving the node and everything of it."""
-        entities = self._nodes.pop(node, None)
-        if entities is not None:
-            entities.close()
-        for entity in _entities_of(node):
-            self.remove(entity)
+        with self._changing:
+            entities = self._nodes.pop(node, None)
+            if entities is not None:
+                entities.close()
+            for entity in _entities_of(node):
+                self.remove(entity)
 
     def add_subscription(self, subscription: Subscription, callback: Callable[[Any], None]) -> None:
         """Call ``callback(message)`` for each message."""
@@ -67,23 +73,21 @@ class EventLoop(Scheduler):
 
     def remove(self, entity: object) -> None:
         """Stop serving one entity. To be called before it is destroyed."""
-        slot = self._slots_of.pop(entity, None)
-        if slot is not None:
-            self.close_slot(slot)
-
-    def serves(self, entity: object) -> bool:
-        """Tell whether the entity was added by itself, not with its node."""
-        return entity in self._slots_of
+        with self._changing:
+            slot = self._slots_of.pop(entity, None)
+            if slot is not None:
+                self.close_slot(slot)
 
     def own_source(self, entity: object) -> Source | None:
         """Return the source for what came with a node, or None where there is nothing to do."""
         return sources.source_of(entity, self._futures, self.run_task)
 
     def _add(self, entity: object, source: Source) -> None:
-        self.remove(entity)
-        for entities in list(self._nodes.values()):
-            entities.let_go(entity)
-        self._slots_of[entity] = self.open_slot(source)
+        with self._changing:
+            self.remove(entity)
+            for entities in self._nodes.values():
+                entities.let_go(entity)
+            self._slots_of[entity] = self.open_slot(source)
 
     def _expire(self, server: ActionServer) -> None:
         if server not in self._slots_of:
@@ -99,16 +103,18 @@ class _NodeEntities:
     Rarely used, all of it; a file descriptor for each would be thousands in a large system.
     """
 
-    def __init__(self, loop: EventLoop, node: Any) -> None:
+    def __init__(self, loop: EventLoop, node: Any, changing: threading.RLock) -> None:
         self._loop = loop
         self._node = node
+        self._changing = changing
         self._slot = loop.open_slot()
         self._sources: dict[object, Source] = {}
         self._look_due = False
         self._closed = False
         self._executor = NodeExecutor(loop, self._look_soon)  # the node refers to it weakly
         node.executor = self._executor
-        self._look()
+        for entity in _entities_of(node):
+            self._serve(entity)
 
     def let_go(self, entity: object) -> None:
         """Leave the entity to whoever adds it by itself."""
@@ -129,17 +135,26 @@ class _NodeEntities:
             self._loop.call_soon(self._look)
 
     def _look(self) -> None:
-        self._look_due = False
-        if self._closed:
+        """Find what the node got or lost meanwhile."""
+        with self._changing:
+            self._look_due = False
+            if self._closed:
+                return
+            present = _entities_of(self._node)
+            for gone in self._sources.keys() - set(present):
+                self.let_go(gone)
+            for entity in filter(comes_by_itself, present):
+                self._serve(entity)
+
+    def _serve(self, entity: object) -> None:
+        source = None if entity in self._sources else self._loop.own_source(entity)
+        if source is None:
             return
-        present = [entity for entity in _entities_of(self._node) if not self._loop.serves(entity)]
-        for gone in self._sources.keys() - set(present):
-            self.let_go(gone)
-        for entity in present:
-            source = None if entity in self._sources else self._loop.own_source(entity)
-            if source is not None:
-                self._sources[entity] = source
-                self._slot.add(source)
+        try:
+            self._slot.add(source)
+        except InvalidHandle:
+            return  # destroyed meanwhile
+        self._sources[entity] = source
 
 
 def _entities_of(node: Any) -> list[object]:

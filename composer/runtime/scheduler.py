@@ -72,7 +72,7 @@ class Scheduler:
         """Run a coroutine; the future is its outcome. Cancelling the future closes it."""
         task = Task(coroutine, self.call_soon, self._report, self._tasks.discard)
         self._tasks.add(task)
-        return task.future
+        return task.start()
 
     def run(self, function: Callable[[], T], timeout_s: float | None = None) -> T:
         """Call ``function`` on the loop and wait for it (at once when already there).

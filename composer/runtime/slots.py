@@ -17,9 +17,13 @@ class Slot:
         self.queued = False  # true while in the ready deque, so that it is in there once
 
     def add(self, source: Source) -> None:
-        """Serve ``source`` from now on."""
+        """Serve ``source`` from now on. Raises InvalidHandle when its entity is destroyed."""
         self.sources = (*self.sources, source)
-        source.attach(self.signal)
+        try:
+            source.attach(self.signal)
+        except BaseException:
+            self.discard(source)
+            raise
 
     def discard(self, source: Source) -> None:
         """Serve ``source`` no more."""

@@ -15,6 +15,7 @@ from rclpy.client import Client
 from rclpy.event_handler import EventHandler
 from rclpy.service import Service
 from rclpy.subscription import Subscription
+from rclpy.time_source import TimeSource
 
 from composer.runtime import readiness
 from composer.runtime.readiness import Signal
@@ -204,6 +205,7 @@ class EventSource:
     def __init__(self, handler: Any) -> None:
         self._handler = handler
         self._handle = handler._EventHandler__event
+        self._seen: tuple[object, ...] = ()
 
     @property
     def name(self) -> str:
@@ -219,10 +221,19 @@ class EventSource:
         signal.detach(self._handle)
 
     def take(self) -> Any:
-        """Return the status, unless nothing changed in it: rcl always has a status."""
+        """Return the status, unless nothing happened: rcl always has a status.
+
+        Its ``..._change`` fields do not tell: attaching sets them back to nothing.
+        """
         status = self._handle.take_event()
-        changes = (name for name in dir(status) if name.endswith("_change"))
-        return status if any(getattr(status, name) for name in changes) else None
+        fields = [name for name in dir(status) if name.endswith(("_count", "_count_change"))]
+        counts = tuple(getattr(status, name) for name in fields)
+        happened = any(counts) and counts != self._seen
+        self._seen = tuple(
+            0 if name.endswith("_change") else count
+            for name, count in zip(fields, counts, strict=True)
+        )
+        return status if happened else None
 
     def call(self, taken: Any) -> None:
         """Call with the status."""
@@ -244,3 +255,11 @@ def source_of(entity: object, executor: object, run_task: RunTask) -> Source | N
         case EventHandler():
             return EventSource(entity)
     return None
+
+
+def comes_by_itself(entity: object) -> bool:
+    """Tell whether nobody adds the entity, though the node got it late: QoS events, the clock."""
+    callback = getattr(entity, "callback", None)
+    return isinstance(entity, EventHandler) or isinstance(
+        getattr(callback, "__self__", None), TimeSource
+    )

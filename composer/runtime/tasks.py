@@ -187,7 +187,11 @@ class Task(Generic[T]):
         self._finished = False
         self.future: Future[T] = Future(self._report)
         self.future.add_done_callback(self._cancel)
-        call_soon(self._begin)
+
+    def start(self) -> Future[T]:
+        """Have the loop begin; return the outcome."""
+        self._call_soon(self._begin)
+        return self.future
 
     def close(self) -> None:
         """End the coroutine now, on the calling thread, as when nothing will ever resume it."""

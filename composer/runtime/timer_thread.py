@@ -6,15 +6,27 @@ import threading
 from collections.abc import Callable
 from functools import partial
 from time import monotonic
+from typing import Protocol
 
+from composer.runtime.tasks import name_of
 from composer.runtime.timers import ScheduledCall, TimerHeap
+
+
+class Caller(Protocol):
+    """The part of a loop that is needed here."""
+
+    def call_soon(self, callback: Callable[[], object]) -> None:
+        """Call ``callback`` on the loop as soon as it is free."""
+
+    def call(self, name: Callable[[], str], callback: Callable[[], object]) -> None:
+        """Call ``callback`` on the current thread; what it raises is reported."""
 
 
 class TimerThread:
     """Hands calls to a loop when they are due. A periodic call is never handed over twice."""
 
-    def __init__(self, name: str, call_soon: Callable[[Callable[[], object]], None]) -> None:
-        self._call_soon = call_soon
+    def __init__(self, loop: Caller, name: str) -> None:
+        self._loop = loop
         self._timers = TimerHeap()
         self._changed = threading.Condition()
         self._stopping = False
@@ -48,14 +60,12 @@ class TimerThread:
                     continue
                 due = self._timers.take_due()
             for call in due:
-                self._call_soon(partial(self._call, call))
+                self._loop.call_soon(partial(self._call, call))
 
     def _call(self, call: ScheduledCall) -> None:
         if call.cancelled or self._stopping:
             return
-        try:
-            call.callback()
-        finally:
-            with self._changed:
-                self._timers.repeat(call)
-                self._changed.notify()
+        self._loop.call(partial(name_of, call.callback), call.callback)
+        with self._changed:
+            self._timers.repeat(call)
+            self._changed.notify()

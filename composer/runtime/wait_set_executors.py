@@ -29,12 +29,14 @@ from rclpy.executors import (
     ShutdownException,
     SingleThreadedExecutor,
 )
+from rclpy.guard_condition import GuardCondition
 from rclpy.task import Future as RclpyFuture
+from rclpy.timer import Timer
 
 from composer.runtime import actions
 from composer.runtime.loop import Loop
 from composer.runtime.node_executor import NodeExecutor
-from composer.runtime.sources import Source, source_of
+from composer.runtime.sources import Source, comes_by_itself, source_of
 
 _Execute = Callable[[], Coroutine[Any, Any, None]]
 _END = None  # what a thread of the pool finds in the queue when it is to end
@@ -58,19 +60,25 @@ class MendedExecutor(Executor):
         self._loop = loop
         self._for_nodes = NodeExecutor(loop, lambda: None)
         self._sources: dict[object, Source] = {}  # of the entities that were added by themselves
-        self._removed: WeakSet[Any] = WeakSet()
+        self._served: WeakSet[Any] = WeakSet()
         self._ending = False
 
     def serve(self, entity: object, source: Source | None) -> None:
         """Serve an entity by ``source``, or as rclpy does."""
-        self._removed.discard(entity)
         if source is not None:
             self._sources[entity] = source
+        self._served.add(entity)
         self.wake()
+
+    def serve_all_of(self, node: Any) -> None:
+        """Serve what the node has by now, as rclpy does."""
+        for entities in (node.subscriptions, node.services, node.clients, node.waitables):
+            self._served.update(entities)
+        self.add_node(node)
 
     def forget(self, entity: object) -> None:
         """Serve an entity no more."""
-        self._removed.add(entity)
+        self._served.discard(entity)
         self._sources.pop(entity, None)
         self.wake()
 
@@ -85,8 +93,9 @@ class MendedExecutor(Executor):
         return self._for_nodes.create_task(callback, *args, **kwargs)
 
     def can_execute(self, entity: Any) -> bool:
-        """Leave out what was removed."""
-        return entity not in self._removed and bool(super().can_execute(entity))
+        """Leave out what nobody added: its callback may not be the one it is for."""
+        served = entity in self._served or comes_by_itself(entity) or _is_rclpy_only(entity)
+        return served and bool(super().can_execute(entity))
 
     def turn(self) -> bool:
         """Wait for a handler and run it; false when there will be none any more."""
@@ -200,6 +209,11 @@ class MendedMultiThreadedExecutor(MendedExecutor):
                 with self._tasks_lock:
                     self._tasks.append((handler, None, None))
                 self.wake()
+
+
+def _is_rclpy_only(entity: object) -> bool:
+    """Tell whether a loop has no way to be given the entity, so that it is served as it is."""
+    return isinstance(entity, Timer | GuardCondition)
 
 
 def _take(source: Source) -> Any:

@@ -55,7 +55,7 @@ class WaitSetLoop:
             if threads is None
             else MendedMultiThreadedExecutor(self, threads)
         )
-        self._timers = TimerThread(f"{name} timers", self.call_soon)
+        self._timers = TimerThread(self, f"executor {name}, timers")
         self._thread = threading.Thread(target=self._spin, name=f"executor {name}", daemon=True)
 
     @property
@@ -67,7 +67,7 @@ class WaitSetLoop:
 
     def add_node(self, node: Node) -> None:
         """Serve what every node brings along."""
-        self._executor.add_node(node)
+        self._executor.serve_all_of(node)
 
     def remove_node(self, node: Any) -> None:
         """Stop serving the node and everything of it."""
@@ -123,7 +123,7 @@ class WaitSetLoop:
         """Run a coroutine; the future is its outcome. Cancelling the future closes it."""
         task = Task(coroutine, self.call_soon, self.report, self._tasks.discard)
         self._tasks.add(task)
-        return task.future
+        return task.start()
 
     def run(self, function: Callable[[], T], timeout_s: float | None = None) -> T:
         """Call ``function`` on the loop and wait for it (at once when already there).

@@ -33,9 +33,9 @@ def start(calls: Calls, awaited: Any) -> Future[Any]:
     def report(what: str, error: BaseException) -> None:
         raise error
 
-    task = Task(outer(), calls.waiting.append, report, lambda _: None)
+    future = Task(outer(), calls.waiting.append, report, lambda _: None).start()
     calls.run()
-    return task.future
+    return future
 
 
 def test_an_rclpy_future_is_not_polled() -> None:

@@ -49,7 +49,9 @@ class Loop:
         self.reports.append((what, error))
 
     def task(self, coroutine: Coroutine[Any, Any, Any]) -> Task[Any]:
-        return Task(coroutine, self.call_soon, self.report, self.count_end)
+        task = Task(coroutine, self.call_soon, self.report, self.count_end)
+        task.start()
+        return task
 
     def count_end(self, _: object) -> None:
         self.ended += 1
