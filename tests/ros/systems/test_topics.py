@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from rclpy.qos import QoSPresetProfiles
+from rclpy.qos import DurabilityPolicy, QoSPresetProfiles, QoSProfile
 from std_msgs.msg import String
 
 from tests.ros.systems.running import REPOSITORY, Outsider, RunningSystem
@@ -52,9 +52,7 @@ def test_a_late_joiner_gets_the_state_but_not_the_stream_it_missed(outsider: Out
 def test_a_late_joiner_from_outside_gets_the_state(outsider: Outsider) -> None:
     with RunningSystem("systems/qos_patterns.yaml") as system:
         system.wait_for(r"early_listener.*order 1$")
-        latched = QoSPresetProfiles.SYSTEM_DEFAULT.value
-        latched.depth = 1
-        latched.durability = latched.durability.TRANSIENT_LOCAL
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         heard = outsider.listen(String, "/mode", latched)
         outsider.spin_until(lambda: len(heard) == 1)
         assert heard[0].data == "ready"
