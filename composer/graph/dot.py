@@ -32,9 +32,9 @@ def render(graph: Graph) -> str:
 
 
 def _lines(graph: Graph) -> Iterator[str]:
-    yield f"digraph {_quoted(graph.title)} {{"
+    yield f"digraph {_key(graph.title)} {{"
     yield f"  graph [rankdir={graph.direction}, compound=true, labelloc=t, {_font(14)}];"
-    yield f"  graph [label={_quoted(f'{graph.title}: {graph.view}')}];"
+    yield f"  graph [label={_text(f'{graph.title}: {graph.view}')}];"
     yield f"  node [{_font(11)}];"
     yield f"  edge [{_font(9)}];"
     yield from _inside("", graph, "  ")
@@ -57,8 +57,8 @@ def _inside(around: str, graph: Graph, indent: str) -> Iterator[str]:
 
 
 def _frame(cluster: Cluster, graph: Graph, indent: str) -> Iterator[str]:
-    yield f"{indent}subgraph {_quoted(f'cluster_{cluster.key}')} {{"
-    yield f'{indent}  graph [label={_quoted(cluster.label)}, style=rounded, color="#94a3b8"];'
+    yield f"{indent}subgraph {_key(f'cluster_{cluster.key}')} {{"
+    yield f'{indent}  graph [label={_text(cluster.label)}, style=rounded, color="#94a3b8"];'
     yield from _inside(cluster.key, graph, indent + "  ")
     yield f"{indent}}}"
 
@@ -66,8 +66,8 @@ def _frame(cluster: Cluster, graph: Graph, indent: str) -> Iterator[str]:
 def _vertex(vertex: Vertex) -> str:
     attributes = [f"label={_label(vertex.lines)}", _VERTICES[vertex.kind]]
     if vertex.wrong:
-        attributes += [_WRONG, f"tooltip={_quoted(vertex.wrong)}"]
-    return f"{_quoted(vertex.key)} [{', '.join(attributes)}]"
+        attributes += [_WRONG, f"tooltip={_text(vertex.wrong)}"]
+    return f"{_key(vertex.key)} [{', '.join(attributes)}]"
 
 
 def _edge(edge: Edge) -> str:
@@ -75,18 +75,24 @@ def _edge(edge: Edge) -> str:
     if edge.lines:
         attributes.append(f"label={_label(edge.lines)}")
     if edge.wrong:
-        attributes += [_WRONG, f"tooltip={_quoted(edge.wrong)}"]
-    return f"{_quoted(edge.source)} -> {_quoted(edge.target)} [{', '.join(attributes)}]"
+        attributes += [_WRONG, f"tooltip={_text(edge.wrong)}"]
+    return f"{_key(edge.source)} -> {_key(edge.target)} [{', '.join(attributes)}]"
 
 
 def _label(lines: tuple[str, ...]) -> str:
     return '"' + "\\n".join(map(_escaped, lines)) + '"'
 
 
-def _quoted(text: str) -> str:
+def _key(key: str) -> str:
+    """Quote a name that is not shown: only the quote itself is special in it."""
+    return '"' + key.replace('"', '\\"') + '"'
+
+
+def _text(text: str) -> str:
     return f'"{_escaped(text)}"'
 
 
 def _escaped(text: str) -> str:
-    """Escape for a quoted string; a line break within a text becomes one in the picture."""
-    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    """Escape what is shown: backslashes begin sequences in it, ampersands HTML's entities."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("&", "&amp;")
+    return escaped.replace("\n", "\\n")

@@ -64,7 +64,7 @@ def _rules(colors: _Colors) -> str:
         f"text{{fill:{colors.text}}}",
         f".faint,.frame-label,.edge-label{{fill:{colors.faint}}}",
         f".frame{{fill:{colors.frame};stroke:{colors.frame_line}}}",
-        f".label-back{{fill:{colors.label}}}",
+        f".label-back{{fill:{colors.label};fill-opacity:.85}}",
     ]
     for kind, (fill, line) in colors.kinds.items():
         rules.append(f".shape.{kind}{{fill:{fill};stroke:{line}}}")

@@ -1,0 +1,156 @@
+"""What holds for every layout: nothing overlaps, frames hold theirs, same input same picture."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from composer.graph.layout import Layout, Place, arrange
+from composer.graph.picture import Cluster, Direction, Edge, Graph, Kind, Line, Vertex
+from composer.graph.svg import sizes
+
+
+def graph_of(
+    vertices: dict[str, str],
+    edges: list[tuple[str, str]],
+    clusters: list[tuple[str, str]] | None = None,
+    direction: Direction = Direction.RIGHT,
+) -> Graph:
+    return Graph(
+        title="test",
+        view="nodes",
+        direction=direction,
+        vertices=tuple(Vertex(key, Kind.NODE, (key,), around) for key, around in vertices.items()),
+        edges=tuple(Edge(begin, end, Line.TOPIC, (f"{begin} to {end}",)) for begin, end in edges),
+        clusters=tuple(Cluster(key, key, parent) for key, parent in clusters or []),
+    )
+
+
+def laid_out(graph: Graph) -> Layout:
+    return arrange(graph, sizes(graph))
+
+
+def overlap(first: Place, second: Place) -> bool:
+    return (
+        abs(first.center.x - second.center.x) * 2 < first.size.width + second.size.width
+        and abs(first.center.y - second.center.y) * 2 < first.size.height + second.size.height
+    )
+
+
+def holds(outer: Place, inner: Place) -> bool:
+    return (
+        outer.left <= inner.left
+        and outer.top <= inner.top
+        and inner.left + inner.size.width <= outer.left + outer.size.width
+        and inner.top + inner.size.height <= outer.top + outer.size.height
+    )
+
+
+def test_a_chain_runs_from_left_to_right_in_a_straight_line() -> None:
+    layout = laid_out(graph_of(dict.fromkeys("abc", ""), [("a", "b"), ("b", "c")]))
+    places = [place for _, place in layout.vertices]
+    assert places[0].center.x < places[1].center.x < places[2].center.x
+    assert len({round(place.center.y, 3) for place in places}) == 1
+
+
+def test_a_chain_runs_downwards_when_asked_to() -> None:
+    graph = graph_of(dict.fromkeys("ab", ""), [("a", "b")], direction=Direction.DOWN)
+    (_, first), (_, second) = laid_out(graph).vertices
+    assert first.center.y < second.center.y
+    assert first.center.x == second.center.x
+
+
+def test_an_edge_begins_at_its_source_and_ends_at_its_target_also_against_the_direction() -> None:
+    graph = graph_of(dict.fromkeys("ab", ""), [("a", "b"), ("b", "a")])
+    layout = laid_out(graph)
+    places = {vertex.key: place for vertex, place in layout.vertices}
+    for path in layout.paths:
+        begin, end = path.points[0], path.points[-1]
+        source, target = places[path.edge.source], places[path.edge.target]
+        assert abs(begin.x - source.center.x) == source.size.width / 2
+        assert abs(end.x - target.center.x) == target.size.width / 2
+
+
+def test_no_vertices_make_an_empty_picture() -> None:
+    layout = laid_out(graph_of({}, []))
+    assert layout.vertices == ()
+    assert layout.size.width > 0
+
+
+def test_a_cluster_without_vertices_is_not_drawn() -> None:
+    layout = laid_out(graph_of({"a": "full"}, [], [("full", ""), ("empty", "")]))
+    assert [frame.cluster.key for frame in layout.frames] == ["full"]
+
+
+def test_a_frame_is_wide_enough_for_its_label() -> None:
+    long_name = "/a/namespace/with/a/very/long/name"
+    graph = graph_of({"a": long_name}, [], [(long_name, "")])
+    layout = laid_out(graph)
+    assert layout.frames[0].place.size.width >= sizes(graph).frames[long_name].width
+
+
+@st.composite
+def graphs(draw: st.DrawFn) -> Graph:
+    count = draw(st.integers(1, 12))
+    names = [f"v{number}" for number in range(count)]
+    groups = [f"g{number}" for number in range(draw(st.integers(0, 4)))]
+    clusters = [
+        (group, draw(st.sampled_from(["", *groups[:number]])))
+        for number, group in enumerate(groups)
+    ]
+    vertices = {name: draw(st.sampled_from(["", *groups])) for name in names}
+    pair = st.tuples(st.sampled_from(names), st.sampled_from(names))
+    edges = draw(st.lists(pair, max_size=20))
+    return graph_of(vertices, edges, clusters, draw(st.sampled_from(Direction)))
+
+
+@settings(max_examples=60, deadline=None)
+@given(graphs())
+def test_nothing_overlaps_that_must_not(graph: Graph) -> None:
+    layout = laid_out(graph)
+    places = {vertex.key: place for vertex, place in layout.vertices}
+    for first, second in combinations(places.values(), 2):
+        assert not overlap(first, second)
+    labels = [
+        Place(path.label, sizes(graph).labels[graph.edges.index(path.edge)])
+        for path in layout.paths
+        if path.label is not None
+    ]
+    for label in labels:
+        assert not any(overlap(label, place) for place in places.values())
+    for first, second in combinations(labels, 2):
+        assert not overlap(first, second)
+
+
+@settings(max_examples=60, deadline=None)
+@given(graphs())
+def test_frames_hold_what_is_theirs_and_nothing_else(graph: Graph) -> None:
+    layout = laid_out(graph)
+    frames = {frame.cluster.key: frame for frame in layout.frames}
+    for frame in layout.frames:
+        if frame.cluster.parent:
+            assert holds(frames[frame.cluster.parent].place, frame.place)
+        inside = {frame.cluster.key}
+        for other in layout.frames:  # parents come first
+            if other.cluster.parent in inside:
+                inside.add(other.cluster.key)
+        for vertex, place in layout.vertices:
+            if vertex.cluster in inside:
+                assert holds(frame.place, place)
+            else:
+                assert not overlap(frame.place, place)
+
+
+@settings(max_examples=30, deadline=None)
+@given(graphs())
+def test_everything_is_inside_the_picture_and_comes_out_the_same_again(graph: Graph) -> None:
+    layout = laid_out(graph)
+    everything = [place for _, place in layout.vertices] + [frame.place for frame in layout.frames]
+    for place in everything:
+        assert place.left >= 0.0
+        assert place.top >= 0.0
+        assert place.left + place.size.width <= layout.size.width
+        assert place.top + place.size.height <= layout.size.height
+    assert laid_out(graph) == layout

@@ -1,0 +1,120 @@
+"""Texts that a format would read as syntax, and every example system in every format."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from composer.graph import RENDERERS, View, build_graph, dot, mermaid, svg
+from composer.graph import json as graph_json
+from composer.graph.picture import Cluster, Direction, Edge, Graph, Kind, Line, Vertex
+from composer.loading import load
+from composer.resources import systems_folder
+
+EVIL = 'end "quoted" <b>&amp; #35; `code` \\n |pipe| [x] {y} --> z;'
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def evil_graph() -> Graph:
+    return Graph(
+        title=EVIL,
+        view="nodes",
+        direction=Direction.RIGHT,
+        vertices=(
+            Vertex(f"one {EVIL}", Kind.NODE, (EVIL, "second line"), cluster=EVIL),
+            Vertex("two", Kind.TOPIC, ("graph",), wrong=EVIL),
+        ),
+        edges=(Edge(f"one {EVIL}", "two", Line.TOPIC, (EVIL,), wrong=EVIL),),
+        clusters=(Cluster(EVIL, EVIL),),
+    )
+
+
+def test_mermaid_labels_hold_nothing_that_ends_them() -> None:
+    for label in re.findall(r'"([^"\n]*)"', mermaid.render(evil_graph()).split("---\n")[2]):
+        assert not re.search(r"[<>&`\\]", label.replace("<br/>", ""))
+        assert not re.search(r"#(?!\d+;)", label)
+
+
+def test_mermaid_says_what_the_text_was_in_character_codes() -> None:
+    text = mermaid.render(evil_graph()).split("---\n")[2]
+    (label,) = re.findall(r'\["(.*?)<br/>second line"\]', text)
+    assert re.sub(r"#(\d+);", lambda code: chr(int(code[1])), label) == EVIL
+
+
+def test_mermaid_marks_what_is_wrong() -> None:
+    text = mermaid.render(evil_graph())
+    assert "\n  class v2 wrong\n" in text
+    assert "\n  linkStyle 0 stroke:" in text
+
+
+@pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz is not installed")
+def test_graphviz_shows_the_texts_as_they_were() -> None:
+    drawn = subprocess.run(
+        ["dot", "-Tsvg"], input=dot.render(evil_graph()), capture_output=True, text=True, check=True
+    )
+    texts = [text.text or "" for text in ET.fromstring(drawn.stdout).iter(f"{SVG}text")]
+    shown = [text.replace("\xa0", " ") for text in texts]
+    assert shown.count(EVIL) == 3  # frame, vertex, edge
+
+
+def test_svg_holds_the_texts_as_they_were() -> None:
+    root = ET.fromstring(svg.render(evil_graph()))
+    texts = [text.text for text in root.iter(f"{SVG}text")]
+    assert texts.count(EVIL) == 3  # frame, vertex, edge
+    assert EVIL in {title.text for title in root.iter(f"{SVG}title")}
+
+
+def test_svg_loads_nothing_from_elsewhere() -> None:
+    text = svg.render(evil_graph()).replace('xmlns="http://www.w3.org/2000/svg"', "")
+    assert "http" not in text
+    assert "@import" not in text
+
+
+def test_json_says_what_is_wrong_and_where() -> None:
+    data = json.loads(graph_json.render(evil_graph()))
+    assert [vertex["wrong"] for vertex in data["vertices"]] == [None, EVIL]
+    assert data["edges"][0] == {
+        "source": f"one {EVIL}",
+        "target": "two",
+        "kind": "topic",
+        "label": [EVIL],
+        "details": {},
+        "wrong": EVIL,
+    }
+
+
+def check(form: str, text: str) -> None:
+    """Have the format's own reader look at the text."""
+    match form:
+        case "json":
+            json.loads(text)
+        case "svg":
+            ET.fromstring(text)
+        case "mermaid":
+            frames = re.findall(r"^ *subgraph ", text, re.MULTILINE)
+            assert len(frames) == len(re.findall(r"^ *end$", text, re.MULTILINE))
+        case "dot" if shutil.which("dot") is not None:
+            subprocess.run(
+                ["dot", "-Tcanon"], input=text, text=True, check=True, capture_output=True
+            )
+
+
+@pytest.mark.parametrize(
+    "path", sorted(systems_folder().glob("*.yaml")), ids=lambda path: path.stem
+)
+@pytest.mark.parametrize("view", list(View))
+def test_every_example_system_is_drawn_in_every_format(path: Path, view: View) -> None:
+    loading = load(path)
+    assert loading.system is not None
+    graph = build_graph(loading.system, view, loading.diagnostics)
+    keys = {vertex.key for vertex in graph.vertices}
+    assert len(keys) == len(graph.vertices)
+    assert all({edge.source, edge.target} <= keys for edge in graph.edges)
+    for form, render in RENDERERS.items():
+        check(form, render(graph))
