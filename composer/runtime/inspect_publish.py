@@ -1,0 +1,74 @@
+"""Publishing from the command line."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.duration import Duration
+
+from composer.qos import QosProfile
+from composer.runtime.inspect_values import Build, class_of
+from composer.runtime.ports.profiles import rclpy_profile
+from composer.runtime.session import Deadline, NoAnswer, Session
+
+
+@dataclass(frozen=True, slots=True)
+class Publishing:
+    """What is published how often. ``times`` None means for ever.
+
+    ``wait_for`` is the number of subscriptions that must have matched before the first message.
+    """
+
+    topic: str
+    type_name: str
+    build: Build
+    qos: QosProfile
+    rate_hz: float = 1.0
+    times: int | None = None
+    wait_for: int = 0
+
+
+def publish(session: Session, deadline: Deadline, what: Publishing) -> Iterator[Any]:
+    """Publish and yield each message, then see that reliable subscriptions have got them.
+
+    The deadline is for the matching; raises NoAnswer. Messages see ``count`` (from 0) and ``now``
+    (seconds).
+    """
+    publisher = session.node.create_publisher(
+        class_of(what.type_name), what.topic, rclpy_profile(what.qos)
+    )
+    try:
+        _wait_for_match(session, deadline, publisher.get_subscription_count, what)
+        next_s = time.monotonic()
+        count = 0
+        while what.times is None or count < what.times:
+            message = what.build({"count": count, "now": time.time()})
+            publisher.publish(message)
+            yield message
+            count += 1
+            next_s += 1.0 / what.rate_hz
+            if what.times is None or count < what.times:
+                _spin_until(session, next_s)
+        publisher.wait_for_all_acked(Duration(seconds=1))
+    finally:
+        session.node.destroy_publisher(publisher)
+
+
+def _wait_for_match(
+    session: Session, deadline: Deadline, matched: Callable[[], int], what: Publishing
+) -> None:
+    if session.wait_for(lambda: matched() >= what.wait_for or None, deadline) is None:
+        raise NoAnswer(
+            f"{matched()} of {what.wait_for} subscriptions to '{what.topic}' were there within"
+            f" {deadline.timeout_s:g} s",
+            "--wait-matching-subscriptions 0 publishes at once; compose topic info -v shows QoS",
+        )
+
+
+def _spin_until(session: Session, at_s: float) -> None:
+    pause = Deadline(at_s - time.monotonic())
+    while not pause.passed:
+        session.spin_once(pause)

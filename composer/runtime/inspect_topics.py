@@ -1,0 +1,178 @@
+"""Topics of any ROS graph: who is at their ends, what comes over them, and putting things on."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from composer.qos import Durability, History, Liveliness, QosProfile, Reliability
+from composer.runtime.inspect_names import Names
+from composer.runtime.inspect_values import class_of
+from composer.runtime.ports.profiles import rclpy_profile
+from composer.runtime.session import Deadline, RosError, Session
+
+_LISTEN_DEPTH = 1000
+#: rmw's infinite duration; what is longer than any process lives means "no limit".
+_NO_LIMIT_MS = 1e12
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """A publisher or a subscription of some node."""
+
+    node: str
+    type: str
+    qos: QosProfile
+
+
+@dataclass(frozen=True, slots=True)
+class TopicInfo:
+    """A topic and who is at its ends."""
+
+    name: str
+    types: tuple[str, ...]
+    publishers: tuple[End, ...]
+    subscriptions: tuple[End, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A message, or its serialized bytes, and when it came (seconds, time.monotonic)."""
+
+    content: Any
+    at_s: float
+
+
+class Topics:
+    """Looks at topics, and takes part in them, until the deadline."""
+
+    def __init__(self, session: Session, deadline: Deadline) -> None:
+        self._session = session
+        self._deadline = deadline
+        self._names = Names(session, deadline)
+
+    def info(self, name: str) -> TopicInfo:
+        """Return who publishes and subscribes to a topic. Raises NotThere."""
+        types = self._names.types("topic", name)
+        full_name = name if name.startswith("/") else f"/{name}"
+        return self._session.wait_until_still(
+            lambda: _info(self._session.node, full_name, types), self._deadline
+        )
+
+    def type_of(self, name: str) -> str:
+        """Return the one type of a topic. Raises NotThere, and RosError where there are more."""
+        types = self._names.types("topic", name)
+        if len(types) > 1:
+            raise RosError(
+                f"topic '{name}' has more than one type", "say which: " + ", ".join(types)
+            )
+        return types[0]
+
+    def listen(
+        self, name: str, type_name: str, qos: QosProfile | None = None, *, raw: bool = False
+    ) -> Iterator[Received]:
+        """Yield what is published, for as long as the deadline is not passed.
+
+        Without ``qos`` it is what gets most from the publishers that are there. With ``raw`` the
+        content is the serialized bytes.
+        """
+        node = self._session.node
+        profile = qos or self._matching(name)
+        waiting: deque[Received] = deque()
+        subscription = node.create_subscription(
+            class_of(type_name),
+            name,
+            lambda content: waiting.append(Received(content, time.monotonic())),
+            rclpy_profile(profile),
+            raw=raw,
+        )
+        try:
+            while not self._deadline.passed:
+                self._session.spin_once(self._deadline)
+                while waiting:
+                    yield waiting.popleft()
+        finally:
+            node.destroy_subscription(subscription)
+
+    def _matching(self, name: str) -> QosProfile:
+        """Return the strongest profile that all publishers satisfy."""
+        found = self._session.node.get_publishers_info_by_topic(name)
+        offers = [_end(endpoint).qos for endpoint in found]
+        return strongest_for_all(offers, depth=_LISTEN_DEPTH)
+
+
+def strongest_for_all(offers: list[QosProfile], depth: int) -> QosProfile:
+    """Return the profile of a subscription that matches every offer and asks for no less.
+
+    See the offer/request rule in :mod:`composer.qos`.
+    """
+    reliable = all(offer.reliability is Reliability.RELIABLE for offer in offers)
+    kept = all(offer.durability is Durability.TRANSIENT_LOCAL for offer in offers)
+    return QosProfile(
+        depth=depth,
+        reliability=Reliability.RELIABLE if offers and reliable else Reliability.BEST_EFFORT,
+        durability=Durability.TRANSIENT_LOCAL if offers and kept else Durability.VOLATILE,
+    )
+
+
+def _info(node: Node, name: str, types: tuple[str, ...]) -> TopicInfo:
+    return TopicInfo(
+        name,
+        types,
+        _ends(node.get_publishers_info_by_topic(name)),
+        _ends(node.get_subscriptions_info_by_topic(name)),
+    )
+
+
+def _ends(endpoints: list[TopicEndpointInfo]) -> tuple[End, ...]:
+    return tuple(sorted(map(_end, endpoints), key=lambda end: (end.node, end.type)))
+
+
+def _end(endpoint: TopicEndpointInfo) -> End:
+    node = f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
+    return End(node, endpoint.topic_type, _profile(endpoint.qos_profile))
+
+
+def _profile(found: QoSProfile) -> QosProfile:
+    """Return a profile as we say it. History and depth are not discovered: they say nothing."""
+    profile = QosProfile(
+        reliability=(
+            Reliability.BEST_EFFORT
+            if found.reliability is ReliabilityPolicy.BEST_EFFORT
+            else Reliability.RELIABLE
+        ),
+        durability=(
+            Durability.TRANSIENT_LOCAL
+            if found.durability is DurabilityPolicy.TRANSIENT_LOCAL
+            else Durability.VOLATILE
+        ),
+        deadline_ms=_milliseconds(found.deadline),
+        lifespan_ms=_milliseconds(found.lifespan),
+        liveliness=(
+            Liveliness.MANUAL_BY_TOPIC
+            if found.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
+            else Liveliness.AUTOMATIC
+        ),
+        liveliness_lease_duration_ms=_milliseconds(found.liveliness_lease_duration),
+    )
+    if found.history is HistoryPolicy.KEEP_ALL:
+        return replace(profile, history=History.KEEP_ALL)
+    return profile
+
+
+def _milliseconds(duration: Any) -> float | None:
+    milliseconds = duration.nanoseconds / 1e6
+    return None if milliseconds >= _NO_LIMIT_MS else milliseconds

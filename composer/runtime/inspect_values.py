@@ -1,0 +1,97 @@
+"""Messages as plain data, and YAML text as messages."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from composer.diagnostics import suggestion
+from composer.document import parse_document
+from composer.expressions import EvaluationError
+from composer.runtime.messages import MessageError, compile_message, interface_class
+from composer.runtime.session import RosError
+from composer.source import SourceFile
+from composer.templates import compile_template
+
+#: Makes a message; expressions in it see the names of the scope.
+Build = Callable[[Mapping[str, Any]], Any]
+
+
+class BadValue(RosError):
+    """What was given does not make a message of the type, or names no part of it."""
+
+
+def class_of(name: str) -> Any:
+    """Return the class of an interface. Raises BadValue when it is not installed here."""
+    if name.count("/") != 2:
+        raise BadValue(
+            f"'{name}' is not an interface name", "it has three parts, as std_msgs/msg/String"
+        )
+    try:
+        return interface_class(name)
+    except MessageError as error:
+        raise BadValue(str(error), "the package that defines it must be installed here") from error
+
+
+def compile_content(text: str, message_type: Any, what: str) -> Build:
+    """Return what makes messages of YAML ``text``; fields left out keep their defaults.
+
+    ``{expressions}`` are evaluated each time. Raises BadValue, now and from the result.
+    """
+    tree, findings = parse_document(SourceFile(what, text.strip() or "{}"))
+    if tree is None or findings:
+        reasons = "; ".join(finding.message for finding in findings)
+        raise BadValue(f"{what} is not a YAML map: {reasons}", "write it as '{data: hello}'")
+    template, problems = compile_template(tree)
+    if template is None or problems:
+        raise BadValue(f"{what}: " + "; ".join(problem.message for problem in problems))
+    try:
+        build = compile_message(template, message_type, what)
+    except MessageError as error:
+        raise BadValue(str(error)) from error
+
+    def build_checked(scope: Mapping[str, Any]) -> Any:
+        try:
+            return build(scope)
+        except (MessageError, EvaluationError) as error:
+            raise BadValue(f"{what}: {error}") from error
+
+    return build_checked
+
+
+def to_plain(value: Any) -> Any:
+    """Return a message, or a part of one, as dicts, lists and scalars."""
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: to_plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if isinstance(value, bytes):
+        return value[0] if len(value) == 1 else list(value)
+    if isinstance(value, array) or hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [to_plain(item) for item in value]
+    return value
+
+
+def part(value: Any, path: str) -> Any:
+    """Return the part of a message that ``path`` names: ``pose.position.x``, ``ranges.3``.
+
+    Raises BadValue.
+    """
+    for name in path.split("."):
+        value = _step(value, name, path)
+    return value
+
+
+def _step(value: Any, name: str, path: str) -> Any:
+    if hasattr(value, "get_fields_and_field_types"):
+        fields = value.get_fields_and_field_types()
+        if name in fields:
+            return getattr(value, name)
+        raise BadValue(f"there is no field '{name}' in '{path}'", suggestion(name, fields))
+    if name.isdigit() and hasattr(value, "__getitem__") and not isinstance(value, str):
+        try:
+            return value[int(name)]
+        except IndexError as error:
+            raise BadValue(f"'{path}': there are {len(value)} items only") from error
+    raise BadValue(f"'{name}' in '{path}' is not a part of {value!r:.60}")
