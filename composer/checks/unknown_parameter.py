@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from composer.checks.context import Context
 from composer.checks.doubt import doubt
@@ -60,7 +60,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
         for node in context.system.nodes
     }
     names = {node: frozenset(declared) for node, declared in known.items()}
-    for node_name, name, span in _uses(context):
+    for node_name, name, span in _uses(context, names):
         if name not in names[node_name] and not doubts.may_have(node_name, "parameters"):
             yield Diagnostic(
                 RULE,
@@ -70,9 +70,10 @@ def check(context: Context) -> Iterator[Diagnostic]:
             )
 
 
-def _uses(context: Context) -> Iterator[tuple[str, str, Span]]:
+def _uses(context: Context, known: Mapping[str, frozenset[str]]) -> Iterator[tuple[str, str, Span]]:
     for site in sites(context.system):
         for path in site.expression.paths:
             if path.root == "parameters" and len(path.parts) > 1:
                 span = part_of_path(site.span, site.expression, path, 1)
-                yield site.node.name.value, str(path.parts[1]), span
+                node_name = site.node.name.value
+                yield node_name, path.key(known[node_name]) or str(path.parts[1]), span

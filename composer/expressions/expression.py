@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
+from itertools import takewhile
 from types import CodeType, TracebackType
 from typing import Any
 
 from composer.diagnostics import shown
 from composer.expressions.errors import EvaluationError, Refusal
-from composer.expressions.values import describe
+from composer.expressions.values import describe, map_key
 
 _REASONS: Mapping[type[Exception], str] = {
     KeyError: "there is no such name here",
@@ -19,6 +20,10 @@ _REASONS: Mapping[type[Exception], str] = {
     TypeError: "a text and a number have no order",
     ValueError: "not defined for this value",
 }
+
+
+def _is_name(part: str | int) -> bool:
+    return isinstance(part, str)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +41,11 @@ class FieldPath:
     def root(self) -> str:
         """The name in scope that the path starts from."""
         return str(self.parts[0])
+
+    def key(self, known: Container[str]) -> str:
+        """Return the key that the path reads of its root, a map that has the keys ``known``."""
+        names = tuple(str(part) for part in takewhile(_is_name, self.parts[1:]))
+        return map_key(known, names)[0] if names else ""
 
     def __str__(self) -> str:
         steps = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in self.parts[1:])

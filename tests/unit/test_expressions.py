@@ -249,6 +249,22 @@ def test_paths_are_listed_with_their_places() -> None:
     assert str(expression.paths[0]) == "message.poses[-1].x"
 
 
+@pytest.mark.parametrize(
+    ("source", "key"),
+    [
+        ("p.a", "a"),
+        ("p.a.b", "a.b"),
+        ("p.a.b.x", "a.b"),
+        ("p.c[0]", "c"),
+        ("p.z.b", "z"),
+        ("p", ""),
+    ],
+)
+def test_a_path_names_a_key_of_its_root(source: str, key: str) -> None:
+    (path,) = compile_expression(source).paths
+    assert path.key({"a", "a.b", "c"}) == key
+
+
 def test_expressions_are_equal_when_their_sources_are() -> None:
     assert compile_expression("a + 1") == compile_expression("a + 1")
     assert compile_expression("a + 1") != compile_expression("a + 2")
