@@ -89,7 +89,7 @@ class _Known:
             if interfaces is not None
             else Interfaces.load(interface_folders(path.parent))
         )
-        return cls(path.resolve().parent, Catalog.for_file(path), known)
+        return cls(path.parent.resolve(), Catalog.for_file(path), known)
 
 
 def _load(

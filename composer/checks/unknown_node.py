@@ -1,4 +1,4 @@
-"""A connection or a dependency that names a node the system does not have."""
+"""A connection, a dependency or a setting that names a node the system does not have."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RULE = register(
         code="RC202",
         name="unknown-node",
         severity=Severity.ERROR,
-        summary="A connection or a dependency names a node that is not in this system.",
+        summary="A connection, a dependency or --set names a node that is not in this system.",
         why="The connection would join nothing, and the dependency could never be met.",
         bad="""\
 system: dependency
@@ -33,12 +33,19 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the ends of connections and at what nodes depend on."""
+    """Look at the ends of connections, at what nodes depend on, at the command line."""
     for connection in context.system.connections:
         for endpoint in (*connection.sources, *connection.sinks):
             yield from _endpoint(context, endpoint)
     for node in context.system.nodes:
         yield from _dependencies(context, node)
+    for unknown in context.system.unknown:
+        yield Diagnostic(
+            RULE,
+            f"'{unknown.name}' is not a node of this system",
+            unknown.name.span,
+            hint=suggestion(unknown.name.value, unknown.known),
+        )
 
 
 def _endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, shown
 from composer.document import parse_document
 from composer.source import Located, SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
@@ -78,7 +78,7 @@ def _override(
     node, dot, parameter = target.partition(".")
     if not (equals and dot and node and parameter):
         span = Span(source, line, 1, max(len(text), 1))
-        message = f"'{text}' is not of the form node.parameter=value"
+        message = f"'{shown(text)}' is not of the form node.parameter=value"
         findings.append(Diagnostic(RULE, message, span))
         return None
     value = _value(text, len(target) + 1, source, line, findings)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from composer.catalog import Catalog, shown_path
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, has_errors, register
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, has_errors, register, shown
 from composer.document import read_document
 from composer.expand import expand, missing_variables
 from composer.resolve.declaration import Declaration, declare
@@ -122,12 +122,12 @@ class NodeTypes:
 def _missing(tree: Mapping, given: dict[str, Tree], span: Span) -> Iterator[Diagnostic]:
     declared = {entry.name: entry for entry in entries(tree.get("variables"))}
     owner = tree.get("node")
-    name = plain(owner) if owner is not None else ""
+    name = shown(str(plain(owner))) if owner is not None else ""
     for variable in missing_variables(tree, given):
         yield Diagnostic(
             RULE,
-            f"node type '{name}' needs a value for its variable '{variable}'",
+            f"node type '{name}' needs a value for its variable '{shown(variable)}'",
             span,
             (Label(declared[variable].key.span, "declared without default"),),
-            f"add 'variables: {{{variable}: ...}}' to the node",
+            f"add 'variables: {{{shown(variable)}: ...}}' to the node",
         )

@@ -1,0 +1,172 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.catalog import find_files
+from composer.diagnostics import Severity
+from composer.interfaces import Interfaces
+from composer.loading import Loading, load, load_bytes
+from composer.resources import nodes_folder, systems_folder
+
+GOOD = """\
+system: robot
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+    timers: {tick: {period_ms: 100, publish: {chatter: {data: hello}}}}
+    parameters: {speed: {type: double, default: 1.0, maximum: 2.0}}
+  listener:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command, log: "{message.data}"}}
+"""
+
+
+@pytest.fixture(scope="module")
+def interfaces() -> Interfaces:
+    return Interfaces.load()
+
+
+def errors(loading: Loading) -> list[str]:
+    return [
+        f"{finding.primary.file.path}:{finding.primary.line} {finding.rule.name}"
+        for finding in loading.diagnostics
+        if finding.severity is Severity.ERROR
+    ]
+
+
+def write(folder: Path, text: str, name: str = "robot.yaml") -> Path:
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_good_system_can_run(tmp_path: Path, interfaces: Interfaces) -> None:
+    loading = load(write(tmp_path, GOOD), interfaces=interfaces)
+    assert errors(loading) == []
+    assert loading.runnable
+    assert loading.system is not None
+    assert loading.system.name.value == "robot"
+    assert loading.source.text == GOOD
+
+
+@pytest.mark.parametrize(
+    "path", find_files([systems_folder(), nodes_folder()]), ids=lambda path: path.stem
+)
+def test_everything_that_comes_with_the_composer_is_without_errors(path: Path) -> None:
+    loading = load(path)
+    assert errors(loading) == []
+    assert loading.runnable == (path.parent == systems_folder())
+
+
+def test_one_run_shows_what_every_stage_finds(tmp_path: Path, interfaces: Interfaces) -> None:
+    write(
+        tmp_path,
+        "node: camera\nservices: {ask: {typ: std_srvs/srv/Trigger}}\n",
+        "nodes/camera.yaml",
+    )
+    path = write(
+        tmp_path,
+        """\
+system: robot
+system: again
+variables: {unit: [1]}
+nodes:
+  front: {type: camera}
+  talker:
+    description: in ${unit}
+    executor: nowhere
+    colour: red
+    timers: {tick: {period_ms: 100, log: "{1 +}"}}
+""",
+    )
+    loading = load(path, shown="robot.yaml", interfaces=interfaces)
+    found = errors(loading)
+    for line, rule in (
+        ("robot.yaml:2", "duplicate-key"),
+        ("robot.yaml:7", "variable-not-text"),
+        ("robot.yaml:8", "unknown-executor"),
+        ("robot.yaml:9", "unknown-key"),
+        ("robot.yaml:10", "invalid-expression"),
+    ):
+        assert f"{line} {rule}" in found
+    assert any(item.startswith(str(tmp_path / "nodes" / "camera.yaml") + ":2 ") for item in found)
+    assert not loading.runnable
+    places = [finding.sort_key for finding in loading.diagnostics]
+    assert places == sorted(places)
+
+
+def test_the_command_line_is_checked_like_the_file(tmp_path: Path, interfaces: Interfaces) -> None:
+    path = write(tmp_path, GOOD)
+    loading = load(
+        path,
+        parameter_overrides=["talker.speed=9.0", "talker.sped=1.0", "nobody.speed=1.0", "nonsense"],
+        namespace="//",
+        interfaces=interfaces,
+    )
+    found = errors(loading)
+    assert "--set:1 parameter-range" in found
+    assert "--set:2 unknown-parameter" in found
+    assert "--set:3 unknown-node" in found
+    assert "--set:4 invalid-override" in found
+    assert "--namespace:1 invalid-namespace" in found
+
+
+def test_a_good_setting_is_taken(tmp_path: Path, interfaces: Interfaces) -> None:
+    loading = load(
+        write(tmp_path, GOOD),
+        parameter_overrides=["talker.speed=2"],
+        namespace="left",
+        interfaces=interfaces,
+    )
+    assert errors(loading) == []
+    assert loading.system is not None
+    talker = loading.system.node("talker")
+    assert talker is not None
+    assert talker.full_name == "/left/talker"
+    speed = talker.parameter("speed")
+    assert speed is not None
+    assert speed.value is not None
+    assert speed.value.value == 2.0
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        ("services: {web: {}}\n", "wrong-kind-of-file"),
+        ("{}", "wrong-kind-of-file"),
+        ("", "not-a-map"),
+        ("[", None),
+        ("\x00", None),
+    ],
+)
+def test_what_is_no_file_of_ours_has_a_finding_and_no_system(
+    tmp_path: Path, interfaces: Interfaces, text: str, rule: str | None
+) -> None:
+    loading = load(write(tmp_path, text), interfaces=interfaces)
+    assert loading.system is None
+    assert not loading.runnable
+    assert len(loading.diagnostics) == 1
+    assert rule in {None, loading.diagnostics[0].rule.name}
+
+
+def test_a_file_that_is_not_there_has_a_finding(tmp_path: Path, interfaces: Interfaces) -> None:
+    loading = load(tmp_path / "missing.yaml", shown="missing.yaml", interfaces=interfaces)
+    assert loading.system is None
+    assert [str(finding.primary) for finding in loading.diagnostics] == ["missing.yaml:1:1"]
+
+
+def test_text_from_elsewhere_belongs_to_a_folder(tmp_path: Path, interfaces: Interfaces) -> None:
+    write(tmp_path, "node: camera\n", "nodes/camera.yaml")
+    text = b"system: robot\nnodes: {front: {type: camera}, back: {type: camra}}\n"
+    loading = load_bytes(text, tmp_path, shown="<stdin>", interfaces=interfaces)
+    assert errors(loading) == ["<stdin>:2 unknown-node-type"]
+
+
+def test_a_node_type_is_checked_alone(tmp_path: Path, interfaces: Interfaces) -> None:
+    path = write(tmp_path, "node: camera\nbehavior: camera:Camera\n", "nodes/camera.yaml")
+    loading = load(path, shown="camera.yaml", interfaces=interfaces)
+    assert errors(loading) == ["camera.yaml:2 behavior-module-missing"]
+    (tmp_path / "nodes" / "camera.py").write_text("class Camera: ...\n")
+    assert errors(load(path, interfaces=interfaces)) == []
