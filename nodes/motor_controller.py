@@ -10,7 +10,9 @@ from composer_interfaces.srv import PlanTrajectory
 from geometry_msgs.msg import Point, Twist
 from nav_msgs.msg import Odometry, Path
 
-from composer.behavior import Behavior, CallError, Goal
+from composer.behavior import Behavior, CallCancelled, CallError, Goal
+
+RETRY_S = 1.0  # pause before a planner that refused is asked again
 
 
 class MotorController(Behavior):
@@ -55,6 +57,7 @@ class MotorController(Behavior):
         self.reference = reference
         if reference is None:
             self.log.warn(f"no path to ({goal.x:.2f}, {goal.y:.2f}): {reason}")
+            await self.clock.sleep(RETRY_S)
         else:
             self.log.info(f"driving to ({goal.x:.2f}, {goal.y:.2f}): {reason}")
 
@@ -104,6 +107,8 @@ class MotorController(Behavior):
         request = PlanTrajectory.Request(start=self.position, goal=goal, max_velocity=cruise)
         try:
             response = await self.clients.plan_trajectory.call(request)
+        except CallCancelled:
+            raise  # this node is being deactivated: there is nothing left to do
         except CallError as error:
             return None, str(error)
         if not response.success:
