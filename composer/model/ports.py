@@ -89,10 +89,12 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Reaction:
-    """What is done, in YAML, when something happens. Carried out in the order of the fields:
-    nothing at all unless ``when`` is true; then the new ``state`` (all values worked out from the
-    old one), the log line, the messages, the calls and goals, the response. ``when_span`` is the
-    place of the expression's text, so that a finding can point into it.
+    """What is done, in YAML, when something happens.
+
+    Carried out in the order of the fields: nothing at all unless ``when`` is true; then the new
+    ``state`` (all values worked out from the old one), the log line, the messages, the calls and
+    goals, the response. ``when_span`` is the place of the expression's text, so that a finding
+    can point into it.
     """
 
     span: Span = field(compare=False)

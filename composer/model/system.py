@@ -153,8 +153,10 @@ class Endpoint:
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A topic, service or action and the ports joined to it. ``sources`` are publishers or
-    servers, ``sinks`` subscriptions or clients."""
+    """A topic, service or action and the ports joined to it.
+
+    ``sources`` are publishers or servers, ``sinks`` subscriptions or clients.
+    """
 
     kind: ChannelKind
     name: Located[str]
@@ -200,8 +202,11 @@ class QosReference:
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """Everything one file declares. A node type validated alone is a system of that one node,
-    with ``node_type`` true: nothing outside it is known then."""
+    """Everything one file declares.
+
+    A node type validated alone is a system of that one node, with ``node_type`` true: nothing
+    outside it is known then.
+    """
 
     name: Located[str]
     source: SourceFile
