@@ -21,9 +21,9 @@ app = typer.Typer(
 
 def _show_version(asked: bool) -> None:
     if asked:
-        from composer.cli.version import composer_version
+        from composer.report.tool import tool_version
 
-        write(f"compose {composer_version()}")
+        write(f"compose {tool_version()}")
         raise typer.Exit
 
 

@@ -52,7 +52,11 @@ def load_system(
     parameter_overrides: Iterable[str] = (),
     namespace: str | None = None,
 ) -> Loading:
-    """Read and check the system in ``path``; findings go to stderr, with carets."""
+    """Read and check the system in ``path``; errors and warnings go to stderr, with carets.
+
+    What is only good to know stays with ``compose validate``.
+    """
+    from composer.diagnostics import Severity
     from composer.loading import load
     from composer.report.text import render
 
@@ -62,6 +66,7 @@ def load_system(
         parameter_overrides=parameter_overrides,
         namespace=namespace,
     )
-    if loading.diagnostics:
-        say(render(loading.diagnostics, color=use_color(sys.stderr)))
+    pressing = [found for found in loading.diagnostics if found.severity is not Severity.INFO]
+    if pressing:
+        say(render(pressing, color=use_color(sys.stderr)))
     return loading

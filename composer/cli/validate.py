@@ -92,7 +92,7 @@ def _check(paths: Sequence[Path]) -> _Checked:
     from composer.loading import load, load_bytes
 
     found = yaml_files([path for path in paths if path != _STDIN])
-    findings = []
+    findings: list[Diagnostic] = []
     if _STDIN in paths:
         content = sys.stdin.buffer.read()
         findings += load_bytes(content, Path.cwd(), shown="<stdin>").diagnostics
@@ -103,7 +103,9 @@ def _check(paths: Sequence[Path]) -> _Checked:
     files = len(found.files) + (_STDIN in paths)
     if not files:
         raise UsageFailure("there is no system and no node type in " + ", ".join(map(str, paths)))
-    return _Checked(files, findings)
+    # A node type is read with each system that uses it: its findings are told once.
+    once = {(str(finding.primary), finding): finding for finding in findings}
+    return _Checked(files, list(once.values()))
 
 
 def _chosen(findings: list[Diagnostic], select: list[str], ignore: list[str]) -> list[Diagnostic]:

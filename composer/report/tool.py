@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 
 NAME = "ros2-composer"
 
 
 def tool_version() -> str:
-    """Return the version of the installed distribution."""
-    return version(NAME)
+    """Return the version of the installed distribution; ``0+source`` in a mere checkout."""
+    try:
+        return version(NAME)
+    except PackageNotFoundError:
+        return "0+source"

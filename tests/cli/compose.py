@@ -1,0 +1,36 @@
+"""Runs the command line in this process, as typer's CliRunner does, up to the exit code."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import sys
+from dataclasses import dataclass
+
+from composer.cli import main
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """How a command ended and what it wrote."""
+
+    code: int
+    out: str
+    err: str
+
+
+class _Stream(io.TextIOWrapper):
+    """A stream in memory, with a buffer beneath as real ones have."""
+
+    def text(self) -> str:
+        self.flush()
+        return self.buffer.getvalue().decode()  # type: ignore[attr-defined]
+
+
+def compose(*arguments: str) -> Done:
+    """Run ``compose`` with the arguments."""
+    out, err = (_Stream(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main(list(arguments))
+    assert sys.stdout is not out
+    return Done(code, out.text(), err.text())

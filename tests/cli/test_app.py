@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from composer import cli
+from composer.cli.help import examples
+from tests.cli.compose import compose
+
+COMPOSE = [sys.executable, "-m", "composer"]
+
+
+def test_version() -> None:
+    done = compose("--version")
+    assert done.code == 0
+    assert done.out.startswith("compose ")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        [],
+        ["run"],
+        ["validate"],
+        ["graph"],
+        ["lifecycle"],
+        ["lifecycle", "nodes"],
+        ["lifecycle", "get"],
+        ["lifecycle", "list"],
+        ["lifecycle", "set"],
+    ],
+    ids=" ".join,
+)
+def test_every_help_page_ends_with_examples(command: list[str]) -> None:
+    done = compose(*command, "--help")
+    assert done.code == 0
+    options, _, lines = done.out.partition("Examples:")
+    assert "--help" in options
+    assert all(line.strip().startswith(("compose", "cat")) for line in lines.strip().splitlines())
+    assert lines.strip()
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--bogus"], ["nothing"], ["run"], ["graph", "-f", "x", "y"]]
+)
+def test_a_wrong_command_line_is_a_usage_error_on_stderr(arguments: list[str]) -> None:
+    done = compose(*arguments)
+    assert (done.code, done.out) == (2, "")
+    assert "Error: " in done.err
+
+
+def test_a_mistyped_command_gets_a_suggestion() -> None:
+    assert "Did you mean 'validate'?" in compose("valdate").err
+
+
+def test_a_fault_of_ours_is_told_shortly_and_with_a_traceback_only_on_request(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise RuntimeError("out of paper")
+
+    monkeypatch.delenv("COMPOSE_DEBUG", raising=False)
+    monkeypatch.setattr("composer.loading.load", fail)
+    (tmp_path / "any.yaml").write_text("system: any\n")
+    done = compose("validate", str(tmp_path / "any.yaml"))
+    assert done.code == cli.INTERNAL
+    assert done.err.startswith("compose: internal error: RuntimeError: out of paper\n")
+    assert "Traceback" not in done.err
+    monkeypatch.setenv("COMPOSE_DEBUG", "1")
+    assert "Traceback" in compose("validate", str(tmp_path / "any.yaml")).err
+
+
+def test_a_closed_pipe_ends_quietly() -> None:
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [*COMPOSE, "graph", "pipeline"],
+        check=False,
+        stdout=write,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    os.close(write)
+    assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_help_and_version_import_nothing_heavy() -> None:
+    code = (
+        "import sys; from composer.cli import main; main(['--version']); main(['--help']);"
+        "heavy = {'rclpy', 'jsonschema', 'yaml', 'composer.loading', 'composer.runtime', 'rich'};"
+        "print(heavy & set(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr == "set()\n"
+
+
+def test_examples_stand_as_they_are_written() -> None:
+    assert examples("compose a", "compose b") == "\b\nExamples:\n  compose a\n  compose b"

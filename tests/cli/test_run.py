@@ -1,0 +1,60 @@
+"""What ``compose run`` does before anything starts; tests/ros has the rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.cli.compose import compose
+
+
+def test_a_dry_run_prints_the_plan_with_its_causes() -> None:
+    done = compose("run", "pipeline", "--dry-run")
+    assert (done.code, done.err) == (0, "")
+    assert "#2 configure /planning/planner: motor_controller depends on it\n" in done.out
+    assert len(done.out.splitlines()) == 6
+
+
+def test_options_change_the_plan() -> None:
+    done = compose(
+        "run", "pipeline", "--dry-run", "--autostart", "inactive", "--namespace", "/robot1"
+    )
+    assert "activate" not in done.out
+    assert "#1 configure /robot1/perception/sensor_simulator: " in done.out
+    assert compose("run", "pipeline", "--dry-run", "--autostart", "unconfigured").out == ""
+
+
+def test_a_system_with_errors_is_refused_and_nothing_is_planned(tmp_path: Path) -> None:
+    path = tmp_path / "broken.yaml"
+    path.write_text("system: broken\nnodes:\n  one: {lifecycle: {depends_on: [two]}}\n")
+    done = compose("run", str(path), "--dry-run")
+    assert (done.code, done.out) == (1, "")
+    assert "is not a node of this system" in done.err
+
+
+def test_a_setting_is_checked_like_what_is_in_the_file() -> None:
+    done = compose("run", "pipeline", "--dry-run", "--set", "planner.max_velocty=1.0")
+    assert done.code == 1
+    assert "did you mean 'max_velocity'?" in done.err
+    assert compose("run", "pipeline", "--dry-run", "--set", "planner.max_velocity=0.5").code == 0
+
+
+def test_a_node_type_is_not_run(tmp_path: Path) -> None:
+    path = tmp_path / "relay.yaml"
+    path.write_text("node: relay\n")
+    done = compose("run", str(path), "--dry-run")
+    assert done.code == 1
+    assert "is a node type, not a system" in done.err
+
+
+def test_a_folder_is_not_run(tmp_path: Path) -> None:
+    assert compose("run", str(tmp_path)).code == 2
+
+
+def test_without_rclpy_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("composer.cli.ros.find_spec", lambda name: None)
+    for command in (["run", "pipeline"], ["lifecycle", "nodes"]):
+        done = compose(*command)
+        assert (done.code, done.out) == (1, "")
+        assert 'pip install "ros2-composer[ros]"' in done.err

@@ -1,0 +1,152 @@
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.compose import compose
+
+FINE = "system: fine\nnodes:\n  one: {}\n"
+BROKEN = """\
+system: broken
+nodes:
+  first: {lifecycle: {depends_on: [secnd]}}
+  second: {}
+"""
+WARNED = """\
+system: warned
+nodes:
+  first: {type: nothing_of_the_kind}
+"""
+TWISTED = """\
+system: twisted
+nodes:
+  one: {publishers: {talk: {type: std_msgs/msg/String, topic: /talk, qos: sensor_data}}}
+  two: {subscriptions: {talk: {type: std_msgs/msg/String, topic: /talk, qos: command}}}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("fine.yaml").write_text(FINE)
+    return tmp_path
+
+
+def test_a_clean_file_says_so_on_stderr_and_nothing_on_stdout(folder: Path) -> None:
+    done = compose("validate", "fine.yaml")
+    assert (done.code, done.out, done.err) == (0, "", "1 file checked: clean\n")
+
+
+def test_a_finding_has_its_place_a_caret_and_a_hint(folder: Path) -> None:
+    Path("broken.yaml").write_text(BROKEN)
+    done = compose("validate", "fine.yaml", "broken.yaml")
+    assert done.code == 1
+    assert "broken.yaml:3:36" in done.out
+    assert "^^^^^" in done.out
+    assert "did you mean 'second'?" in done.out
+    assert done.err == "2 files checked\n"
+
+
+def test_a_folder_is_searched_for_systems_and_node_types_only(folder: Path) -> None:
+    Path("nodes").mkdir()
+    Path("nodes/relay.yaml").write_text("node: relay\n")
+    Path(".github").mkdir()
+    Path(".github/workflow.yaml").write_text("on: push\n")
+    Path("compose.yaml").write_text("services: {}\n")
+    done = compose("validate", ".")
+    assert done.code == 0
+    assert done.err == (
+        "not checked, no 'system:' or 'node:' in it: compose.yaml\n2 files checked: clean\n"
+    )
+
+
+def test_what_is_in_a_node_type_is_told_once_for_all_systems_that_use_it(folder: Path) -> None:
+    Path("nodes").mkdir()
+    Path("nodes/odd.yaml").write_text("node: odd\nports: {}\n")
+    for name in ("first", "second"):
+        Path(f"{name}.yaml").write_text(f"system: {name}\nnodes: {{one: {{type: odd}}}}\n")
+    done = compose("validate", "--format", "json", ".")
+    places = [finding["location"]["file"] for finding in json.loads(done.out)["findings"]]
+    assert places.count("nodes/odd.yaml") == 1
+
+
+def test_a_named_file_is_checked_whatever_is_in_it(folder: Path) -> None:
+    Path("other.yaml").write_text("services: {}\n")
+    done = compose("validate", "other.yaml")
+    assert done.code == 1
+    assert "other.yaml:1:1" in done.out
+
+
+def test_stdin_is_a_dash(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(BROKEN.encode())))
+    done = compose("validate", "-")
+    assert done.code == 1
+    assert "<stdin>:3:36" in done.out
+
+
+def test_a_path_that_does_not_exist_is_a_usage_error(folder: Path) -> None:
+    done = compose("validate", "nothing.yaml")
+    assert done.code == 2
+    assert done.err == "compose: there is no file or folder 'nothing.yaml'\n"
+
+
+def test_a_folder_without_anything_to_check_is_a_usage_error(folder: Path) -> None:
+    Path("empty").mkdir()
+    assert compose("validate", "empty").code == 2
+
+
+def test_warnings_count_when_strict(folder: Path) -> None:
+    text = "system: deep\nnodes:\n  one: {namespace: a/b/c/d/e}\n"
+    Path("deep.yaml").write_text(text)
+    relaxed = compose("validate", "deep.yaml", "--format", "json")
+    assert [item["severity"] for item in json.loads(relaxed.out)["findings"]] == ["warning"]
+    assert relaxed.code == 0
+    assert compose("validate", "deep.yaml", "--strict").code == 1
+
+
+@pytest.mark.parametrize("rule", ["RC301", "RC3", "qos-incompatible"])
+def test_rules_are_selected_and_ignored_by_code_band_or_name(folder: Path, rule: str) -> None:
+    Path("twisted.yaml").write_text(TWISTED)
+    (found,) = json.loads(compose("validate", "twisted.yaml", "--format", "json").out)["findings"]
+    rule = {"RC301": found["code"], "RC3": found["code"][:3]}.get(rule, found["rule"])
+    assert compose("validate", "twisted.yaml", "--select", rule).code == 1
+    assert compose("validate", "twisted.yaml", "--ignore", rule).code == 0
+    assert compose("validate", "twisted.yaml", "--select", "RC0").code == 0
+
+
+def test_an_unknown_rule_is_a_usage_error_with_the_nearest(folder: Path) -> None:
+    done = compose("validate", "fine.yaml", "--ignore", "unknown-nod")
+    assert done.code == 2
+    assert done.err == "compose: no rule is called 'unknown-nod'\n  did you mean 'unknown-node'?\n"
+
+
+def test_github_annotations_come_by_themselves_in_github_actions(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("broken.yaml").write_text(BROKEN)
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    assert compose("validate", "broken.yaml").out.startswith("::error file=broken.yaml,line=3")
+    assert compose("validate", "broken.yaml", "--format", "text").out.startswith("error[")
+
+
+def test_sarif_is_one_json_document(folder: Path) -> None:
+    Path("broken.yaml").write_text(BROKEN)
+    log = json.loads(compose("validate", "broken.yaml", "-f", "sarif").out)
+    assert log["version"] == "2.1.0"
+    assert len(log["runs"][0]["results"]) == 1
+
+
+def test_colours_are_for_terminals_unless_forced(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("broken.yaml").write_text(BROKEN)
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.delenv("FORCE_COLOR", raising=False)
+    assert "\x1b[" not in compose("validate", "broken.yaml").out
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    assert "\x1b[" in compose("validate", "broken.yaml").out
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert "\x1b[" not in compose("validate", "broken.yaml").out
