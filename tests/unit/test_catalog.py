@@ -78,9 +78,7 @@ def test_interfaces_of_the_project_come_first(project: Path) -> None:
         ("a.txt", "system: a\n", False),
     ],
 )
-def test_a_folder_gives_only_what_is_ours(
-    tmp_path: Path, name: str, text: str, ours: bool
-) -> None:
+def test_a_folder_gives_only_what_is_ours(tmp_path: Path, name: str, text: str, ours: bool) -> None:
     (tmp_path / name).write_text(text, encoding="utf-8")
     assert find_files([tmp_path]) == ((tmp_path / name,) if ours else ())
 

@@ -187,10 +187,10 @@ def test_a_long_chain_takes_no_time_and_no_stack() -> None:
         f"n{number}: {{lifecycle: {{depends_on: [n{number + 1}]}}}}" for number in range(count)
     )
     system = system_of(system_with(*chain, f"n{count}: {{}}"))
-    start = time.perf_counter()
+    start = time.process_time()
     plan = bring_up(system)
     assert dependency_cycles(system) == ()
-    assert time.perf_counter() - start < 2.0
+    assert time.process_time() - start < 2.0
     assert steps(plan)[0] == f"configure n{count}"
     assert steps(plan)[count] == "configure n0"
 
