@@ -78,7 +78,7 @@ message_fields = cast(
 def describe(value: Any) -> str:
     """Return how an error speaks of ``value``: never the value itself, which may be huge."""
     kind = kind_of(type(value))
-    return f"a {type(value).__name__}" if kind is Kind.MESSAGE else kind.value
+    return type(value).__name__ if kind is Kind.MESSAGE else kind.value
 
 
 def plain(value: Any) -> Any:
