@@ -68,7 +68,7 @@ def parse_document(source: SourceFile) -> tuple[Mapping | None, list[Diagnostic]
     except Stopped as stopped:
         return None, [*builder.findings, stopped.finding]
     except (yaml.YAMLError, ValueError) as error:
-        return None, _with_syntax(builder.findings, explain(error, source))
+        return None, _with_syntax(builder.findings, explain(error, source, builder.open_bracket))
     return _root(builder.root, builder.findings, source)
 
 

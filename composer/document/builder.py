@@ -73,6 +73,11 @@ class TreeBuilder:
         self._anchors: dict[str, _Anchored | None] = {}  # None while what they mark is being read
         self._values = 0
 
+    @property
+    def open_bracket(self) -> Span | None:
+        """Where the innermost '[' or '{' stands that has not been closed."""
+        return next((part.start for part in reversed(self._open) if part.is_flow), None)
+
     def take(self, event: yaml.Event) -> None:
         """Go on by one event. Raises Stopped."""
         match event:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import stat
 from collections.abc import Iterator
@@ -56,23 +57,14 @@ def too_large(source: SourceFile) -> Diagnostic:
 
 def decode(data: bytes, shown_path: str) -> tuple[SourceFile, list[Diagnostic]]:
     """Return the text of UTF-8 ``data`` (a byte-order mark is dropped), or a finding."""
+    content = data.removeprefix(codecs.BOM_UTF8)
     try:
-        return SourceFile(shown_path, data.decode("utf-8-sig")), []
-    except UnicodeDecodeError:
-        pass
-    # Once more without the mark being special, so that the offset counts from the first byte.
-    source = SourceFile(shown_path, data.decode("utf-8", errors="replace"))
-    good = _longest_valid_prefix(data)
-    before = SourceFile("", data[:good].decode("utf-8")).lines
-    return source, [_not_utf8(data, good, Span(source, len(before), len(before[-1]) + 1))]
-
-
-def _longest_valid_prefix(data: bytes) -> int:
-    try:
-        data.decode("utf-8")
+        return SourceFile(shown_path, content.decode("utf-8")), []
     except UnicodeDecodeError as error:
-        return error.start
-    return len(data)
+        source = SourceFile(shown_path, content.decode("utf-8", errors="replace"))
+        before = SourceFile("", content[: error.start].decode("utf-8")).lines
+        span = Span(source, len(before), len(before[-1]) + 1)
+        return source, [_not_utf8(content, error.start, span)]
 
 
 def _not_utf8(data: bytes, offset: int, span: Span) -> Diagnostic:

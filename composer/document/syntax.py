@@ -32,6 +32,7 @@ class _Problem:
     context: str
     place: Mark
     began: Mark
+    bracket: Span | None
 
     @property
     def line(self) -> str:
@@ -67,8 +68,13 @@ class _Problem:
         return Label(span_at(self.source, self.began), message)
 
 
-def explain(error: yaml.YAMLError | ValueError, source: SourceFile) -> Diagnostic:
-    """Return the finding for whatever the parser raised."""
+def explain(
+    error: yaml.YAMLError | ValueError, source: SourceFile, bracket: Span | None
+) -> Diagnostic:
+    """Return the finding for whatever the parser raised.
+
+    ``bracket`` is the innermost one that was open then.
+    """
     place = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     if place is None:
         reason = shown(error).replace("\n", " ")
@@ -79,6 +85,7 @@ def explain(error: yaml.YAMLError | ValueError, source: SourceFile) -> Diagnosti
         getattr(error, "context", None) or "",
         place,
         getattr(error, "context_mark", None) or place,
+        bracket,
     )
     for explanation in _EXPLANATIONS:
         finding = explanation(problem)
@@ -121,14 +128,17 @@ def _in_brackets(problem: _Problem) -> Diagnostic | None:
     if problem.character == "{" and problem.before.endswith("$"):
         hint = 'write "${name}": inside braces and brackets it needs quotes'
         return problem.here("a '${...}' stands here without quotes", hint)
-    opening = problem.opening
-    closing = _CLOSING.get(opening, "")
-    if problem.place.line != problem.began.line:
-        return problem.there(
-            f"this '{opening}' is not closed", f"close it with '{closing}', or add a comma"
-        )
+    if problem.place.line != problem.began.line or not problem.character:
+        return _not_closed(problem, span_at(problem.source, problem.began))
     hint = f"{_QUOTE_TEXT} if it is one; commas separate items"
-    return problem.here(f"expected ',' or '{closing}' here", hint)
+    return problem.here(f"expected ',' or '{_CLOSING.get(problem.opening, '')}' here", hint)
+
+
+def _not_closed(problem: _Problem, bracket: Span) -> Diagnostic:
+    line = problem.source.line(bracket.line)
+    opening = line[bracket.column - 1 : bracket.column]
+    hint = f"close it with '{_CLOSING.get(opening, '')}', or add a comma"
+    return Diagnostic(YAML_SYNTAX, f"this '{opening}' is not closed", bracket, hint=hint)
 
 
 def _colon(problem: _Problem) -> Diagnostic | None:
@@ -189,6 +199,8 @@ def _cannot_start(problem: _Problem) -> Diagnostic | None:
 def _no_content(problem: _Problem) -> Diagnostic | None:
     if "node content" not in problem.words:
         return None
+    if not problem.character and problem.bracket is not None:
+        return _not_closed(problem, problem.bracket)
     found = f"'{shown(problem.character)}'" if problem.character else "the end of the line"
     return problem.here(f"expected a value, found {found}", f"{_QUOTE_TEXT} if it is one")
 

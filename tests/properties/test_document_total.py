@@ -1,0 +1,123 @@
+"""Reading takes any bytes, and what is written is what is read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from composer.diagnostics import LONGEST_ECHO
+from composer.document import parse_bytes, parse_document
+from composer.document.limits import MAX_INTEGER, MIN_INTEGER
+from composer.source import SourceFile
+from composer.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
+
+#: What YAML is made of, so that random texts get further than random characters do.
+PIECES = st.sampled_from(
+    [*"[]{},:?-#&*!|>'\"%@`\t \n\r\\~$", ": ", "- ", "a", "b: ", "<<", "*a", "&a ", "!!int ",
+     "---\n", "...\n", "%YAML 1.1\n", "\n  ", "\n    ", '"\\x', "\\u", "é", "\ud800", "\x00", "\x85",
+     "\u2028", "\ufeff", "1e999", ".nan", "0x", "null", "true", "{x}", "${x}", "system: a\n"]
+)  # fmt: skip
+
+
+def text_of(place: Tree) -> str:
+    span = place.span
+    return span.file.line(span.line)[span.column - 1 : span.column - 1 + span.length]
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.binary(max_size=200))
+@example(b"\xff\xfe\x00")
+@example(b"%YAML 1." + b"9" * 5000)
+@example(b'"\\U00110000"')
+def test_any_bytes(data: bytes) -> None:
+    tree, source, findings = parse_bytes(data, "f")
+    assert tree is not None or findings
+    for finding in findings:
+        assert finding.primary.file == source
+        assert 1 <= finding.primary.line <= len(source.lines)
+        assert 1 <= finding.primary.column <= len(source.line(finding.primary.line)) + 1
+        assert finding.message.isprintable()
+        assert len(finding.message) < 2 * LONGEST_ECHO + 100
+
+
+@settings(max_examples=500, deadline=None)
+@given(st.lists(PIECES, max_size=30).map("".join))
+def test_any_text(text: str) -> None:
+    tree, findings = parse_document(SourceFile("f", text))
+    assert tree is not None or findings
+    for finding in findings:
+        assert (
+            1 <= finding.primary.column <= len(finding.primary.file.line(finding.primary.line)) + 1
+        )
+        assert finding.message.isprintable()
+        assert finding.hint is None or finding.hint.isprintable()
+
+
+characters = st.characters(
+    codec="utf-8",
+    exclude_categories=("Cc", "Cf", "Cs", "Cn", "Zl", "Zp"),
+    include_characters="\t\n",
+)
+texts = st.text(characters, max_size=12)
+scalars = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(MIN_INTEGER, MAX_INTEGER),
+    st.floats(allow_nan=False, allow_infinity=False),
+    texts,
+)
+values: st.SearchStrategy[Plain] = st.recursive(
+    scalars,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(texts, inner, max_size=4),
+    max_leaves=20,
+)
+documents = st.dictionaries(texts, values, min_size=1, max_size=4)
+
+
+def quoted(value: Plain) -> str:
+    return json.dumps(value, ensure_ascii=False)
+
+
+def as_blocks(value: Plain, indent: str = "") -> str:
+    """Return ``value`` in block style: maps and lists over several lines."""
+    if isinstance(value, dict) and value:
+        lines = (f"{indent}{quoted(key)}:{_below(item, indent)}" for key, item in value.items())
+        return "\n".join(lines)
+    if isinstance(value, list) and value:
+        return "\n".join(f"{indent}-{_below(item, indent)}" for item in value)
+    return f"{indent}{quoted(value)}"
+
+
+def _below(value: Plain, indent: str) -> str:
+    if isinstance(value, (dict, list)) and value:
+        return "\n" + as_blocks(value, indent + "  ")
+    return f" {quoted(value)}"
+
+
+def scalars_in(tree: Tree) -> list[Scalar]:
+    match tree:
+        case Scalar():
+            return [tree]
+        case Sequence():
+            return [scalar for item in tree.items for scalar in scalars_in(item)]
+        case Mapping():
+            keys = [entry.key for entry in tree]
+            return keys + [scalar for entry in tree for scalar in scalars_in(entry.value)]
+
+
+@settings(max_examples=300, deadline=None)
+@given(documents, st.sampled_from([quoted, as_blocks]))
+def test_round_trip(document: dict[str, Plain], write: Callable[[Plain], str]) -> None:
+    tree, findings = parse_document(SourceFile("f", write(document)))
+    assert [finding.message for finding in findings] == []
+    assert tree is not None
+    assert repr(plain(tree)) == repr(document)
+    for scalar in scalars_in(tree):
+        if isinstance(scalar.value, str):
+            assert text_of(scalar) == quoted(scalar.value)
+            if scalar.verbatim:
+                whole = Scalar("", scalar.part(0, len(scalar.value)))
+                assert text_of(whole).removesuffix('"') == scalar.value

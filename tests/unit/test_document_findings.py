@@ -1,0 +1,175 @@
+"""What is wrong with a text as YAML: every finding, with its place, from either parser."""
+
+from __future__ import annotations
+
+import importlib
+
+import pytest
+import yaml
+
+from composer.diagnostics import Diagnostic
+from composer.document import parse_document
+from composer.source import SourceFile
+from composer.tree import plain
+
+PARSERS = [yaml.SafeLoader]
+if yaml.__with_libyaml__:
+    PARSERS.append(yaml.CSafeLoader)
+
+
+@pytest.fixture(params=PARSERS, ids=lambda parser: parser.__name__)
+def parser(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of the parsers that PyYAML may have in turn."""
+    events = importlib.import_module("composer.document.events")
+    monkeypatch.setattr(events, "_LOADER", request.param)
+
+
+def findings_in(text: str) -> list[Diagnostic]:
+    return parse_document(SourceFile("f", text))[1]
+
+
+def told(finding: Diagnostic) -> str:
+    return f"{finding.primary} {finding.message}"
+
+
+@pytest.mark.usefixtures("parser")
+@pytest.mark.parametrize(
+    ("text", "expected", "hint"),
+    [
+        ("a:\n\tb: 1", "f:2:1 a tab indents this line", "indent with spaces"),
+        ("a:\n  b: 1\n\tc: 2", "f:3:1 a tab indents this line", "indent with spaces"),
+        ("a:\n  b: 1\n \tc: 2", "f:3:2 a tab indents this line", "indent with spaces"),
+        ("a: 'x", "f:1:4 this quote is never closed", "end the text with another '"),
+        ('a: "x\nb: 1\n', "f:1:4 this quote is never closed", 'end the text with another "'),
+        ("a: [1, 2", "f:1:4 this '[' is not closed", "close it with ']'"),
+        ("a: {b: 1", "f:1:4 this '{' is not closed", "close it with '}'"),
+        ("a: [", "f:1:4 this '[' is not closed", "close it with ']'"),
+        ("a: [b, {c: [d],", "f:1:8 this '{' is not closed", "close it with '}'"),
+        ("a: [1,\nb: 2\n\n", "f:1:4 this '[' is not closed", "close it with ']'"),
+        ("a: {b: 1 ]", "f:1:10 expected ',' or '}' here", "commas separate items"),
+        ("a: {t: ${x}}", "f:1:9 a '${...}' stands here without quotes", 'write "${name}"'),
+        ("log: Received: {m}", "f:1:14 a second ':' in one value", "whole text in quotes"),
+        ("- a: b: c", "f:1:7 a second ':' in one value", "whole text in quotes"),
+        ("a\nbcd: 1", "f:2:1 this key stands where none can", "line it up"),
+        ("a: b\n  cd: 1", "f:2:3 this key stands where none can", "line it up"),
+        ("a: 1\nb:2\nc: 3", "f:2:2 there is no space behind this colon", "'key: value'"),
+        ("a: 1\nb\nc: 3", "f:2:1 this line has no key, or its key no ':'", "'key: value'"),
+        (
+            "a:\n   b: 1\n  c: 1",
+            "f:3:3 this line is not in line with the keys it stands among",
+            "the same indentation",
+        ),
+        ("a: 1\n- b", "f:2:1 a list item stands among keys", "under the key it belongs to"),
+        ("a: [b]]", "f:1:7 this ']' closes nothing", "delete it"),
+        ('a: "x" y', "f:1:8 this stands behind a finished value", "whole text in quotes"),
+        ("- a\nb: 1", "f:2:1 this line stands in a list and is no item of it", "'- '"),
+        ("a: @x", "f:1:4 no value begins with '@'", "whole text in quotes"),
+        ("a: `x`", "f:1:4 no value begins with '`'", "whole text in quotes"),
+        ("a: %x", "f:1:4 no value begins with '%'", "whole text in quotes"),
+        ("a: ]", "f:1:4 expected a value, found ']'", "whole text in quotes"),
+        ("a: {b: 1,, c: 2}", "f:1:10 expected a value, found ','", "whole text in quotes"),
+        ('a: "\\q"', "f:1:5 this backslash begins no escape that YAML knows", "single quotes"),
+        ('a: "xy\\x9"', "f:1:7 this backslash begins no escape that YAML knows", "single"),
+        ("a: |x\n b", "f:1:5 this does not belong behind '|' or '>'", "end of the line"),
+        ("'a':1", "f:1:4 the YAML ends before this", "space behind the colon"),
+        ("a: 1\n...\nfoo", "f:3:1 the YAML ends before this", "one map"),
+    ],
+)
+def test_syntax(text: str, expected: str, hint: str) -> None:
+    (finding,) = findings_in(text)
+    assert told(finding) == expected
+    assert finding.rule.name == "yaml-syntax"
+    assert hint in str(finding.hint)
+
+
+@pytest.mark.usefixtures("parser")
+def test_misplaced_line_shows_where_its_map_begins() -> None:
+    (finding,) = findings_in("x: 1\na:\n  b: 1\n c: 2")
+    assert [(str(label.span), label.message) for label in finding.related] == [
+        ("f:1:1", "the map begins here")
+    ]
+
+
+@pytest.mark.usefixtures("parser")
+@pytest.mark.parametrize(
+    ("text", "rule", "expected"),
+    [
+        ("", "not-a-map", "f:1:1 this file is empty"),
+        ("# only a comment\n", "not-a-map", "f:1:1 this file is empty"),
+        ("---\n", "not-a-map", "f:1:1 this file is empty"),
+        ("- a", "not-a-map", "f:1:3 expected keys and values, found a list"),
+        ("a:b", "not-a-map", "f:1:1 expected keys and values, found text 'a:b'"),
+        ("7", "not-a-map", "f:1:1 expected keys and values, found the number 7"),
+        ("a: 1\n---\nb: 2", "several-documents", "f:2:1 a second document begins here"),
+        ("a: !!str 5", "yaml-tag", "f:1:4 the tag '!!str' is not read"),
+        ("a: !env x", "yaml-tag", "f:1:4 the tag '!env' is not read"),
+        ("a: !!python/object:os.system {}", "yaml-tag", "f:1:4 the tag"),
+        ("a: 1\nb: 2\na: 3", "duplicate-key", "f:3:1 the key 'a' stands here a second time"),
+        ("x: {a: 1, 'a': 3}", "duplicate-key", "f:1:11 the key 'a' stands here a second time"),
+        ("1: x", "key-not-text", "f:1:1 a key is text, found the number 1"),
+        ("true: x", "key-not-text", "f:1:1 a key is text, found true"),
+        ("x: {null: y}", "key-not-text", "f:1:5 a key is text, found nothing"),
+        ("x: {[a]: b}", "key-not-text", "f:1:5 a key is text, found a list"),
+        ("x: {{a: 1}: b}", "key-not-text", "f:1:5 a key is text, found a map"),
+        ("x: {? : y}", "key-not-text", "f:1:"),  # one parser says 6, the other 7
+        ("x: {<<: {a: 1}}", "merge-key", "f:1:5 YAML merge keys are not read"),
+        ("a: *x", "bad-alias", "f:1:4 '*x' repeats something, but nothing before it is marked"),
+        ("a: &x [*x]", "bad-alias", "f:1:8 '*x' is part of what it stands for"),
+        ("a: &x b\nc: {*x : 1}", "bad-alias", "f:2:5 the alias '*x' stands where a key"),
+        ("log: {message.data}", "key-without-value", "f:1:7 '{message.data}' is a map whose key"),
+        ("log: {data} read", "key-without-value", "f:1:7 '{data}' is a map whose key"),
+        ("t: {rate_hz:10}", "key-without-value", "f:1:5 there is no space behind the colon of"),
+        ("a: \x1b[2J", "forbidden-character", "f:1:4 the character U+001B is not allowed"),
+        ("a: 1\nb: \x00", "forbidden-character", "f:2:4 the character U+0000 is not allowed"),
+        ("a: \x85", "forbidden-character", "f:1:4 the character U+0085 is not allowed"),
+        ("# \u202e", "forbidden-character", "f:1:3 the character U+202E (RIGHT-TO-LEFT OVERRIDE)"),
+        ("a: x\u2028y", "forbidden-character", "f:1:5 the character U+2028 (LINE SEPARATOR)"),
+        ("a: \ufeff", "forbidden-character", "f:1:4 the character U+FEFF"),
+        ("a: \ud800", "forbidden-character", "f:1:4 the character U+D800"),
+        ('a: "\\e]0;pwn\\a"', "forbidden-character", "f:1:4 this text contains the character"),
+        ('a: "\\u202e"', "forbidden-character", "f:1:4 this text contains the character U+202E"),
+        ('a: "\\r"', "forbidden-character", "f:1:4 this text contains the character U+000D"),
+    ],
+)
+def test_finding(text: str, rule: str, expected: str) -> None:
+    (finding,) = findings_in(text)
+    assert finding.rule.name == rule
+    assert told(finding).startswith(expected)
+
+
+def test_second_key_shows_the_first() -> None:
+    (finding,) = findings_in("x:\n  a: 1\n  b: 2\n  a: 3")
+    assert [str(label.span) for label in finding.related] == ["f:2:3"]
+
+
+@pytest.mark.parametrize(
+    "text", ["a: 😀👩‍🚀", "a: م", "a: 1 # ✓ é", 'a: "tab\\t line\\n"', "a: m/s²"]
+)
+def test_characters_people_write(text: str) -> None:
+    assert findings_in(text) == []
+
+
+def test_all_findings_in_one_run() -> None:
+    text = "a: .nan\nb: !x 1\nc: 1\nc: 2\n5: x\nd: {<<: 1}\ne: {x}"
+    assert [finding.rule.code for finding in findings_in(text)] == [
+        "RC014", "RC010", "RC011", "RC012", "RC013", "RC016",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("a: 1\na: 2\nb: 3", {"a": 1, "b": 3}),  # the first counts
+        ("t: {rate_hz:10}", {"t": {"rate_hz": 10}}),
+        ("log: {message.data}", {"log": "{message.data}"}),
+        ("a: {<<: {b: 1}, c: 2}", {"a": {"c": 2}}),
+        ("1: {b: 2}", {"1": {"b": 2}}),
+        ('a: "x\\e[0my"', {"a": "x[0my"}),
+        ("a: !x 5", {"a": "5"}),
+    ],
+)
+def test_what_is_meant_is_read_beside_the_finding(text: str, value: object) -> None:
+    tree, findings = parse_document(SourceFile("f", text))
+    assert len(findings) == 1
+    assert tree is not None
+    assert plain(tree) == value

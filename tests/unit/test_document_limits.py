@@ -1,0 +1,119 @@
+"""Input that was made to do harm: one finding with a place, at once, and without much memory."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+
+import pytest
+
+from composer.document import parse_bytes, parse_document
+from composer.document.limits import MAX_BYTES, MAX_DEPTH, MAX_VALUES
+from composer.source import SourceFile
+
+#: Of CPU time, so that a busy machine makes no difference.
+SECONDS_ALLOWED = 2.0
+
+
+def laughs() -> str:
+    lines = ["a: &a [x, x, x, x, x, x, x, x, x]"]
+    lines += [
+        f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]"
+        for before, name in zip("abcdefgh", "bcdefghi", strict=True)
+    ]
+    return "\n".join(lines)
+
+
+def nested_blocks(levels: int) -> str:
+    return "\n".join(f"{' ' * level}a:" for level in range(levels))
+
+
+FULL = MAX_BYTES
+ATTACKS = {
+    "200 000 brackets": ("[" * 200_000, "nested-too-deep"),
+    "brackets": ("[" * FULL, "nested-too-deep"),
+    "braces": ("{" * FULL, "nested-too-deep"),
+    "lists in one line": ("- " * (FULL // 2), "nested-too-deep"),
+    "keys in one line": ("? " * (FULL // 2), "nested-too-deep"),
+    "lists and maps": ("[{a: " * (FULL // 5), "nested-too-deep"),
+    "indented maps": (nested_blocks(1300), "nested-too-deep"),
+    "billion laughs": (laughs(), "too-many-values"),
+    "small maps": ("- {a: 1}\n" * (FULL // 9), "too-many-values"),
+    "many keys": ("".join(f"k{number}: 1\n" for number in range(90_000)), "too-many-values"),
+    "alias of itself": ("a: &a [*a]", "bad-alias"),
+    "one key again and again": ("a: 1\n" * 20_000, "duplicate-key"),
+    "blanks": (" " * FULL, "not-a-map"),
+    "empty lines": ("\n" * FULL, "not-a-map"),
+    "a comment": ("#" * FULL, "not-a-map"),
+    "quotes": ("a: '" + "'" * (FULL - 4), "yaml-syntax"),
+    "colons": (":" * FULL, "yaml-syntax"),
+    "commas": ("[a" + "," * (FULL - 2), "yaml-syntax"),
+    "a long anchor": ("a: &" + "x" * (FULL - 4), None),
+    "a long tag": ("a: !" + "x" * (FULL - 4), "yaml-tag"),
+    "a long key": ("k" * 500_000 + ": 1", "yaml-syntax"),
+    "a long text": ("a: " + "x" * (FULL - 3), None),
+    "a text of many lines": ("a: x\n" + "  y\n" * (FULL // 4 - 2), None),
+    "a text of many escapes": ('a: "' + "\\n" * (FULL // 2 - 3) + '"', None),
+    "terminal escapes": ("\x1b]0;pwned\x07" * (FULL // 11), "forbidden-character"),
+    "a long integer": ("a: " + "9" * (FULL - 3), "bad-number"),
+    "a long float": ("a: 1." + "9" * (FULL - 5), "bad-number"),
+    "nearly a number": ("a: " + "9" * (FULL - 4) + "x", None),
+    "a long directive": ("%YAML 1." + "9" * 10_000 + "\n---\na: 1", "yaml-syntax"),
+}
+
+
+@pytest.mark.parametrize(("text", "rule"), ATTACKS.values(), ids=ATTACKS)
+def test_attack(text: str, rule: str | None) -> None:
+    started = time.process_time()
+    _, findings = parse_document(SourceFile("f", text))
+    assert time.process_time() - started < SECONDS_ALLOWED
+    if rule is None:
+        assert findings == []
+    else:
+        assert {finding.rule.name for finding in findings} == {rule}
+        assert all(len(finding.message) < 300 for finding in findings)
+
+
+def test_size_is_looked_at_before_the_text() -> None:
+    _, _, findings = parse_bytes(b"\xff" * (MAX_BYTES + 1), "f")
+    assert [finding.rule.name for finding in findings] == ["file-too-large"]
+    _, findings = parse_document(SourceFile("f", " " * (MAX_BYTES + 1)))
+    assert [finding.rule.name for finding in findings] == ["file-too-large"]
+
+
+@pytest.mark.parametrize(("depth", "fits"), [(MAX_DEPTH, True), (MAX_DEPTH + 1, False)])
+def test_depth(depth: int, fits: bool) -> None:
+    lists = depth - 1  # within one map
+    tree, findings = parse_document(SourceFile("f", f"a: {'[' * lists}{']' * lists}"))
+    assert (tree is not None, findings == []) == (fits, fits)
+
+
+@pytest.mark.parametrize(("lists", "fits"), [(15, True), (16, False)])
+def test_depth_through_an_alias(lists: int, fits: bool) -> None:
+    brackets = "[" * 16, "]" * 16
+    text = f"a: &a {brackets[0]}{brackets[1]}\nb: {'[' * lists}*a{']' * lists}"
+    tree, findings = parse_document(SourceFile("f", text))
+    assert (tree is not None, findings == []) == (fits, fits)
+
+
+@pytest.mark.parametrize(("items", "fits"), [(MAX_VALUES // 10, False), (MAX_VALUES // 11, True)])
+def test_values_through_aliases_count_again(items: int, fits: bool) -> None:
+    repeated = ", ".join(["*a"] * 9)
+    text = f"a: &a [{','.join('x' * items)}]\nb: [{repeated}]"
+    tree, findings = parse_document(SourceFile("f", text))
+    assert (tree is not None, findings == []) == (fits, fits)
+
+
+def test_memory() -> None:
+    program = (
+        "import resource\n"
+        "from composer.document import parse_document\n"
+        "from composer.source import SourceFile\n"
+        f"parse_document(SourceFile('f', '- {{a: 1}}\\n' * {MAX_BYTES // 9}))\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True
+    )
+    assert int(ran.stdout) < 200_000  # kilobytes
