@@ -1,0 +1,183 @@
+"""``compose run`` and ``compose lifecycle`` as people use them: two terminals, real ROS."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+COMPOSE = [sys.executable, "-m", "composer"]
+PATIENCE_S = 30.0
+
+
+def compose(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*COMPOSE, *arguments], check=False, capture_output=True, text=True, timeout=PATIENCE_S
+    )
+
+
+class Running:
+    """A ``compose run`` in another terminal."""
+
+    def __init__(self, log: Path, *arguments: str) -> None:
+        self.log = log
+        with log.open("w") as file:
+            self.process = subprocess.Popen(
+                [*COMPOSE, "run", *arguments], stderr=file, stdout=subprocess.PIPE, text=True
+            )
+
+    def wait_for(self, text: str) -> None:
+        until_s = time.monotonic() + PATIENCE_S
+        while text not in self.log.read_text():
+            assert self.process.poll() is None, self.log.read_text()
+            assert time.monotonic() < until_s, self.log.read_text()
+            time.sleep(0.02)
+
+    def stop(self, number: int = signal.SIGINT) -> tuple[int, str, str]:
+        """Send the signal; return exit code, stdout and stderr."""
+        self.process.send_signal(number)
+        out, _ = self.process.communicate(timeout=PATIENCE_S)
+        return self.process.returncode, out, self.log.read_text()
+
+
+@contextmanager
+def running(log: Path, *arguments: str) -> Iterator[Running]:
+    run = Running(log, *arguments)
+    try:
+        yield run
+    finally:
+        run.process.kill()
+        run.process.wait()
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return tmp_path / "stderr.txt"
+
+
+def states_in(text: str) -> list[str]:
+    """Return the state changes that were shown, as 'node state'."""
+    lines = [line.rpartition("[compose] ")[2] for line in text.splitlines() if "[compose]" in line]
+    return [line for line in lines if line.startswith("/") and len(line.split()) == 2]
+
+
+def test_a_system_comes_up_in_order_stops_by_itself_and_sums_up() -> None:
+    done = compose("run", "pipeline", "--for", "1")
+    assert (done.returncode, done.stdout) == (0, "")
+    shown = states_in(done.stderr)
+    assert shown[3:6] == [
+        "/perception/sensor_simulator active",
+        "/planning/planner active",
+        "/control/motor_controller active",
+    ]
+    assert shown[6] == "/control/motor_controller inactive"
+    assert "3 of 3 nodes active" in done.stderr
+    table = done.stderr.splitlines()[-4:]
+    assert table[0].split() == ["node", "state", "received", "sent", "calls", "dropped", "errors"]
+    assert table[1].split()[:2] == ["/perception/sensor_simulator", "finalized"]
+    assert int(table[1].split()[3]) > 10
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_tears_down_in_reverse_and_leaves_no_trace(log: Path, number: int) -> None:
+    with running(log, "pipeline") as run:
+        run.wait_for("3 of 3 nodes active")
+        code, out, err = run.stop(number)
+    assert (code, out) == (0, "")
+    assert "Traceback" not in err
+    assert states_in(err)[6:9] == [
+        "/control/motor_controller inactive",
+        "/planning/planner inactive",
+        "/perception/sensor_simulator inactive",
+    ]
+
+
+def test_a_node_is_deactivated_and_activated_from_another_terminal(log: Path) -> None:
+    with running(log, "pipeline") as run:
+        run.wait_for("3 of 3 nodes active")
+        listed = json.loads(compose("lifecycle", "nodes", "--json").stdout)
+        assert listed == dict.fromkeys(
+            ["/control/motor_controller", "/perception/sensor_simulator", "/planning/planner"],
+            "active",
+        )
+        done = compose("lifecycle", "set", "planner", "deactivate")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout == "/planning/planner: active -> inactive\n"
+        run.wait_for("[compose] /planning/planner inactive")
+        assert compose("lifecycle", "get", "planner").stdout == "inactive\n"
+        assert set(compose("lifecycle", "list", "planner").stdout.split()) == {
+            "activate",
+            "cleanup",
+            "shutdown",
+        }
+        refused = compose("lifecycle", "set", "planner", "configure")
+        assert (refused.returncode, refused.stdout) == (1, "")
+        assert "'configure' is not possible: /planning/planner is inactive" in refused.stderr
+        assert "possible now: " in refused.stderr
+        assert compose("lifecycle", "set", "/planning/planner", "activate").returncode == 0
+        assert run.stop()[0] == 0
+
+
+def test_autostart_and_namespace(log: Path) -> None:
+    arguments = ("pipeline", "--autostart", "inactive", "--namespace", "/robot1")
+    with running(log, *arguments) as run:
+        run.wait_for("0 of 3 nodes active")
+        got = compose("lifecycle", "get", "/robot1/planning/planner")
+        assert got.stdout == "inactive\n"
+        assert run.stop()[0] == 0
+
+
+def test_a_node_that_fails_ends_the_run_with_exit_code_1(tmp_path: Path) -> None:
+    (tmp_path / "sour.py").write_text(
+        "from composer.behavior import Behavior\n\n\n"
+        "class Sour(Behavior):\n"
+        "    def on_activate(self) -> None:\n"
+        "        raise RuntimeError('no milk')\n"
+    )
+    (tmp_path / "sour.yaml").write_text(
+        "system: sour\nnodes:\n  good: {}\n  bad: {behavior: 'sour:Sour'}\n"
+    )
+    done = compose("run", str(tmp_path / "sour.yaml"))
+    assert done.returncode == 1
+    assert "no milk" in done.stderr
+    assert "rolling back because of /bad" in done.stderr
+    assert states_in(done.stderr)[-1].endswith("finalized")
+
+
+def test_an_environment_that_ros_would_misread_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "-1")
+    for arguments in (["run", "minimal", "--for", "1"], ["lifecycle", "nodes"]):
+        done = compose(*arguments)
+        assert done.returncode == 1
+        assert "compose: ROS_DOMAIN_ID is '-1'" in done.stderr
+
+
+def test_no_nodes_at_all_is_told_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
+    started_s = time.monotonic()
+    done = compose("lifecycle", "get", "planner", "--timeout", "1")
+    assert time.monotonic() - started_s < 5.0
+    assert done.returncode == 1
+    assert "no lifecycle node was found at all" in done.stderr
+
+
+def test_ctrl_c_ends_a_waiting_command_without_a_traceback() -> None:
+    process = subprocess.Popen(
+        [*COMPOSE, "lifecycle", "get", "nobody", "--timeout", "60"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+    time.sleep(1.5)  # nothing to wait on: the command says nothing until it ends
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, out, err) == (130, "", "")
