@@ -19,6 +19,14 @@ NO_ROS = "rclpy cannot be imported"
 DOMAIN_IDS = range(1, 102)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--update-golden",
+        action="store_true",
+        help="write what the golden tests get as what they expect; read the difference before commit",
+    )
+
+
 def _may_skip() -> bool:
     """Tell whether tests with ROS may be left out: never in CI, where green must mean tested."""
     return importlib.util.find_spec("rclpy") is None and os.environ.get("CI") != "true"

@@ -12,15 +12,24 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from importlib import import_module
 
-from composer.checks.context import Context
+from composer.checks.context import Context, place
 from composer.diagnostics import Diagnostic, in_order
 
 Check = Callable[[Context], Iterator[Diagnostic]]
 
 
 def run_checks(context: Context) -> list[Diagnostic]:
-    """Return every finding of every rule, sorted by place."""
-    return in_order(finding for check in all_checks() for finding in check(context))
+    """Return every finding of every rule, sorted by place.
+
+    What an earlier stage refused is not found fault with again.
+    """
+    refused = {place(span) for span in context.refused}
+    return in_order(
+        finding
+        for check in all_checks()
+        for finding in check(context)
+        if place(finding.primary) not in refused
+    )
 
 
 @cache

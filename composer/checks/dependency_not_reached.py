@@ -51,7 +51,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     f"but '{other.name}' is started only as far as {other.autostart}",
                     dependency.node.span,
                     (Label(other.autostart.span, "stays here until it is moved by hand"),),
-                    f"depend on it being {other.autostart}, or let it start further",
+                    _hint(other.autostart.value),
                 )
 
 
@@ -59,3 +59,9 @@ def _start(system: System, node: Node) -> int:
     """Return the rank of the state that the bring-up takes a node to, if nothing is in the way."""
     own = node.autostart.value if node.autostart is not None else system.autostart
     return min(_RANK[own], _RANK[system.autostart])
+
+
+def _hint(reached: PrimaryState) -> str:
+    if reached is PrimaryState.UNCONFIGURED:
+        return "let it start further, or do not depend on it"
+    return f"let it start further, or depend on it being {reached}"

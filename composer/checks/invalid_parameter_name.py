@@ -42,7 +42,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             name = parameter.name
             problem = parameter_name_problem(name.value)
             if problem is not None and not is_opaque(name.value):
-                better = ".".join(safe_name(part) for part in name.value.split("."))
+                better = ".".join(safe_name(part) for part in name.value.split(".") if part)
                 yield Diagnostic(
                     RULE,
                     f"parameter name '{name}' {problem}",

@@ -72,10 +72,6 @@ def _range(parameter: Parameter) -> Iterator[Diagnostic]:
             (Label(high.span, f"the maximum is {high}"),),
             "swap them",
         )
-    if step is not None and step.value <= 0:
-        yield Diagnostic(
-            RULE, f"parameter '{name}' has a step of {step}, which is not positive", step.span
-        )
 
 
 def _choices(parameter: Parameter) -> Iterator[Diagnostic]:

@@ -43,19 +43,13 @@ def check(context: Context) -> Iterator[Diagnostic]:
         problem = range_problem(parameter, value.value)
         if problem is not None:
             yield Diagnostic(
-                RULE, f"parameter '{parameter.name}': {problem}", value.span, _labels(parameter)
+                RULE,
+                f"parameter '{parameter.name}': {problem.message}",
+                value.span,
+                (Label(problem.limit.span, "the limit"),),
             )
 
 
 def _is_contradictory(parameter: Parameter) -> bool:
     low, high = parameter.minimum, parameter.maximum
     return low is not None and high is not None and low.value > high.value
-
-
-def _labels(parameter: Parameter) -> tuple[Label, ...]:
-    words = {"minimum": parameter.minimum, "maximum": parameter.maximum, "step": parameter.step}
-    return tuple(
-        Label(limit.span, f"the {word} is {limit}")
-        for word, limit in words.items()
-        if limit is not None
-    )

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from composer.model import Parameter, ParameterType
+from composer.source import Located
 from composer.tree import Plain
 
 _INTEGERS = (-(2**63), 2**63 - 1)
@@ -20,6 +22,16 @@ _ELEMENTS = {
     ParameterType.DOUBLE_ARRAY: "double",
     ParameterType.STRING_ARRAY: "string",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class RangeProblem:
+    """What is wrong with a number, and the limit that it breaks."""
+
+    message: str
+    limit: Located[float]
+
+
 KNOWN_TYPES = frozenset(kind.value for kind in ParameterType)
 
 
@@ -36,7 +48,7 @@ def type_problem(value: Plain, kind: str) -> str | None:
     return None
 
 
-def range_problem(parameter: Parameter, value: Plain) -> str | None:
+def range_problem(parameter: Parameter, value: Plain) -> RangeProblem | None:
     """Return how a number, or one of several, is out of the parameter's range, or None."""
     for item in numbers(value):
         problem = _range_problem(parameter, item)
@@ -92,17 +104,19 @@ def _is_number(value: Plain) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _range_problem(parameter: Parameter, value: float) -> str | None:
+def _range_problem(parameter: Parameter, value: float) -> RangeProblem | None:
     low, high, step = parameter.minimum, parameter.maximum, parameter.step
     unit = f" {parameter.unit}" if parameter.unit else ""
     if low is not None and value < low.value:
-        return f"{value}{unit} is less than the minimum of {low}{unit}"
+        return RangeProblem(f"{value}{unit} is less than the minimum of {low}{unit}", low)
     if high is not None and value > high.value:
-        return f"{value}{unit} is more than the maximum of {high}{unit}"
+        return RangeProblem(f"{value}{unit} is more than the maximum of {high}{unit}", high)
     if step is None or step.value <= 0 or (high is not None and value == high.value):
         return None
     steps = (value - (low.value if low is not None else 0)) / step.value
     if math.isfinite(steps) and abs(steps - round(steps)) > _TOLERANCE:
         start = f" from {low}{unit}" if low is not None else ""
-        return f"{value}{unit} is not a whole number of steps of {step}{unit}{start}"
+        return RangeProblem(
+            f"{value}{unit} is not a whole number of steps of {step}{unit}{start}", step
+        )
     return None

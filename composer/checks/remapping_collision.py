@@ -50,19 +50,25 @@ def check(context: Context) -> Iterator[Diagnostic]:
         joined: dict[tuple[PortKind, str], list[Port]] = defaultdict(list)
         for port in node.ports:
             joined[port.kind, port.full_name].append(port)
+        told: set[tuple[PortKind, str]] = set()
         for remapping in node.remappings:
-            yield from _remapping(node, remapping, joined)
+            yield from _remapping(node, remapping, joined, told)
 
 
 def _remapping(
-    node: Node, remapping: Remapping, joined: dict[tuple[PortKind, str], list[Port]]
+    node: Node,
+    remapping: Remapping,
+    joined: dict[tuple[PortKind, str], list[Port]],
+    told: set[tuple[PortKind, str]],
 ) -> Iterator[Diagnostic]:
+    """Report each name once, where a remapping first brings it about."""
     if is_opaque(remapping.target.value):
         return
     target = own_name(node, remapping.target.value)
     for port in matched_ports(node, remapping):
         others = [other for other in joined[port.kind, target] if other is not port]
-        if port.full_name == target and others:
+        if port.full_name == target and others and (port.kind, target) not in told:
+            told.add((port.kind, target))
             yield Diagnostic(
                 RULE,
                 f"remapping '{remapping.source}' to '{remapping.target}' puts {port.kind}s "

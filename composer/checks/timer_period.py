@@ -10,7 +10,7 @@ from composer.checks.periods import period_value
 from composer.checks.words import number
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.expressions import Expression
-from composer.model import Node, PeriodUnit, Timer
+from composer.model import PeriodUnit, Timer
 
 RULE = register(
     Rule(
@@ -50,7 +50,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             if problem is not None:
                 yield Diagnostic(
                     RULE,
-                    f"timer '{timer.name}' {problem}{_origin(node, timer)}",
+                    f"timer '{timer.name}' {problem}{_origin(timer)}",
                     timer.period.span,
                     hint="use a period between 0.1 ms and one day",
                 )
@@ -71,8 +71,9 @@ def _problem(timer: Timer, value: float) -> str | None:
     return None
 
 
-def _origin(node: Node, timer: Timer) -> str:
+def _origin(timer: Timer) -> str:
     """Say which values an expression got its result from."""
-    if not isinstance(timer.period.value, Expression):
+    value = timer.period.value
+    if not isinstance(value, Expression) or not value.paths:
         return ""
-    return f" with the parameters that node '{node.name}' starts with"
+    return ", with the values its parameters start with"

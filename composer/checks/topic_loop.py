@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context, is_opaque
+from composer.checks.wiring import place_of
 from composer.checks.words import end_name
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Event, Port, PortKind, PortOfNode
@@ -59,7 +60,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for start in steps:
         circle = _circle(steps, start, done)
         if circle:
-            yield _finding(circle)
+            yield _finding(context, circle)
 
 
 def _steps(context: Context) -> _Steps:
@@ -105,14 +106,14 @@ def _circle(steps: _Steps, start: str, done: set[str]) -> list[tuple[str, PortOf
     return []
 
 
-def _finding(circle: list[tuple[str, PortOfNode]]) -> Diagnostic:
+def _finding(context: Context, circle: list[tuple[str, PortOfNode]]) -> Diagnostic:
     names = [topic for topic, _ in circle]
     way = " -> ".join((names[-1], *names))
-    first, *others = [end for _, end in circle]
+    first, *others = [(end, place_of(context, end)[0]) for _, end in circle]
     return Diagnostic(
         RULE,
         f"messages go round for ever: {way}",
-        first.port.name.span,
-        tuple(Label(end.port.name.span, f"'{end_name(end)}' passes them on") for end in others),
+        first[1],
+        tuple(Label(place, f"'{end_name(end)}' passes them on") for end, place in others),
         "let a timer publish, or add a 'when' that ends it",
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
-from composer.checks.wiring import lonely_ends, place_of
+from composer.checks.wiring import external_hint, lonely_ends, place_of
 from composer.checks.words import end_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import PortKind
@@ -47,5 +47,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 f"which '{end_name(end)}' publishes",
                 place,
                 labels,
-                "say 'external: true' if somebody outside does",
+                external_hint(context, end),
             )

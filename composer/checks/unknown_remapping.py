@@ -68,7 +68,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     RULE,
                     f"node '{node.name}' has no port with the name '{source}' to remap",
                     source.span,
-                    hint=suggestion(source.value, [port.ros_name.value for port in node.ports]),
+                    hint=_hint(node, source.value),
                 )
 
 
@@ -79,3 +79,10 @@ def _known(node: Node, remapping: Remapping) -> bool:
     return any(matched_ports(node, remapping)) or own_name(node, source) in {
         own_name(node, name) for name in _EVERY_NODE
     }
+
+
+def _hint(node: Node, source: str) -> str | None:
+    port = node.port(source)
+    if port is not None:
+        return f"the {port.kind.channel} of port '{source}' is called '{port.ros_name}'"
+    return suggestion(source, [port.ros_name.value for port in node.ports])

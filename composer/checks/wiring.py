@@ -65,6 +65,15 @@ def place_of(context: Context, end: PortOfNode) -> tuple[Span, tuple[Label, ...]
     return end.node.name.span, (Label(declared, f"{end.port.kind} '{end.port.name}'"),)
 
 
+def external_hint(context: Context, end: PortOfNode) -> str:
+    """Return how to say that the other end of a port is outside the system."""
+    port = end.port
+    said = "external: true"
+    if port.name.span.file != context.system.source:
+        said = f"{port.kind.section}: {{{port.name}: {{external: true}}}}"
+    return f"say '{said}' if somebody outside does"
+
+
 @dataclass(slots=True)
 class _Doubts:
     """What may be wired wrongly because of a mistake that is reported elsewhere."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Sequence
 
 from composer.diagnostics import nearest
-from composer.model import Channel, Port, PortKind, PortOfNode
+from composer.model import Channel, PortKind, PortOfNode
 
 
 def a(kind: PortKind) -> str:
@@ -36,9 +37,15 @@ def number(value: float) -> str:
 
 def safe_name(name: str) -> str:
     """Return a valid ROS name made of what can be kept of ``name``."""
-    kept = "".join(character if _is_safe(character) else "_" for character in name)
+    plain = unicodedata.normalize("NFKD", name)
+    kept = "".join(character if _is_safe(character) else "_" for character in _base(plain))
     joined = re.sub("__+", "_", kept).strip("_")
     return f"n{joined}" if not joined or joined[0].isdigit() else joined
+
+
+def _base(text: str) -> str:
+    """Return ``text`` without the accents that were taken off its letters."""
+    return "".join(character for character in text if not unicodedata.combining(character))
 
 
 def _is_safe(character: str) -> bool:
@@ -58,11 +65,15 @@ def nearest_channel(channels: Sequence[Channel], end: PortOfNode) -> str | None:
         for channel in channels
         if channel.kind is port.kind.channel
         and channel.name != port.full_name
-        and any(_could_meet(port, other.port) for other in channel.ends)
+        and any(_could_meet(end, other) for other in channel.ends)
     ]
     close = nearest(port.full_name, names)
     return f"did you mean '{close}'?" if close is not None else None
 
 
-def _could_meet(one: Port, other: Port) -> bool:
-    return one.kind is not other.kind and one.interface == other.interface
+def _could_meet(one: PortOfNode, other: PortOfNode) -> bool:
+    return (
+        one.node.name != other.node.name
+        and one.port.kind is not other.port.kind
+        and one.port.interface == other.port.interface
+    )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from composer.checks.context import Context
 from composer.checks.reactions import sends
 from composer.checks.words import a, either
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
-from composer.model import ChannelKind, Connection, Endpoint, PortKind
+from composer.model import ChannelKind, Connection, Endpoint, Port, PortKind
 
 RULE = register(
     Rule(
@@ -58,10 +59,7 @@ _SENDERS = {
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the ends of connections and at the ports that reactions send through."""
     for connection in context.system.connections:
-        groups = (connection.sources, connection.sinks)
-        for endpoints, (key, kind) in zip(groups, _ENDS[connection.kind], strict=True):
-            for endpoint in endpoints:
-                yield from _endpoint(context, connection, endpoint, key, kind)
+        yield from _connection(context, connection)
     for site, key, send in sends(context.system):
         port = site.node.port(send.port.value)
         allowed = _SENDERS[key]
@@ -75,26 +73,73 @@ def check(context: Context) -> Iterator[Diagnostic]:
             )
 
 
-def _endpoint(
-    context: Context, connection: Connection, endpoint: Endpoint, key: str, kind: PortKind
-) -> Iterator[Diagnostic]:
-    port = context.system.port(endpoint)
-    if port is None or port.kind is kind:
+@dataclass(frozen=True, slots=True)
+class _End:
+    """An end of a connection: its key, the kind of port it takes, and the port that is there."""
+
+    endpoint: Endpoint
+    key: str
+    wanted: PortKind
+    port: Port
+
+    @property
+    def label(self) -> Label:
+        return Label(self.port.name.span, f"'{self.endpoint.text}' is {a(self.port.kind)}")
+
+
+def _connection(context: Context, connection: Connection) -> Iterator[Diagnostic]:
+    ends = list(_ends(context, connection))
+    wrong = [end for end in ends if end.port.kind is not end.wanted]
+    kinds = {end.port.kind.channel for end in wrong}
+    if len(wrong) > 1 and len(wrong) == len(ends) and len(kinds) == 1:
+        yield _all_wrong(connection, wrong, kinds.pop())
         return
-    actual = port.kind
-    if actual.channel is connection.kind:
-        other = next(other for other, belongs in _ENDS[connection.kind] if belongs is actual)
-        hint = f"{a(actual)} belongs under '{other}'"
+    for end in wrong:
+        actual = end.port.kind
+        yield Diagnostic(
+            RULE,
+            f"'{end.key}' of {connection.kind} '{connection.name}' needs {a(end.wanted)}, "
+            f"but '{end.endpoint.text}' is {a(actual)}",
+            end.endpoint.text.span,
+            (Label(end.port.name.span, f"declared as {a(actual)}"),),
+            _belongs(connection, actual),
+        )
+
+
+def _ends(context: Context, connection: Connection) -> Iterator[_End]:
+    groups = (connection.sources, connection.sinks)
+    for endpoints, (key, kind) in zip(groups, _ENDS[connection.kind], strict=True):
+        for endpoint in endpoints:
+            port = context.system.port(endpoint)
+            if port is not None:
+                yield _End(endpoint, key, kind, port)
+
+
+def _all_wrong(connection: Connection, ends: list[_End], kind: ChannelKind) -> Diagnostic:
+    """Tell as one mistake what makes every end of a connection wrong."""
+    (source_key, _), (sink_key, _) = _ENDS[connection.kind]
+    if kind is connection.kind:
+        message = f"the ends of {kind} '{connection.name}' are swapped"
+        hint = f"exchange '{source_key}' and '{sink_key}'"
     else:
-        hint = f"{a(actual)} belongs in a connection that begins with '{actual.channel}:'"
-    yield Diagnostic(
-        RULE,
-        f"'{key}' of {connection.kind} '{connection.name}' needs {a(kind)}, "
-        f"but '{endpoint.text}' is {a(actual)}",
-        endpoint.text.span,
-        (Label(port.name.span, f"declared as {a(actual)}"),),
-        hint,
-    )
+        message = (
+            f"'{connection.name}' joins the ends of {_an(kind)}, not of {_an(connection.kind)}"
+        )
+        (source_key, _), (sink_key, _) = _ENDS[kind]
+        hint = f"write '{kind}:', '{source_key}:' and '{sink_key}:'"
+    labels = tuple(end.label for end in ends)
+    return Diagnostic(RULE, message, connection.span, labels, hint)
+
+
+def _belongs(connection: Connection, actual: PortKind) -> str:
+    if actual.channel is connection.kind:
+        other = next(key for key, kind in _ENDS[connection.kind] if kind is actual)
+        return f"{a(actual)} belongs under '{other}'"
+    return f"{a(actual)} belongs in a connection that begins with '{actual.channel}:'"
+
+
+def _an(kind: ChannelKind) -> str:
+    return f"{'an' if kind.value.startswith('a') else 'a'} {kind}"
 
 
 def _hint(kind: PortKind) -> str | None:

@@ -29,11 +29,11 @@ from composer.source import Span
 from composer.templates import (
     Computed,
     Constant,
+    Formatted,
     Items,
     Record,
     Template,
     Text,
-    expressions_in,
 )
 
 
@@ -60,8 +60,19 @@ class Judge:
 
     def text(self, template: Template) -> Iterator[Problem]:
         """Yield what is wrong with the expressions of a template that may become anything."""
-        for expression, span in expressions_in(template):
-            yield from self.expression(expression, span)
+        match template:
+            case Computed(expression=expression, span=span):
+                yield from self.expression(expression, span)
+            case Text(parts=parts):
+                for part in parts:
+                    if isinstance(part, Formatted):
+                        yield from self._formatted(part)
+            case Record(fields=fields):
+                for _, content in fields:
+                    yield from self.text(content)
+            case Items(items=items):
+                for item in items:
+                    yield from self.text(item)
 
     def condition(self, expression: Expression, span: Span) -> Iterator[Problem]:
         """Yield what is wrong with an expression that must be true or false."""
@@ -75,6 +86,12 @@ class Judge:
     def expression(self, expression: Expression, span: Span) -> Iterator[Problem]:
         """Yield what is wrong with an expression."""
         yield from self._infer(expression, span)[1]
+
+    def _formatted(self, part: Formatted) -> Iterator[Problem]:
+        found, problems = self._infer(part.expression, part.span)
+        yield from problems
+        if part.format and not _can_be_written(found, part.format):
+            yield Problem(f"{described(found)} cannot be written as '{part.format}'", part.span)
 
     def _infer(self, expression: Expression, span: Span) -> tuple[ValueType, list[Problem]]:
         found, complaints = infer(expression, self.scope, self.interfaces)
@@ -168,6 +185,19 @@ class Judge:
         return given.name == wanted.name
 
 
+def _can_be_written(type_: ValueType, layout: str) -> bool:
+    """Ask Python, with a value of the type; true where the type is not known."""
+    if type_ is ANYTHING:
+        return True
+    samples = ((is_integer, 1), (is_number, 1.0), (is_text, "text"), (is_bool, True))
+    sample = next((value for belongs, value in samples if belongs(type_)), ())
+    try:
+        format(sample, layout)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
 def _fits_array(found: ValueType, target: ValueType) -> bool:
     if not isinstance(found, FieldType) or not isinstance(target, FieldType) or not found.is_array:
         return False
@@ -200,8 +230,8 @@ def _conversion_hint(
     expression: Expression, found: ValueType, target: FieldType | Message
 ) -> str | None:
     source = expression.source
-    if is_integer(target) and is_number(found):
-        return f"use {{round({source})}}"
+    if is_integer(target) and (is_number(found) or is_text(found)):
+        return f"use {{{'round' if is_number(found) else 'int'}({source})}}"
     if is_text(target) and (is_number(found) or is_bool(found)):
         return f"use {{str({source})}}"
     if is_number(target) and is_text(found):

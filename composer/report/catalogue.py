@@ -27,8 +27,9 @@ BANDS = {
 _INTRODUCTION = """\
 # Rules
 
-What `compose validate` finds. Errors keep a system from running; warnings and infos do not. This page is made from the
-rules themselves by `python tools/write_rules.py`; each example is run by a test.
+What `compose validate` finds. Errors keep a system from running; warnings and infos do not.
+This page is made from the rules themselves by `python tools/write_rules.py`; a test runs each
+example.
 
 A comment on the line of a finding, or on a line of its own before it, silences a rule there:
 `# compose: ignore[unheard-publisher]`.
@@ -82,14 +83,11 @@ def page(rules: Iterable[Rule]) -> str:
 
 def _table(rules: Iterable[Rule]) -> str:
     rows = [
-        f"| [{rule.code}](#{_anchor(rule)}) | {rule.name} | {rule.severity.value} | {rule.summary} |"
+        f"| [{rule.code}](#{rule.code}-{rule.name}) "
+        f"| {rule.name} | {rule.severity.value} | {rule.summary} |".replace("#RC", "#rc")
         for rule in rules
     ]
     return "\n".join(["| code | name | severity | what |", "|---|---|---|---|", *rows, ""])
-
-
-def _anchor(rule: Rule) -> str:
-    return f"{rule.code}-{rule.name}".lower()
 
 
 def _section(rule: Rule) -> str:

@@ -1,7 +1,8 @@
-"""A line of a file with marks under the part that is meant."""
+"""A line of a file with marks under the parts that are meant."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from composer.report.display import visible, width
@@ -35,34 +36,47 @@ class Pen:
 
 
 @dataclass(frozen=True, slots=True)
-class Snippet:
-    """A place to show, and how: the arrow before it, the mark under it, the words behind that.
-
-    ``codes`` are the SGR codes of the mark.
-    """
+class Mark:
+    """A place to mark, what with, and the words behind that. ``codes`` are SGR codes."""
 
     span: Span
-    arrow: str
-    mark: str
+    sign: str
     codes: tuple[str, ...]
     message: str = ""
 
-    def lines(self, pen: Pen, margin: int) -> list[str]:
-        """Return the lines; ``margin`` is the width of the widest line number around."""
-        shown, column, length = _window(self.span)
-        before = width(shown[:column])
-        under = max(width(shown[column : column + length]), 1)
-        space = " " * margin
-        bar = pen.frame("|")
-        number = pen.frame(str(self.span.line).rjust(margin))
-        marks = pen.write(self.mark * under, *self.codes)
-        note = f" {visible(self.message)}" if self.message else ""
-        return [
-            f"{space}{pen.frame(self.arrow)} {visible(str(self.span))}",
-            f"{space} {bar}",
-            f"{number} {bar} {visible(shown)}".rstrip(),
-            f"{space} {bar} {' ' * before}{marks}{note}",
-        ]
+
+def snippets(marks: Iterable[Mark]) -> list[list[Mark]]:
+    """Return the marks in groups that are shown under one line, in the order of their first."""
+    groups: dict[tuple[str, int, int], list[Mark]] = {}
+    for mark in marks:
+        span = mark.span
+        is_long = len(span.file.line(span.line)) > LONGEST_LINE
+        key = (span.file.path, span.line, span.column if is_long else 0)
+        groups.setdefault(key, []).append(mark)
+    return list(groups.values())
+
+
+def draw(marks: list[Mark], arrow: str, pen: Pen, margin: int) -> list[str]:
+    """Return a line with all marks on it; ``margin`` is the width of the widest line number."""
+    span = marks[0].span
+    space = " " * margin
+    bar = pen.frame("|")
+    number = pen.frame(str(span.line).rjust(margin))
+    shown, _, _ = _window(span)
+    return [
+        f"{space}{pen.frame(arrow)} {visible(str(span))}",
+        f"{space} {bar}",
+        f"{number} {bar} {visible(shown)}".rstrip(),
+        *(f"{space} {bar} {_under(mark, pen)}" for mark in marks),
+    ]
+
+
+def _under(mark: Mark, pen: Pen) -> str:
+    shown, column, length = _window(mark.span)
+    before = width(shown[:column])
+    cells = max(width(shown[column : column + length]), 1)
+    note = f" {visible(mark.message)}" if mark.message else ""
+    return f"{' ' * before}{pen.write(mark.sign * cells, *mark.codes)}{note}"
 
 
 def _window(span: Span) -> tuple[str, int, int]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from composer.diagnostics import Diagnostic, Severity
 from composer.report.display import visible
-from composer.report.snippet import BOLD, FRAME, Pen, Snippet
+from composer.report.snippet import BOLD, FRAME, Mark, Pen, draw, snippets
 
 _COLORS = {Severity.ERROR: "31", Severity.WARNING: "33", Severity.INFO: "36"}
 
@@ -38,13 +38,11 @@ def _finding(diagnostic: Diagnostic, pen: Pen) -> str:
     accent = _COLORS[rule.severity]
     head = pen.bold(f"{rule.severity.value}[{rule.code} {rule.name}]", accent)
     lines = [f"{head}: {pen.bold(visible(diagnostic.message))}"]
-    snippets = [Snippet(diagnostic.primary, "-->", "^", (BOLD, accent))]
-    snippets += [
-        Snippet(label.span, ":::", "-", (FRAME,), label.message) for label in diagnostic.related
-    ]
-    margin = max(len(str(snippet.span.line)) for snippet in snippets)
-    for snippet in snippets:
-        lines += snippet.lines(pen, margin)
+    marks = [Mark(diagnostic.primary, "^", (BOLD, accent))]
+    marks += [Mark(label.span, "-", (FRAME,), label.message) for label in diagnostic.related]
+    margin = max(len(str(mark.span.line)) for mark in marks)
+    for index, group in enumerate(snippets(marks)):
+        lines += draw(group, ":::" if index else "-->", pen, margin)
     if diagnostic.hint is not None:
         lines.append(f"{' ' * margin} {pen.frame('=')} hint: {visible(diagnostic.hint)}")
     return "\n".join(lines)

@@ -1,0 +1,5 @@
+# coding: utf-7
+
+
+class Planner:
+    pass

@@ -1,0 +1,47 @@
+"""The examples in the rules are true: each bad one breaks its rule and no other, each good one
+none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.diagnostics import Diagnostic, Rule
+from composer.loading import load
+from composer.report.catalogue import all_rules
+from composer.report.samples import files_of
+
+# Examples of rules about what is not YAML of ours - a command line, bytes - are not run here.
+RULES = [rule for rule in all_rules() if files_of(rule.bad) and files_of(rule.good)]
+
+
+def findings_in(example: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Diagnostic]:
+    files = files_of(example)
+    for name, text in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    monkeypatch.chdir(folder)
+    return load(Path(next(iter(files)))).diagnostics
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
+def test_bad_example_breaks_the_rule(
+    rule: Rule, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = findings_in(rule.bad, tmp_path, monkeypatch)
+    assert {finding.rule.code for finding in found} == {rule.code}
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
+def test_good_example_breaks_none(
+    rule: Rule, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = findings_in(rule.good, tmp_path, monkeypatch)
+    assert [f"{finding.rule.code}: {finding.message}" for finding in found] == []
+
+
+def test_all_checks_have_examples_that_are_run() -> None:
+    run = {rule.code for rule in RULES}
+    assert {rule.code for rule in all_rules() if rule.code[2] in "2345"} - run == set()
