@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from composer.source import Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
+_WORDS_FOR_NOTHING = ("null", "~")
+
 
 @dataclass(frozen=True, slots=True)
 class Place:
@@ -24,9 +26,11 @@ class Place:
     @property
     def value_span(self) -> Span:
         """The place of the value; that of its key where nothing is written."""
-        if self.key is not None and isinstance(self.tree, Scalar) and self.tree.value is None:
-            return self.key.span
-        return self.tree.span
+        span = self.tree.span
+        if self.key is None or not isinstance(self.tree, Scalar) or self.tree.value is not None:
+            return span
+        written = span.file.line(span.line)[span.column - 1 :]
+        return span if written.lower().startswith(_WORDS_FOR_NOTHING) else self.key.span
 
 
 @dataclass(slots=True)

@@ -17,8 +17,9 @@ from composer.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
 #: What YAML is made of, so that random texts get further than random characters do.
 PIECES = st.sampled_from(
     [*"[]{},:?-#&*!|>'\"%@`\t \n\r\\~$", ": ", "- ", "a", "b: ", "<<", "*a", "&a ", "!!int ",
-     "---\n", "...\n", "%YAML 1.1\n", "\n  ", "\n    ", '"\\x', "\\u", "é", "\ud800", "\x00", "\x85",
-     "\u2028", "\ufeff", "1e999", ".nan", "0x", "null", "true", "{x}", "${x}", "system: a\n"]
+     "---\n", "...\n", "%YAML 1.1\n", "\n  ", "\n    ", '"\\x', "\\u", "é", "\ud800", "\x00",
+     "\x85", "\u2028", "\ufeff", "1e999", ".nan", "0x", "null", "true", "{x}",
+     "${x}", "system: a\n"]
 )  # fmt: skip
 
 

@@ -1,0 +1,56 @@
+"""Findings: their order, and what they may echo."""
+
+from __future__ import annotations
+
+import pytest
+
+from composer.diagnostics import LONGEST_ECHO, Diagnostic, Rule, Severity, in_order, shown
+from composer.source import SourceFile, Span
+
+RULE = Rule("RC999", "example", Severity.ERROR, "", "", "", "")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("planner", "planner"),
+        ("größe 値段 😀", "größe 値段 😀"),
+        ("\x1b]0;pwn\x07", "\\x1b]0;pwn\\x07"),
+        ("a\u202eb\nc", "a\\u202eb\\nc"),
+        ("\U000e0041", "\\U000e0041"),
+        ("a\\b'c", "a\\b'c"),
+        (None, "null"),
+        (True, "true"),
+        (False, "false"),
+        (1, "1"),
+        (0.5, "0.5"),
+    ],
+)
+def test_shown(value: object, text: str) -> None:
+    assert shown(value) == text
+
+
+def test_shown_is_cut() -> None:
+    assert shown("x" * LONGEST_ECHO) == "x" * LONGEST_ECHO
+    assert shown("x" * 1_000_000) == "x" * (LONGEST_ECHO - 3) + "..."
+    assert shown("abcdef", limit=5) == "ab..."
+
+
+def at(path: str, line: int, column: int) -> Diagnostic:
+    return Diagnostic(RULE, "same words", Span(SourceFile(path), line, column))
+
+
+def test_order_is_that_of_the_files() -> None:
+    findings = [at("b", 1, 1), at("a", 10, 1), at("a", 2, 30), at("a", 2, 4)]
+    assert [str(finding.primary) for finding in in_order(findings)] == [
+        "a:2:4", "a:2:30", "a:10:1", "b:1:1",
+    ]  # fmt: skip
+
+
+def test_each_finding_once() -> None:
+    assert len(in_order([at("a", 1, 1), at("a", 1, 1)])) == 1
+
+
+def test_same_place_of_two_files_is_two_places() -> None:
+    findings = in_order([at("b", 1, 1), at("a", 1, 1)])
+    assert [finding.primary.file.path for finding in findings] == ["a", "b"]

@@ -1,0 +1,152 @@
+"""The schemas themselves: valid, complete for editors, and the ones the shipped files keep to."""
+
+from __future__ import annotations
+
+import runpy
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft7Validator
+
+from composer.document import parse_document, read_document
+from composer.resources import nodes_folder, schemas_folder, systems_folder
+from composer.schema import SCHEMAS, check_schema, kind_of, schema
+from composer.schema.findings import KEYWORDS
+from composer.source import SourceFile
+from composer.tree import plain
+
+SHIPPED = sorted([*systems_folder().glob("*.yaml"), *nodes_folder().glob("*.yaml")])
+ANNOTATIONS = {"$schema", "title", "description", "default", "examples", "definitions"}
+APPLICATORS = {"properties", "items", "allOf", "if", "then", "else", "$ref"}
+
+
+def parts_of(part: Any) -> Iterator[dict[str, Any]]:
+    """Yield every schema within a schema."""
+    if not isinstance(part, dict):
+        return
+    yield part
+    for name in ("items", "if", "then", "else", "additionalProperties", "not"):
+        yield from parts_of(part.get(name))
+    for name in ("allOf", "anyOf"):
+        for item in part.get(name, ()):
+            yield from parts_of(item)
+    for name in ("properties", "definitions"):
+        for item in part.get(name, {}).values():
+            yield from parts_of(item)
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_is_a_schema(name: str) -> None:
+    Draft7Validator.check_schema(schema(name))
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_is_made_from_its_parts(name: str) -> None:
+    build = runpy.run_path(str(schemas_folder() / "build.py"))
+    made = build["build"](name)
+    assert build["path"](name).read_text() == made, "run 'python schemas/build.py'"
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_every_keyword_has_its_words(name: str) -> None:
+    used = {keyword for part in parts_of(schema(name)) for keyword in part}
+    assert used - ANNOTATIONS - APPLICATORS <= KEYWORDS
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_every_key_is_described(name: str) -> None:
+    whole = schema(name)
+    definitions = whole["definitions"]
+
+    def described(part: dict[str, Any]) -> bool:
+        reference = part.get("$ref", "").removeprefix("#/definitions/")
+        return "description" in part or (reference != "" and described(definitions[reference]))
+
+    bare = [
+        f"{part.get('title')}: {key}"
+        for part in parts_of(whole)
+        for key, value in part.get("properties", {}).items()
+        if part is not definitions.get("unnamed_connection") and not described(value)
+    ]
+    assert bare == []
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_every_map_of_keys_is_closed(name: str) -> None:
+    open_maps = [
+        part.get("title")
+        for part in parts_of(schema(name))
+        if "properties" in part and part.get("additionalProperties") is not False
+    ]
+    assert open_maps == []
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_examples_and_defaults_are_valid(name: str) -> None:
+    whole = schema(name)
+    for part in parts_of(whole):
+        values = [*part.get("examples", ()), *([part["default"]] if "default" in part else [])]
+        validator = Draft7Validator({**part, "definitions": whole["definitions"]})
+        for value in values:
+            assert list(validator.iter_errors(value)) == [], part
+
+
+def test_unknown_schema() -> None:
+    with pytest.raises(KeyError):
+        schema("../../etc/passwd")
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.name)
+def test_shipped_file(path: Path) -> None:
+    tree, _, findings = read_document(path)
+    assert tree is not None
+    kind = kind_of(tree)
+    assert kind is not None
+    assert [item.message for item in (*findings, *check_schema(tree, kind))] == []
+    # An editor has plain JSON Schema, without the composer's stricter idea of an integer.
+    assert Draft7Validator(schema(kind)).is_valid(plain(tree))
+
+
+def large_system(nodes: int) -> str:
+    lines = ["system: large", "nodes:"]
+    for number in range(nodes):
+        lines += [
+            f"  node_{number}:",
+            "    type: relay",
+            "    variables: {message_type: std_msgs/msg/String}",
+            "    parameters: {rate_hz: 10.0}",
+        ]
+    lines.append("connections:")
+    for number in range(3 * nodes):
+        ends = f"from: node_{number % nodes}.output, to: node_{(number + 1) % nodes}.input"
+        lines.append(f"  - {{topic: /t{number}, {ends}}}")
+    return "\n".join(lines)
+
+
+def seconds_to_check(text: str) -> float:
+    tree, findings = parse_document(SourceFile("f", text))
+    assert findings == []
+    assert tree is not None
+    started = time.process_time()
+    check_schema(tree, "system")
+    return time.process_time() - started
+
+
+def test_large_system_is_checked_quickly() -> None:
+    large_system_text = large_system(2000)
+    seconds_to_check(large_system(1))  # loads the schema
+    assert seconds_to_check(large_system_text) < 3.0
+
+
+def test_mistakes_everywhere_cost_no_more_than_in_proportion() -> None:
+    few, many = (
+        min(
+            seconds_to_check(large_system(nodes).replace("type:", "typ:").replace("topic", "topc"))
+            for _ in range(2)
+        )
+        for nodes in (100, 800)
+    )
+    assert many < 20 * few
