@@ -80,12 +80,14 @@ def parameter_type(declared: str) -> ValueType:
 def type_of(value: Plain) -> ValueType:
     """Return the type of a value written in YAML: what a node's state starts with.
 
-    A number is any number later: ``{last_s: 0}`` may become 0.5.
+    An integer may become 0.5 later; until then it fits wherever a number does.
     """
     match value:
         case bool():
             return BOOL
-        case int() | float():
+        case int():
+            return INTEGER
+        case float():
             return NUMBER
         case str() if "${" not in value:
             return TEXT

@@ -61,7 +61,12 @@ SCOPE: Scope = {
         "odd": parameter_type("oddity"),
         "camera.fps": parameter_type("integer"),
     },
-    "state": {"last_s": type_of(0), "seen": type_of(True), "free": type_of(None)},
+    "state": {
+        "last_s": type_of(0.0),
+        "seen_count": type_of(0),
+        "seen": type_of(True),
+        "free": type_of(None),
+    },
 }
 JUDGE = Judge(INTERFACES, SCOPE)
 

@@ -62,6 +62,8 @@ FITTING: list[tuple[str, Any]] = [
     ("small", "{count % 256}"),
     ("double", "{state.last_s + parameters.rate_hz}"),
     ("double", "{state.free}"),
+    ("small", "{state.seen_count + 1}"),
+    ("double", "{state.seen_count}"),
     ("double", "{parameters.odd.deeper}"),
     ("text", "{str(count)}"),
     ("text", "{'a' if message.on else node}"),
@@ -178,6 +180,31 @@ def test_the_very_part_is_marked(text: str, marked: str) -> None:
     assert text[start : start + problem.span.length] == marked
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("{now:.2f} s", "{count:03d}", "{count:.1f}", "{node:>9}", "{message.on:>5}"),
+        *("{state.free:d}", "{state.seen_count:d}"),
+    ],
+)
+def test_a_value_that_can_be_written_in_its_format(text: str) -> None:
+    assert list(JUDGE.text(template(["", {"a": text}]))) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{node:.2f} s", "string cannot be written as '.2f'"),
+        ("{now:d}", "float64 cannot be written as 'd'"),
+        ("{point:.2f}", "geometry_msgs/msg/Point cannot be written as '.2f'"),
+        ("{message.three:.2f}", "float64[3] cannot be written as '.2f'"),
+    ],
+)
+def test_a_value_that_cannot(text: str, message: str) -> None:
+    (problem,) = JUDGE.text(template(text))
+    assert problem.message == message
+
+
 def test_where_the_file_does_not_spell_the_text_out_the_whole_is_marked() -> None:
     span = Span(FILE, 4, 7, 40)
     (problem,) = JUDGE.expression(compile_expression("message.doubl"), span)
@@ -253,6 +280,6 @@ def test_what_is_not_known_is_anything() -> None:
     assert type_of(None) is type_of("${open}") is type_of([1]) is ANYTHING
     assert parameter_type("oddity") is ANYTHING
     assert parameter_type("integer") == INTEGER
-    assert type_of({"a": 1}) == {"a": FieldType("float64")}
+    assert type_of({"a": 1, "b": 1.0}) == {"a": INTEGER, "b": FieldType("float64")}
     assert problems_of({"foreign": 3})[0].hint == "write a map of its fields"
     assert problems_of({}, Message("demo_msgs/msg/Empty")) == []
