@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from composer.cli import graph, lifecycle, run, validate
+from composer.cli import graph, lifecycle, rule, run, schema, validate
 from composer.cli.help import examples
 from composer.cli.terminal import write
 
@@ -70,3 +70,5 @@ app.command("run", epilog=run.EPILOG)(run.run)
 app.command("validate", epilog=validate.EPILOG)(validate.validate)
 app.add_typer(lifecycle.app, name="lifecycle")
 app.command("graph", epilog=graph.EPILOG)(graph.graph)
+app.command("rule", epilog=rule.EPILOG)(rule.rule)
+app.command("schema", epilog=schema.EPILOG)(schema.schema)

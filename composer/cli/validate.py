@@ -109,11 +109,11 @@ def _check(paths: Sequence[Path]) -> _Checked:
 
 
 def _chosen(findings: list[Diagnostic], select: list[str], ignore: list[str]) -> list[Diagnostic]:
-    from composer.diagnostics import registered_rules
+    from composer.report.catalogue import all_rules
     from composer.report.selection import UnknownRule, chosen
 
     try:
-        return chosen(findings, list(registered_rules()), select, ignore)
+        return chosen(findings, all_rules(), select, ignore)
     except UnknownRule as error:
         raise UsageFailure(str(error), hint=error.hint) from error
 

@@ -27,6 +27,8 @@ def test_version() -> None:
         ["run"],
         ["validate"],
         ["graph"],
+        ["rule"],
+        ["schema"],
         ["lifecycle"],
         ["lifecycle", "nodes"],
         ["lifecycle", "get"],

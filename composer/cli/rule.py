@@ -1,0 +1,38 @@
+"""``compose rule``: what a finding means and how to mend it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from composer.cli.failure import UsageFailure
+from composer.cli.help import examples
+from composer.cli.terminal import columns, write, write_raw
+
+EPILOG = examples(
+    "compose rule                            all rules, one a line",
+    "compose rule RC202",
+    "compose rule unknown-node",
+)
+
+
+def rule(
+    code: Annotated[
+        str | None,
+        typer.Argument(metavar="CODE", help="A code or a name.", show_default=False),
+    ] = None,
+) -> None:
+    """Explain a rule: what is wrong, why it matters, and an example of it and of its cure."""
+    from composer.diagnostics import suggestion
+    from composer.report.catalogue import all_rules, explain, find_rule
+
+    rules = all_rules()
+    if code is None:
+        write(columns([(item.code, item.severity.value, item.name) for item in rules]))
+        return
+    found = find_rule(code, rules)
+    if found is None:
+        names = [name for item in rules for name in (item.code, item.name)]
+        raise UsageFailure(f"no rule is called '{code}'", hint=suggestion(code, names))
+    write_raw(explain(found))
