@@ -51,8 +51,16 @@ FORBIDDEN_CHARACTER = register(
             "Such characters make a file look different from what it says, and steer the terminal "
             "that shows it."
         ),
-        bad='log: "\\e[2J"',
-        good='log: "cleared"',
+        bad="""\
+system: demo
+nodes:
+  robot: {on_activate: {log: "\\e[2Jstarted"}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {on_activate: {log: started}}
+""",
     )
 )
 YAML_SYNTAX = register(
@@ -61,8 +69,20 @@ YAML_SYNTAX = register(
         name="yaml-syntax",
         summary="The text is not YAML.",
         why="Until the text can be read, nothing else about it can be known.",
-        bad="log: Received: {message.data}",
-        good='log: "Received: {message.data}"',
+        bad="""\
+system: demo
+nodes:
+  robot:
+    on_activate:
+      log: Started: {now}
+""",
+        good="""\
+system: demo
+nodes:
+  robot:
+    on_activate:
+      log: "Started: {now}"
+""",
     )
 )
 NESTED_TOO_DEEP = register(
@@ -71,8 +91,16 @@ NESTED_TOO_DEEP = register(
         name="nested-too-deep",
         summary="Maps and lists stand inside each other more than 32 times.",
         why="No system needs it, and programs that read such a text run out of stack.",
-        bad="variables: {a: [[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]]]]]]]]]]]]]]]]]}",
-        good="variables: {a: [1]}",
+        bad="""\
+system: demo
+nodes:
+  robot: {state: {memory: [[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]]]]]]]]]]]]]]]]]}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {state: {memory: [1]}}
+""",
     )
 )
 TOO_MANY_VALUES = register(
@@ -91,8 +119,20 @@ SEVERAL_DOCUMENTS = register(
         name="several-documents",
         summary="A file holds more than one YAML document.",
         why="One file is one system or one node type, so that its name says what is in it.",
-        bad="system: first\n---\nsystem: second",
-        good="system: first",
+        bad="""\
+system: first
+nodes:
+  robot: {on_activate: {log: started}}
+---
+system: second
+nodes:
+  robot: {on_activate: {log: started}}
+""",
+        good="""\
+system: first
+nodes:
+  robot: {on_activate: {log: started}}
+""",
     )
 )
 NOT_A_MAP = register(
@@ -102,7 +142,7 @@ NOT_A_MAP = register(
         summary="A file is empty, or is a list or a single value.",
         why="A system and a node type are maps of keys and values.",
         bad="- system\n- pipeline",
-        good="system: pipeline",
+        good="system: demo\nnodes:\n  robot: {on_activate: {log: started}}\n",
     )
 )
 YAML_TAG = register(
@@ -111,8 +151,18 @@ YAML_TAG = register(
         name="yaml-tag",
         summary="A value has a YAML tag, such as !!str or !env.",
         why="Tags would let a file decide how it is read. The language has one way to say a thing.",
-        bad="description: !!str 5",
-        good='description: "5"',
+        bad="""\
+system: demo
+description: !!str 5
+nodes:
+  robot: {on_activate: {log: started}}
+""",
+        good="""\
+system: demo
+description: "5"
+nodes:
+  robot: {on_activate: {log: started}}
+""",
     )
 )
 DUPLICATE_KEY = register(
@@ -121,8 +171,18 @@ DUPLICATE_KEY = register(
         name="duplicate-key",
         summary="A key stands twice in one map.",
         why="YAML readers silently keep the last one, and half of what was written is lost.",
-        bad="nodes:\n  talker: {type: timer_source}\n  talker: {type: relay}",
-        good="nodes:\n  talker: {type: timer_source}\n  second_talker: {type: relay}",
+        bad="""\
+system: demo
+nodes:
+  robot: {on_activate: {log: started}}
+  robot: {on_activate: {log: hello}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {on_activate: {log: started}}
+  second_robot: {on_activate: {log: hello}}
+""",
     )
 )
 KEY_NOT_TEXT = register(
@@ -131,8 +191,16 @@ KEY_NOT_TEXT = register(
         name="key-not-text",
         summary="A key is a number, a truth value, a list, a map or nothing.",
         why="Every key of the language is a word or a name.",
-        bad="nodes:\n  1: {type: relay}",
-        good="nodes:\n  relay_1: {type: relay}",
+        bad="""\
+system: demo
+nodes:
+  1: {on_activate: {log: started}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot_1: {on_activate: {log: started}}
+""",
     )
 )
 MERGE_KEY = register(
@@ -141,8 +209,16 @@ MERGE_KEY = register(
         name="merge-key",
         summary="A YAML merge key (<<) is used.",
         why="YAML 1.2 has no merge keys, and what they put together cannot be told from the text.",
-        bad="relay: {<<: *common, type: relay}",
-        good="relay: {type: relay}  # what nodes share stands in their node type",
+        bad="""\
+system: demo
+nodes:
+  robot: {<<: {executor: default}, on_activate: {log: started}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {executor: default, on_activate: {log: started}}
+""",
     )
 )
 BAD_NUMBER = register(
@@ -154,8 +230,16 @@ BAD_NUMBER = register(
             "NaN passes every comparison with a limit, and no message field or parameter holds "
             "more than 64 bits."
         ),
-        bad="timers: {tick: {rate_hz: .inf}}",
-        good="timers: {tick: {rate_hz: 100}}",
+        bad="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {rate_hz: .inf, log: tick}}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {rate_hz: 100, log: tick}}}
+""",
     )
 )
 BAD_ALIAS = register(
@@ -164,8 +248,16 @@ BAD_ALIAS = register(
         name="bad-alias",
         summary="An alias (*name) stands for nothing, or for what it is part of.",
         why="An alias repeats what an anchor (&name) before it marks.",
-        bad="parameters: *common",
-        good="parameters: {rate_hz: 10.0}",
+        bad="""\
+system: demo
+nodes:
+  robot: {parameters: *common}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {parameters: {speed: 1.0}}
+""",
     )
 )
 KEY_WITHOUT_VALUE = register(
@@ -174,7 +266,15 @@ KEY_WITHOUT_VALUE = register(
         name="key-without-value",
         summary="A key in braces has no colon and no value.",
         why="In YAML, braces make a map: an expression or a text with braces needs quotes.",
-        bad="log: {message.data}",
-        good='log: "{message.data}"',
+        bad="""\
+system: demo
+nodes:
+  robot: {on_activate: {log: {now}}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {on_activate: {log: "{now}"}}
+""",
     )
 )

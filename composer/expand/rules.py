@@ -14,8 +14,18 @@ UNKNOWN_VARIABLE = register(
         name="unknown-variable",
         summary="A variable is used, or given to a node type, that is not declared.",
         why="Nothing can be put in its place, and a value that nobody asks for is a mistake.",
-        bad="variables: {rate_hz: 10}\nnodes: {talker: {timers: {tick: {rate_hz: '${rate}'}}}}",
-        good="variables: {rate_hz: 10}\nnodes: {talker: {timers: {tick: {rate_hz: '${rate_hz}'}}}}",
+        bad="""\
+system: demo
+variables: {rate_hz: 10}
+nodes:
+  robot: {timers: {tick: {rate_hz: "${rate}", log: tick}, tock: {rate_hz: "${rate_hz}", log: tock}}}
+""",
+        good="""\
+system: demo
+variables: {rate_hz: 10}
+nodes:
+  robot: {timers: {tick: {rate_hz: "${rate_hz}", log: tick}}}
+""",
     )
 )
 MALFORMED_VARIABLE = register(
@@ -27,8 +37,16 @@ MALFORMED_VARIABLE = register(
             "'${name}' is put in when a file is loaded, '{expression}' is worked out at run time; "
             "there is nothing between the two."
         ),
-        bad='log: "${count + 1}"',
-        good='log: "{count + 1}"',
+        bad="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {rate_hz: 10, log: "${count + 1}"}}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {rate_hz: 10, log: "{count + 1}"}}}
+""",
     )
 )
 CYCLIC_VARIABLES = register(
@@ -37,8 +55,18 @@ CYCLIC_VARIABLES = register(
         name="cyclic-variables",
         summary="Variables stand for each other in a circle.",
         why="None of them can be worked out before the others.",
-        bad="variables: {first: '${second}', second: '${first}'}",
-        good="variables: {first: 10, second: '${first}'}",
+        bad="""\
+system: demo
+variables: {first: "${second}", second: "${first}"}
+nodes:
+  robot: {on_activate: {log: "${first}"}}
+""",
+        good="""\
+system: demo
+variables: {first: "${second}", second: started}
+nodes:
+  robot: {on_activate: {log: "${first}"}}
+""",
     )
 )
 NOT_A_TEXT = register(
@@ -47,8 +75,18 @@ NOT_A_TEXT = register(
         name="variable-not-text",
         summary="A variable that stands for a map or list is used inside a text.",
         why="Maps and lists have no text of their own; alone, '${name}' stands for all of them.",
-        bad="variables: {point: {x: 1}}\nlog: 'at ${point}'",
-        good="variables: {x: 1}\nlog: 'at ${x}'",
+        bad="""\
+system: demo
+variables: {point: {x: 1}}
+nodes:
+  robot: {on_activate: {log: "at ${point}"}}
+""",
+        good="""\
+system: demo
+variables: {x: 1}
+nodes:
+  robot: {on_activate: {log: "at ${x}"}}
+""",
     )
 )
 TOO_LARGE = register(
@@ -68,7 +106,17 @@ UNUSED_VARIABLE = register(
         severity=Severity.INFO,
         summary="A variable is declared and never used.",
         why="It may be misspelt where it was meant, and changing it does nothing.",
-        bad="variables: {rate_hz: 10}\ntimers: {tick: {rate_hz: 10}}",
-        good="variables: {rate_hz: 10}\ntimers: {tick: {rate_hz: '${rate_hz}'}}",
+        bad="""\
+system: demo
+variables: {rate_hz: 10}
+nodes:
+  robot: {timers: {tick: {rate_hz: 10, log: tick}}}
+""",
+        good="""\
+system: demo
+variables: {rate_hz: 10}
+nodes:
+  robot: {timers: {tick: {rate_hz: "${rate_hz}", log: tick}}}
+""",
     )
 )

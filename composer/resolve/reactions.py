@@ -21,8 +21,16 @@ RULE = register(
             "and, or, not, and a few functions. What is not in it is refused before anything "
             "starts, not when a message arrives."
         ),
-        bad='when: "message.data >"',
-        good='when: "message.data > 0.5"',
+        bad="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {rate_hz: 10, when: count >, log: tick}}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {rate_hz: 10, when: count > 5, log: tick}}}
+""",
     )
 )
 

@@ -25,11 +25,21 @@ RULE = register(
         severity=Severity.ERROR,
         summary="A node is not given a variable that its type needs.",
         why="A variable without default is one that the node type cannot be made without.",
-        bad="system: demo\nnodes:\n  relay: {type: relay}",
-        good=(
-            "system: demo\nnodes:\n"
-            "  relay: {type: relay, variables: {message_type: std_msgs/msg/String}}"
-        ),
+        bad="""\
+system: demo
+nodes:
+  source:
+    type: timer_source
+    publishers: {output: {external: true}}
+""",
+        good="""\
+system: demo
+nodes:
+  source:
+    type: timer_source
+    variables: {message_type: std_msgs/msg/String}
+    publishers: {output: {external: true}}
+""",
     )
 )
 

@@ -17,8 +17,16 @@ UNKNOWN_KEY = register(
             "A misspelt key that is passed over silently costs an afternoon: what it was to say "
             "is not done."
         ),
-        bad="timers: {tick: {frequency: 10}}",
-        good="timers: {tick: {rate_hz: 10}}",
+        bad="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {rate_hz: 10, lgo: tick, log: tock}}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {rate_hz: 10, log: tick}}}
+""",
     )
 )
 MISSING_KEY = register(
@@ -27,8 +35,18 @@ MISSING_KEY = register(
         name="missing-key",
         summary="A key that must be there is not.",
         why="Without it the rest means nothing, and there is no value that fits most systems.",
-        bad="publishers: {chatter: {topic: /chatter}}",
-        good="publishers: {chatter: {type: std_msgs/msg/String, topic: /chatter}}",
+        bad="""\
+system: demo
+nodes:
+  robot:
+    publishers: {status: {qos: state, external: true}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot:
+    publishers: {status: {type: std_msgs/msg/String, qos: state, external: true}}
+""",
     )
 )
 WRONG_TYPE = register(
@@ -37,8 +55,16 @@ WRONG_TYPE = register(
         name="wrong-type",
         summary="A value is of another type than what stands there.",
         why="Numbers, texts, lists and maps are not turned into each other: that hides mistakes.",
-        bad='timers: {tick: {period_ms: "1 s"}}',
-        good="timers: {tick: {period_ms: 1000}}",
+        bad="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {period_ms: "1 s", log: tick}}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {period_ms: 1000, log: tick}}}
+""",
     )
 )
 UNKNOWN_WORD = register(
@@ -47,8 +73,18 @@ UNKNOWN_WORD = register(
         name="unknown-word",
         summary="A value that is none of the words allowed there.",
         why="Words are spelled as rclpy spells them, so that what is written is what ROS does.",
-        bad="qos_profiles: {scan: {reliability: best-effort}}",
-        good="qos_profiles: {scan: {reliability: best_effort}}",
+        bad="""\
+system: demo
+lifecycle: {autostart: activ}
+nodes:
+  robot: {on_activate: {log: started}}
+""",
+        good="""\
+system: demo
+lifecycle: {autostart: active}
+nodes:
+  robot: {on_activate: {log: started}}
+""",
     )
 )
 OUT_OF_RANGE = register(
@@ -57,8 +93,16 @@ OUT_OF_RANGE = register(
         name="out-of-range",
         summary="A number is too small for what it says.",
         why="A period, a rate or a number of messages of zero or less means nothing.",
-        bad="timers: {tick: {period_ms: 0}}",
-        good="timers: {tick: {period_ms: 10}}",
+        bad="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {period_ms: 0, log: tick}}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {period_ms: 10, log: tick}}}
+""",
     )
 )
 KEYS_EXCLUDE_EACH_OTHER = register(
@@ -67,8 +111,16 @@ KEYS_EXCLUDE_EACH_OTHER = register(
         name="keys-exclude-each-other",
         summary="Two keys say the same thing in two ways.",
         why="One of them would have to win, and nobody could see which.",
-        bad="timers: {tick: {period_ms: 100, rate_hz: 10}}",
-        good="timers: {tick: {rate_hz: 10}}",
+        bad="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {period_ms: 100, rate_hz: 10, log: tick}}}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {timers: {tick: {rate_hz: 10, log: tick}}}
+""",
     )
 )
 NOTHING_THERE = register(
@@ -77,7 +129,14 @@ NOTHING_THERE = register(
         name="nothing-there",
         summary="A map or list that must hold something is empty.",
         why="A system without nodes does nothing; a connection to no port connects nothing.",
-        bad="system: demo\nnodes: {}",
-        good="system: demo\nnodes: {talker: {type: timer_source}}",
+        bad="""\
+system: demo
+nodes: {}
+""",
+        good="""\
+system: demo
+nodes:
+  robot: {on_activate: {log: started}}
+""",
     )
 )
