@@ -44,10 +44,18 @@ def expand(tree: Mapping, given: Map[str, Tree]) -> tuple[Mapping, list[Diagnost
 
 
 def missing_variables(tree: Mapping, given: Map[str, Tree]) -> tuple[str, ...]:
-    """Return the variables of a node type that have no default and are not ``given``."""
-    declared = read_scope(tree, is_node_type=True).declared
+    """Return the variables of a node type that have no default and are not ``given``.
+
+    One that was given under a misspelt name is not among them: ``expand`` tells that.
+    """
+    scope = read_scope(tree, is_node_type=True)
+    for name in given:
+        if name not in scope.declared:
+            scope.hint(name)
     return tuple(
-        name for name, variable in declared.items() if variable.value is None and name not in given
+        name
+        for name, variable in scope.declared.items()
+        if variable.value is None and name not in given and name not in scope.used
     )
 
 

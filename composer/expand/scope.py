@@ -8,7 +8,7 @@ from composer.diagnostics import nearest
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 #: Names compared for hints in one file; more would take longer than all the rest.
-_MAX_COMPARISONS = 100_000
+_MAX_COMPARISONS = 20_000
 
 
 @dataclass(frozen=True, slots=True)

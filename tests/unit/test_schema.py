@@ -180,6 +180,7 @@ def profile(text: str) -> str:
             "missing-key", "feedback", "this feedback needs the key 'period_ms'", "",
         ),
         # timers
+        (timer(""), "wrong-type", "tick", "expected a map for 'tick', found nothing", "'{}'"),
         (timer("{}"), "missing-key", "tick", "timer 'tick' needs 'period_ms' or 'rate_hz'", ""),
         (
             timer("{rate_hz: 1, period_ms: 2}"),

@@ -1,0 +1,87 @@
+"""Variables and schemas take every tree that can be read, whatever stands where."""
+
+from __future__ import annotations
+
+import json
+
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from composer.document import parse_document
+from composer.document.limits import MAX_VALUES
+from composer.expand import expand, missing_variables
+from composer.schema import SCHEMAS, check_schema, schema
+from composer.source import SourceFile
+from composer.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
+
+KEYS = sorted(
+    {
+        key
+        for name in SCHEMAS
+        for part in (schema(name), *schema(name)["definitions"].values())
+        for key in part.get("properties", ())
+    }
+    | {"a", "b", "default", "typ", "frequency", "topc"}
+)
+TEXTS = ["${a}", "${b}", "x${a}", "$${a}", "${", "{message}", "active", "reliable", "relay", ""]
+
+values: st.SearchStrategy[Plain] = st.recursive(
+    st.none() | st.booleans() | st.integers(-3, 3) | st.floats(-1, 1) | st.sampled_from(TEXTS),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(KEYS), inner, max_size=5)
+    ),
+    max_leaves=40,
+)
+
+
+@st.composite
+def files(draw: st.DrawFn) -> Mapping:
+    """Draw a file that has some of the right keys at its top."""
+    kind = draw(st.sampled_from(SCHEMAS))
+    properties = schema(kind)["properties"]
+    content = draw(st.dictionaries(st.sampled_from(sorted(properties)), values, max_size=6))
+    return tree_of({kind: "a", **content})
+
+
+def tree_of(content: Plain) -> Mapping:
+    tree, findings = parse_document(SourceFile("f", json.dumps(content)))
+    assert findings == []
+    assert tree is not None
+    return tree
+
+
+def size(tree: Tree) -> int:
+    match tree:
+        case Scalar():
+            return 1
+        case Sequence():
+            return 1 + sum(size(item) for item in tree.items)
+        case Mapping():
+            return 1 + sum(1 + size(entry.value) for entry in tree)
+
+
+@settings(max_examples=150, deadline=None)
+@given(files(), st.dictionaries(st.sampled_from(["a", "b", "c"]), values, max_size=2))
+@example(tree_of({"node": "a", "timers": {"t": {"rate_hz": 1, "period_ms": 1}}}), {})
+@example(tree_of({"system": "a", "nodes": {"a": {"typ": {}}}, "connections": [{"topc": 1}]}), {})
+def test_any_tree(tree: Mapping, arguments: dict[str, Plain]) -> None:
+    trees = {entry.name: entry.value for entry in tree_of(arguments)} if arguments else {}
+    missing_variables(tree, trees)
+    expanded, findings = expand(tree, trees)
+    assert size(expanded) <= 2 * MAX_VALUES
+    for kind in SCHEMAS:
+        findings += check_schema(expanded, kind)
+    for finding in findings:
+        line = finding.primary.file.line(finding.primary.line)
+        assert 1 <= finding.primary.column <= len(line)
+        assert finding.message.isprintable()
+
+
+@settings(max_examples=100, deadline=None)
+@given(files())
+def test_expanding_twice_changes_nothing_that_was_complete(tree: Mapping) -> None:
+    once, findings = expand(tree, {})
+    if "${" not in json.dumps(plain(once)):
+        twice, _ = expand(once, {})
+        assert repr(plain(twice)) == repr(plain(once))
+        assert not any(finding.rule.name == "cyclic-variables" for finding in findings)
