@@ -24,7 +24,7 @@ EPILOG = examples(
     "compose validate systems nodes",
     "compose validate systems/pipeline.yaml --strict",
     "compose validate systems --format sarif > findings.sarif",
-    "compose validate systems --ignore implicit-qos --ignore RC5",
+    "compose validate systems --ignore qos-implicit --ignore RC5",
     "cat pipeline.yaml | compose validate -",
 )
 

@@ -1,0 +1,30 @@
+"""Findings made up for the tests of reports."""
+
+from __future__ import annotations
+
+from composer.diagnostics import Diagnostic, Label, Rule, Severity
+from composer.source import SourceFile, Span
+
+
+def rule(severity: Severity = Severity.ERROR, code: str = "RC999", name: str = "made-up") -> Rule:
+    return Rule(code, name, severity, "What it is.", "Why it is.", "bad: 1\n", "good: 1\n")
+
+
+def span_of(source: SourceFile, wanted: str, line: int = 1) -> Span:
+    """Return the place of the first ``wanted`` in a line."""
+    return Span(source, line, source.line(line).index(wanted) + 1, len(wanted))
+
+
+def finding(
+    text: str,
+    wanted: str,
+    message: str = "it is wrong",
+    *,
+    path: str = "systems/demo.yaml",
+    line: int = 1,
+    made_by: Rule | None = None,
+    related: tuple[Label, ...] = (),
+    hint: str | None = None,
+) -> Diagnostic:
+    source = SourceFile(path, text)
+    return Diagnostic(made_by or rule(), message, span_of(source, wanted, line), related, hint)
