@@ -17,7 +17,7 @@ class Gate:
     while any other transition is on its way: a lifecycle handler may sleep.
     """
 
-    __slots__ = ("_node", "_pending", "incoming", "outgoing", "state", "waiting")
+    __slots__ = ("_node", "_pending", "incoming", "outgoing", "period", "state", "waiting")
 
     def __init__(self, node: str) -> None:
         self._node = node
@@ -26,6 +26,7 @@ class Gate:
         self.outgoing = False
         self.waiting = False
         self.state = "unconfigured"
+        self.period = 0  # counts how often what waits was ended
 
     @property
     def refusal(self) -> str:
@@ -49,5 +50,6 @@ class Gate:
 
     def end_pending(self) -> None:
         """End all calls, goals and sleeps that somebody in the node waits for."""
+        self.period += 1
         for future in tuple(self._pending):
             future.set_exception(CallCancelled(self.refusal))

@@ -102,6 +102,7 @@ class Host:
         self._system = system
         self._up = up
         self._down = down
+        self._plan_down: tuple[Step, ...] = ()  # nothing to do before the loops run
         self._options = options or HostOptions()
         self._listener = report
         self._report_lock = threading.Lock()
@@ -147,6 +148,7 @@ class Host:
                 return False
         for loop in self._loops.values():
             loop.start()
+        self._plan_down = self._down.steps
         return True
 
     def _create_node(self, node: Node, executor: Executor) -> RunningNode:
@@ -196,9 +198,9 @@ class Host:
         self._report(Stopping(self._elapsed_s(), self._reason))
         self._watch_over_the_end()
         end_s = time.monotonic() + self._options.stop_within_s
-        for step in self._down.steps:
-            node = self._nodes.get(step.node)
-            if node is None or node.loop.name in self._hung or step.transition not in node.legal:
+        for step in self._plan_down:
+            node = self._nodes[step.node]
+            if node.loop.name in self._hung or step.transition not in node.legal:
                 continue
             limit_s = min(_STEP_SHARE * self._options.stop_within_s, end_s - time.monotonic())
             self._make(step, max(limit_s, 0.0), stoppable=False)

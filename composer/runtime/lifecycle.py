@@ -80,6 +80,7 @@ class Lifecycle:
     def __init__(self, core: Core, hooks: Hooks, *, timeout_s: float) -> None:
         node = core.node
         loop = core.loop
+        self._node = node
         self._loop = loop
         self._strand = core.strand
         self._hooks = hooks
@@ -121,9 +122,11 @@ class Lifecycle:
         return await self._change(transition)
 
     def destroy(self) -> None:
-        """Let go of the state machine; the services go with the node."""
+        """Give back the services and the state machine, which holds the node."""
         for service in self._services:
             self._loop.remove(service)
+            self._node.destroy_service(service)
+        self._machine.destroy_when_not_in_use()
 
     def _begin(self) -> Future[None] | None:
         """Take the right to make a transition, or return the future of the one under way."""

@@ -122,8 +122,8 @@ class Faults:
         self._silent_until_s[callback] = now_s + _AGAIN_AFTER_S
         unsaid = self._unsaid.pop(callback, 0)
         times = f" ({unsaid} more since the last time)" if unsaid else ""
-        first = silent_until_s is None
-        self._log.error(f"{callback}: {text}{times}" + (f"\n{details}" if first else ""))
+        story = f"\n{details}" if details and silent_until_s is None else ""
+        self._log.error(f"{callback}: {text}{times}{story}")
         self._report(callback, text)
 
 

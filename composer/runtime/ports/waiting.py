@@ -22,6 +22,7 @@ class Waiting:
         if not core.gate.outgoing:
             raise CallCancelled(core.gate.refusal)
         self._core = core
+        self._period = core.gate.period
         self._what = what
         self._timeout_ms = timeout_ms
         self._end_s = None if timeout_ms is None else time.monotonic() + timeout_ms / 1000.0
@@ -33,14 +34,14 @@ class Waiting:
                 raise ServerUnavailable(
                     f"no server of {self._what} was there within {self._timeout_ms:g} ms"
                 )
-            await self._core.gate.hold(sleep(self._core.loop, _LOOK_EVERY_S))
+            await self._hold(sleep(self._core.loop, _LOOK_EVERY_S))
 
     async def until_done(self, future: Future[Any]) -> Any:
         """Return the outcome of ``future``. Raises CallTimeout and CallCancelled.
 
         ``future`` is cancelled when it is not waited for any more.
         """
-        self._core.gate.hold(future)
+        self._hold(future)
         if self._end_s is None:
             return await future
         try:
@@ -49,3 +50,10 @@ class Waiting:
             raise CallTimeout(
                 f"{self._what} did not answer within {self._timeout_ms:g} ms"
             ) from error
+
+    def _hold(self, future: Future[Any]) -> Future[Any]:
+        """Let ``future`` end when the node leaves *active*, also if it has left it just now."""
+        if self._core.gate.period != self._period:
+            future.set_exception(CallCancelled(self._core.gate.refusal))
+            return future
+        return self._core.gate.hold(future)

@@ -1,0 +1,276 @@
+"""Publishers and subscriptions of a running node: gated, in order, and unhurt by user code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Int64, String
+
+from tests.ros.system_bench import Peer, running, wait_until
+
+RELAY = """
+system: relay
+nodes:
+  relay:
+    subscriptions:
+      input:
+        type: std_msgs/msg/Int64
+        external: true
+        log: "got {message.data}, the {count}th"
+        publish: {output: {data: "{message.data + 1}"}}
+    publishers:
+      output: {type: std_msgs/msg/Int64, external: true}
+"""
+
+
+def test_a_reaction_publishes_and_logs_what_it_works_out(tmp_path: Path, peer: Peer) -> None:
+    with running(RELAY, tmp_path) as system:
+        heard = peer.listen(Int64, "/output")
+        peer.publisher(Int64, "/input").publish(Int64(data=41))
+        wait_until(lambda: heard)
+    assert heard[0].data == 42
+    assert system.log() == ["got 41, the 0th"]
+
+
+def test_nothing_gets_through_a_node_that_is_not_active(tmp_path: Path, peer: Peer) -> None:
+    with running(RELAY, tmp_path) as system:
+        heard = peer.listen(Int64, "/output")
+        source = peer.publisher(Int64, "/input")
+        assert peer.change("/relay", "deactivate")
+        for number in range(5):
+            source.publish(Int64(data=number))
+        wait_until(lambda: system.host._nodes["relay"].statistics.dropped == 5)
+        assert peer.change("/relay", "activate")
+        source.publish(Int64(data=6))
+        wait_until(lambda: heard)
+        counted = system.summary("/relay")
+    assert [message.data for message in heard] == [7]
+    assert (counted.received, counted.sent, counted.dropped) == (1, 1, 5)
+
+
+def test_what_is_latched_while_inactive_comes_with_the_activation(
+    tmp_path: Path, peer: Peer
+) -> None:
+    text = """
+    system: latched
+    nodes:
+      listener:
+        lifecycle: {autostart: inactive}
+        subscriptions:
+          mode: {type: std_msgs/msg/String, qos: state, external: true, log: "{message.data}"}
+    """
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    with running(text, tmp_path) as system:
+        source = peer.publisher(String, "/mode", latched)
+        source.publish(String(data="old"))
+        source.publish(String(data="ready"))
+        port = system.host._nodes["listener"]._assembly.subscriptions["mode"]
+        wait_until(lambda: [message.data for message in port._latched or ()] == ["ready"])
+        assert system.log() == []
+        assert peer.change("/listener", "activate")
+        system.wait_for_log("ready")
+    assert system.log() == ["ready"]
+
+
+TALKATIVE = """
+system: talkative
+nodes:
+  talkative:
+    behavior: talkative:Talkative
+    publishers:
+      output: {type: std_msgs/msg/String, external: true}
+"""
+
+
+def test_a_node_has_a_first_and_a_last_word_but_none_when_it_is_not_active(
+    tmp_path: Path, peer: Peer
+) -> None:
+    module = """
+    from composer.behavior import Behavior
+    from std_msgs.msg import String
+
+    class Talkative(Behavior):
+        def on_configure(self): self.say("configure")
+        def on_activate(self): self.say("activate")
+        def on_deactivate(self): self.say("deactivate")
+        def on_cleanup(self): self.say("cleanup")
+
+        def say(self, text):
+            self.publishers.output.publish(String(data=text))
+            self.publishers.output.publish(String(data=text))
+    """
+    with running(TALKATIVE, tmp_path, talkative=module) as system:
+        assert peer.change("/talkative", "deactivate")
+        heard = peer.listen(String, "/output")
+        publisher = system.host._nodes["talkative"]._assembly.publishers["output"]._publisher
+        wait_until(lambda: publisher.get_subscription_count() == 1)
+        assert peer.change("/talkative", "activate")
+        assert peer.change("/talkative", "deactivate")
+        assert peer.change("/talkative", "cleanup")
+        wait_until(lambda: len(heard) == 4)
+        counted = system.summary("/talkative")
+    texts = [message.data for message in heard]
+    assert texts == ["activate", "activate", "deactivate", "deactivate"]
+    assert counted.dropped == 4
+    warnings = [line for line in system.log() if "drops its messages" in line]
+    assert warnings == [
+        "publisher 'output' drops its messages: /talkative is configuring, not active",
+        "publisher 'output' drops its messages: /talkative is cleaningup, not active",
+    ]
+
+
+FAULTY = """
+system: faulty
+executors: {shared: {kind: KIND}}
+nodes:
+  faulty:
+    executor: shared
+    behavior: faulty:Faulty
+    subscriptions:
+      input: {type: std_msgs/msg/Int64, external: true, set: {last: "{message.data}"}}
+    state: {last: 0}
+  healthy:
+    executor: shared
+    subscriptions:
+      input: {type: std_msgs/msg/Int64, external: true, log: "healthy {message.data}"}
+"""
+FAULTY_MODULE = """
+from composer.behavior import Behavior
+
+class Faulty(Behavior):
+    def on_input(self, message):
+        if message.data == 1:
+            raise ValueError("one is too much")
+        if message.data == 2:
+            raise SystemExit(3)
+        self.log.info(f"faulty {message.data}")
+"""
+
+
+@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+def test_what_a_handler_raises_is_told_and_hurts_nobody(
+    tmp_path: Path, peer: Peer, kind: str
+) -> None:
+    text = FAULTY.replace("KIND", kind)
+    with running(text, tmp_path, faulty=FAULTY_MODULE) as system:
+        source = peer.publisher(Int64, "/input")
+        wait_until(lambda: source.get_subscription_count() == 2)
+        for number in (1, 2, 3):
+            source.publish(Int64(data=number))
+        system.wait_for_log("faulty 3")
+        system.wait_for_log("healthy 3")
+        fault = system.wait_for_log("one is too much")
+        counted = system.summary("/faulty")
+    assert fault.startswith("on_input: ValueError: one is too much\nTraceback")
+    assert 'raise ValueError("one is too much")' in fault
+    assert counted.errors == 2
+    assert system.end().exit_code == 0
+
+
+SLOW = """
+system: slow
+nodes:
+  slow:
+    behavior: slow:Slow
+    subscriptions:
+      input: {type: std_msgs/msg/Int64, external: true, qos: {depth: 2}, reentrant: REENTRANT}
+      release: {type: std_msgs/msg/Int64, external: true}
+"""
+SLOW_MODULE = """
+from composer.behavior import Behavior
+
+class Slow(Behavior):
+    def on_configure(self):
+        self.free = False
+
+    async def on_input(self, message):
+        self.log.info(f"begin {message.data}")
+        while not self.free:
+            await self.clock.sleep(0.001)
+        self.log.info(f"end {message.data}")
+
+    def on_release(self, message):
+        self.free = True
+"""
+
+
+def test_messages_wait_for_a_handler_that_awaits_and_the_oldest_makes_room(
+    tmp_path: Path, peer: Peer
+) -> None:
+    with running(SLOW.replace("REENTRANT", "false"), tmp_path, slow=SLOW_MODULE) as system:
+        source, release = peer.publisher(Int64, "/input"), peer.publisher(Int64, "/release")
+        source.publish(Int64(data=0))
+        system.wait_for_log("begin 0")
+        for number in range(1, 5):
+            source.publish(Int64(data=number))
+            wait_until(lambda n=number: system.host._nodes["slow"].statistics.received == n + 1)
+        release.publish(Int64())
+        system.wait_for_log("end 4")
+        counted = system.summary("/slow")
+    assert system.log() == [f"{word} {number}" for number in (0, 3, 4) for word in ("begin", "end")]
+    assert counted.dropped == 2
+
+
+def test_runs_of_a_reentrant_port_overlap(tmp_path: Path, peer: Peer) -> None:
+    with running(SLOW.replace("REENTRANT", "true"), tmp_path, slow=SLOW_MODULE) as system:
+        source, release = peer.publisher(Int64, "/input"), peer.publisher(Int64, "/release")
+        for number in range(4):
+            source.publish(Int64(data=number))
+            system.wait_for_log(f"begin {number}")
+        assert "end" not in system.log_text()
+        release.publish(Int64())
+        for number in range(4):
+            system.wait_for_log(f"end {number}")
+
+
+def test_the_callbacks_of_a_node_take_turns_on_several_threads(tmp_path: Path, peer: Peer) -> None:
+    text = """
+    system: turns
+    executors: {several: {kind: multi_threaded, threads: 4}}
+    nodes:
+      turns:
+        executor: several
+        behavior: turns:Turns
+        subscriptions:
+          input: {type: std_msgs/msg/Int64, external: true}
+        timers:
+          tick: {period_ms: 2}
+          async_tick: {period_ms: 2}
+    """
+    module = """
+    import threading
+    from time import sleep
+    from composer.behavior import Behavior
+
+    class Turns(Behavior):
+        def on_configure(self):
+            self.inside = 0
+            self.most = 0
+            self.calls = 0
+            self.threads = set()
+
+        def work(self):
+            self.inside += 1
+            self.most = max(self.most, self.inside)
+            self.threads.add(threading.current_thread().name)
+            sleep(0.001)
+            self.inside -= 1
+            self.calls += 1
+            if self.calls == 300:
+                self.log.info(f"at most {self.most} at once")
+
+        def on_input(self, message): self.work()
+        def on_tick(self): self.work()
+        async def on_async_tick(self):
+            self.work()
+            await self.clock.sleep(0.001)
+            self.work()
+    """
+    with running(text, tmp_path, turns=module) as system:
+        source = peer.publisher(Int64, "/input")
+        for number in range(50):
+            source.publish(Int64(data=number))
+        line = system.wait_for_log("at once")
+    assert line == "at most 1 at once"
