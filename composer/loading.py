@@ -12,6 +12,7 @@ from pathlib import Path
 
 from composer.catalog import Catalog, interface_folders
 from composer.checks import Context, run_checks
+from composer.checks.ignores import without_ignored
 from composer.diagnostics import Diagnostic, Severity, has_errors, in_order
 from composer.document import parse_bytes, read_document
 from composer.expand import expand
@@ -105,7 +106,10 @@ def _load(
         refused = tuple(item.primary for item in findings if item.severity is Severity.ERROR)
         context = Context(system, known.interfaces, known.catalog, refused)
         findings.extend(run_checks(context))
-    return Loading(system, in_order(findings), source, known.catalog, known.interfaces)
+    # In a node type alone much goes unsaid that its comments may be about.
+    judged = system is not None and not system.node_type
+    kept = without_ignored(findings, source, complete=judged)
+    return Loading(system, in_order(kept), source, known.catalog, known.interfaces)
 
 
 def _resolved(

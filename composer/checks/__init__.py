@@ -13,6 +13,7 @@ from functools import cache
 from importlib import import_module
 
 from composer.checks.context import Context, place
+from composer.checks.words import with_short_echoes
 from composer.diagnostics import Diagnostic, in_order
 
 Check = Callable[[Context], Iterator[Diagnostic]]
@@ -25,7 +26,7 @@ def run_checks(context: Context) -> list[Diagnostic]:
     """
     refused = {place(span) for span in context.refused}
     return in_order(
-        finding
+        with_short_echoes(finding)
         for check in all_checks()
         for finding in check(context)
         if place(finding.primary) not in refused

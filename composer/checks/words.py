@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Sequence
+from dataclasses import replace
 
-from composer.diagnostics import nearest
+from composer.diagnostics import LONGEST_ECHO, Diagnostic, nearest, shown
 from composer.model import Channel, PortKind, PortOfNode
+
+_LONG_ECHO = re.compile(rf"'([^']{{{LONGEST_ECHO + 1},}})'")
 
 
 def a(kind: PortKind) -> str:
@@ -33,6 +36,25 @@ def listed(names: Sequence[str], limit: int = 3) -> str:
 def number(value: float) -> str:
     """Return a number without needless digits: ``50``, not ``50.0``; ``0.1``."""
     return f"{value:.6g}"
+
+
+def with_short_echoes(finding: Diagnostic) -> Diagnostic:
+    """Return the finding with every quoted value cut to the length that messages echo."""
+    texts = [finding.message, finding.hint or "", *(label.message for label in finding.related)]
+    if all(len(text) <= LONGEST_ECHO for text in texts):
+        return finding
+    return replace(
+        finding,
+        message=_cut_echoes(finding.message),
+        hint=_cut_echoes(finding.hint) if finding.hint is not None else None,
+        related=tuple(
+            replace(label, message=_cut_echoes(label.message)) for label in finding.related
+        ),
+    )
+
+
+def _cut_echoes(text: str) -> str:
+    return _LONG_ECHO.sub(lambda found: f"'{shown(found[1])}'", text)
 
 
 def safe_name(name: str) -> str:
