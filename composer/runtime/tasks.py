@@ -250,11 +250,14 @@ class Task(Generic[T]):
         self._on_end(self)
 
     def _fail(self, error: BaseException) -> None:
-        if error.__traceback__ is not None:
-            # Without this frame, which holds the task, the future goes as soon as nobody wants it.
-            error.__traceback__ = error.__traceback__.tb_next
-        if not self.future.set_exception(error):
+        outcome = self.future
+        if not outcome.set_exception(error):
             self._report(error)
+            return
+        # The frames of the traceback lead to this task (from Python 3.12 on by way of f_back). So
+        # that the outcome goes as soon as nobody wants it, the task lets go of it.
+        self.future = Future()
+        self.future.set_exception(error)
 
     def _wait_for(self, yielded: object) -> bool:
         if isinstance(yielded, Future):

@@ -57,9 +57,9 @@ class Loop:
         self.ended += 1
 
     def start(self, coroutine: Coroutine[Any, Any, Any]) -> Future[Any]:
-        future = self.task(coroutine).future
+        futures = [self.task(coroutine).future]
         self.run()
-        return future
+        return futures.pop()  # this frame may live on in a traceback, and must not hold it
 
     def run(self) -> None:
         while self.calls:
