@@ -12,6 +12,7 @@ from nav_msgs.msg import Odometry, Path
 
 from composer.behavior import Behavior, CallCancelled, CallError, Goal
 
+ODOMETRY_TIMEOUT_S = 2.0  # a goal may come before the first odometry does
 RETRY_S = 1.0  # pause before a planner that refused is asked again
 
 
@@ -100,8 +101,9 @@ class MotorController(Behavior):
         return Navigate.Result(success=True, message="arrived", distance_traveled=traveled)
 
     async def _plan(self, goal: Point, max_velocity: float) -> tuple[Reference | None, str]:
+        await self._hear_odometry()
         if self.position is None:
-            return None, "no odometry yet"
+            return None, f"no odometry within {ODOMETRY_TIMEOUT_S:g} s"
         limit = min(max_velocity, self.parameters.max_velocity)
         cruise = self.parameters.cruise_share * limit
         request = PlanTrajectory.Request(start=self.position, goal=goal, max_velocity=cruise)
@@ -114,6 +116,11 @@ class MotorController(Behavior):
         if not response.success:
             return None, response.message
         return Reference(response.path, limit), response.message
+
+    async def _hear_odometry(self) -> None:
+        deadline_s = self.clock.now() + ODOMETRY_TIMEOUT_S
+        while self.position is None and self.clock.now() < deadline_s:
+            await self.clock.sleep(0.02)
 
     def _velocity(self, reference: Reference, position: Point) -> tuple[float, float]:
         wanted, velocity_x, velocity_y = reference.at(self.clock.now())
