@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from composer.checks.context import Context
 from composer.checks.reactions import reactions
 from composer.expressions import Expression
 from composer.model import Event, Node, Port, Reaction, System
@@ -42,8 +43,12 @@ class Site:
     port: Port | None = None
 
 
-def sites(system: System) -> Iterator[Site]:
-    """Yield every expression: in reactions, action servers and periods."""
+def sites(context: Context) -> tuple[Site, ...]:
+    """Return every expression: in reactions, action servers and periods."""
+    return tuple(_sites(context.system))
+
+
+def _sites(system: System) -> Iterator[Site]:
     for found in reactions(system):
         names = names_at(found.event)
         for expression, span in reaction_expressions(found.reaction):

@@ -40,7 +40,7 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the first part of every path."""
-    for site in sites(context.system):
+    for site in context.once(sites):
         for path in site.expression.paths:
             if path.root in site.names:
                 continue

@@ -56,7 +56,7 @@ def _endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
         RULE,
         f"'{endpoint.text}' names node '{name}', which is not a node of this system",
         part_of(endpoint.text, 0, len(name)),
-        hint=suggestion(name, _names(context)),
+        hint=suggestion(name, context.once(_names)),
     )
 
 
@@ -69,9 +69,9 @@ def _dependencies(context: Context, node: Node) -> Iterator[Diagnostic]:
             RULE,
             f"node '{node.name}' depends on '{name}', which is not a node of this system",
             name.span,
-            hint=suggestion(name.value, _names(context) - {node.name.value}),
+            hint=suggestion(name.value, context.once(_names)),
         )
 
 
-def _names(context: Context) -> set[str]:
-    return {node.name.value for node in context.system.nodes}
+def _names(context: Context) -> tuple[str, ...]:
+    return tuple(node.name.value for node in context.system.nodes)

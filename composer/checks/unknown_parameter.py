@@ -71,7 +71,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 
 def _uses(context: Context, known: Mapping[str, frozenset[str]]) -> Iterator[tuple[str, str, Span]]:
-    for site in sites(context.system):
+    for site in context.once(sites):
         for path in site.expression.paths:
             if path.root == "parameters" and len(path.parts) > 1:
                 span = part_of_path(site.span, site.expression, path, 1)

@@ -57,7 +57,7 @@ def _uses(context: Context) -> Iterator[tuple[Node, str, Span]]:
     for found in reactions(context.system):
         for name, _ in found.reaction.state:
             yield found.node, name.value, name.span
-    for site in sites(context.system):
+    for site in context.once(sites):
         for path in site.expression.paths:
             if path.root == "state" and "state" in site.names and len(path.parts) > 1:
                 span = part_of_path(site.span, site.expression, path, 1)
