@@ -12,9 +12,9 @@ from pathlib import Path
 import yaml
 
 from composer.diagnostics import Diagnostic
-from composer.document.builder import Stopped, TreeBuilder
+from composer.document.builder import Stopped, TreeBuilder, too_many_values
 from composer.document.characters import check_text
-from composer.document.events import parse_events
+from composer.document.events import excess, parse_events
 from composer.document.files import decode, read_bytes, too_large
 from composer.document.limits import MAX_BYTES
 from composer.document.rules import KEY_WITHOUT_VALUE, NOT_A_MAP
@@ -62,6 +62,9 @@ def parse_document(source: SourceFile) -> tuple[Mapping | None, list[Diagnostic]
         return None, findings
     builder = TreeBuilder(source)
     try:
+        surplus = excess(source.text)
+        if surplus is not None:
+            return None, [too_many_values(source, surplus)]
         with closing(parse_events(source.text)) as stream:
             for event in stream:
                 builder.take(event)

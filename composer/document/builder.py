@@ -112,7 +112,8 @@ class TreeBuilder:
 
     def _take_start(self, event: yaml.CollectionStartEvent) -> None:
         self._count(1, event.start_mark)
-        self._check_tag(event.tag, event.start_mark)
+        if event.tag is not None:
+            self._report_tag(event.tag, event.start_mark)
         is_map = isinstance(event, yaml.MappingStartEvent)
         start = span_at(self._source, event.start_mark)
         if len(self._open) >= MAX_DEPTH:
@@ -170,7 +171,8 @@ class TreeBuilder:
             parent.awaits_value, parent.key = True, None
 
     def _scalar(self, event: yaml.ScalarEvent) -> Scalar:
-        self._check_tag(event.tag, event.start_mark)
+        if event.tag is not None:
+            self._report_tag(event.tag, event.start_mark)
         span, verbatim, offset = scalar_span(self._source, event)
         value: ScalarValue = event.value
         if not event.style:  # None from PyYAML's parser, "" from libyaml's: unquoted
@@ -232,20 +234,24 @@ class TreeBuilder:
         self._report(rules.KEY_WITHOUT_VALUE, message, key.span, hint)
         parent.text_in_braces = Scalar(text, parent.start, verbatim=False)
 
-    def _check_tag(self, tag: str | None, mark: Mark | None) -> None:
-        if tag is not None:
-            hint = "leave it out, and put what is to be text in quotes"
-            message = f"the tag '{shown(tag.replace('tag:yaml.org,2002:', '!!'))}' is not read"
-            self._report(rules.YAML_TAG, message, span_at(self._source, mark), hint)
+    def _report_tag(self, tag: str, mark: Mark | None) -> None:
+        hint = "leave it out, and put what is to be text in quotes"
+        message = f"the tag '{shown(tag.replace('tag:yaml.org,2002:', '!!'))}' is not read"
+        self._report(rules.YAML_TAG, message, span_at(self._source, mark), hint)
 
     def _count(self, values: int, mark: Mark | None) -> None:
         self._values += values
         if self._values > MAX_VALUES:
-            message = f"this file says more than {MAX_VALUES:,} things"
-            raise Stopped(Diagnostic(rules.TOO_MANY_VALUES, message, span_at(self._source, mark)))
+            raise Stopped(too_many_values(self._source, mark))
 
     def _report(self, rule: Rule, message: str, span: Span, hint: str | None) -> None:
         self.findings.append(Diagnostic(rule, message, span, hint=hint))
+
+
+def too_many_values(source: SourceFile, mark: Mark | None) -> Diagnostic:
+    """Return the finding for more than MAX_VALUES values; ``mark`` is where one is too many."""
+    message = f"this file says more than {MAX_VALUES:,} things"
+    return Diagnostic(rules.TOO_MANY_VALUES, message, span_at(source, mark))
 
 
 def _undefined(name: str) -> str:

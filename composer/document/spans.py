@@ -41,12 +41,17 @@ def scalar_span(source: SourceFile, event: yaml.ScalarEvent) -> tuple[Span, bool
     begin, end = event.start_mark, event.end_mark
     if begin is None or end is None:
         return span_at(source, begin), False, 0
-    line = source.line(begin.line + 1)
-    if event.style in _BLOCK_STYLES or end.line != begin.line:
-        return span_at(source, begin, max(len(line.rstrip()) - begin.column, 1)), False, 0
-    offset = 1 if event.style else 0
-    verbatim = line[begin.column + offset : end.column - offset] == event.value
-    return span_at(source, begin, max(end.column - begin.column, 1)), verbatim, offset
+    row, start = begin.line, begin.column
+    line = source.line(row + 1)
+    if end.line != row or event.style in _BLOCK_STYLES:
+        length = len(line.rstrip()) - start
+        verbatim, offset = False, 0
+    else:
+        stop = end.column
+        length = stop - start
+        offset = 1 if event.style else 0
+        verbatim = line[start + offset : stop - offset] == event.value
+    return Span(source, row + 1, start + 1, length if length > 0 else 1), verbatim, offset
 
 
 def collection_span(start: Span, first: Span, is_flow: bool) -> Span:
