@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from difflib import get_close_matches
 from enum import Enum
 
 from composer.source import Span
+from composer.spelling import vocabulary
 
 
 class Severity(Enum):
@@ -119,18 +119,15 @@ def shown(value: object, *, limit: int = LONGEST_ECHO) -> str:
 
 def nearest(name: str, candidates: Iterable[str]) -> str | None:
     """Return the candidate that ``name`` was most likely meant to be, or None."""
-    by_folded = {candidate.casefold(): candidate for candidate in sorted(candidates, reverse=True)}
-    matches = get_close_matches(name.casefold(), by_folded, n=1, cutoff=0.6)
-    return by_folded[matches[0]] if matches else None
+    return next(iter(vocabulary(tuple(candidates)).close(name)), None)
 
 
 def suggestion(name: str, candidates: Iterable[str], *, limit: int = 8) -> str | None:
     """Return a hint: the nearest candidate, else a short list of all, else None."""
-    known = sorted(set(candidates))
-    close = nearest(name, known)
-    if close is not None:
+    known = vocabulary(tuple(candidates))
+    for close in known.close(name):
         return f"did you mean '{close}'?"
-    if not known:
+    if not known.names:
         return None
-    listed = ", ".join(known[:limit])
-    return f"valid here: {listed}" + (", ..." if len(known) > limit else "")
+    listed = ", ".join(map(shown, known.names[:limit]))
+    return f"valid here: {listed}" + (", ..." if len(known.names) > limit else "")

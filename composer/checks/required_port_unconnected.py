@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
+from composer.checks.near_miss import nearest_channel
 from composer.checks.wiring import lonely_ends
-from composer.checks.words import end_name, nearest_channel
+from composer.checks.words import end_name
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import PortKind
 
@@ -49,5 +50,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     f"but nothing is at the other end of '{end.port.full_name}'",
                     end.node.name.span,
                     (Label(end.port.name.span, "declared as required"),),
-                    nearest_channel(context.channels, end),
+                    nearest_channel(context, end),
                 )

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
+from composer.checks.near_miss import nearest_channel
 from composer.checks.wiring import external_hint, lonely_ends, place_of
-from composer.checks.words import end_name, nearest_channel
+from composer.checks.words import end_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import PortKind
 
@@ -52,5 +53,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 f"which '{end_name(end)}' subscribes to",
                 place,
                 labels,
-                nearest_channel(context.channels, end) or external_hint(context, end),
+                nearest_channel(context, end) or external_hint(context, end),
             )

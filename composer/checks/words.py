@@ -7,8 +7,8 @@ import unicodedata
 from collections.abc import Sequence
 from dataclasses import replace
 
-from composer.diagnostics import LONGEST_ECHO, Diagnostic, nearest, shown
-from composer.model import Channel, PortKind, PortOfNode
+from composer.diagnostics import LONGEST_ECHO, Diagnostic, shown
+from composer.model import PortKind, PortOfNode
 
 _LONG_ECHO = re.compile(rf"'([^']{{{LONGEST_ECHO + 1},}})'")
 
@@ -77,25 +77,3 @@ def _is_safe(character: str) -> bool:
 def end_name(end: PortOfNode) -> str:
     """Return a port as connections name it: ``planner.sensor_data``."""
     return f"{end.node.name}.{end.port.name}"
-
-
-def nearest_channel(channels: Sequence[Channel], end: PortOfNode) -> str | None:
-    """Return a hint at the channel of the same kind and type that a lonely port may have meant."""
-    port = end.port
-    names = [
-        channel.name
-        for channel in channels
-        if channel.kind is port.kind.channel
-        and channel.name != port.full_name
-        and any(_could_meet(end, other) for other in channel.ends)
-    ]
-    close = nearest(port.full_name, names)
-    return f"did you mean '{close}'?" if close is not None else None
-
-
-def _could_meet(one: PortOfNode, other: PortOfNode) -> bool:
-    return (
-        one.node.name != other.node.name
-        and one.port.kind is not other.port.kind
-        and one.port.interface == other.port.interface
-    )

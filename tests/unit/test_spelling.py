@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from composer.spelling import LONGEST_NAME, Vocabulary, vocabulary
+
+MANY = [f"camera_{number}_driver" for number in range(3000)]
+
+
+@pytest.mark.parametrize("others", [[], MANY], ids=["few", "many"])
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("planer", "planner"),
+        ("plannre", "planner"),
+        ("Planner", "planner"),
+        ("lanner", "planner"),
+        ("motor_contoller", "motor_controller"),
+        ("motorcontroller", "motor_controller"),
+        ("xotor_controller", "motor_controller"),
+    ],
+)
+def test_a_slip_is_seen_through_among_few_names_and_among_many(
+    others: list[str], name: str, meant: str
+) -> None:
+    assert Vocabulary(["planner", "motor_controller", *others]).close(name) == [meant]
+
+
+def test_numbered_names_are_told_apart_by_their_numbers() -> None:
+    assert Vocabulary(MANY).close("camera_1234_drivr") == ["camera_1234_driver"]
+    assert Vocabulary(MANY).close("amera_1234_driver") == ["camera_1234_driver"]
+
+
+def test_what_is_like_nothing_gets_no_answer() -> None:
+    assert Vocabulary(MANY).close("zzz") == []
+    assert Vocabulary([]).close("zzz") == []
+
+
+def test_several_are_given_with_the_likeliest_first() -> None:
+    assert Vocabulary(["plan", "planner", "plane"]).close("planne", 3) == [
+        "planner",
+        "plane",
+        "plan",
+    ]
+
+
+def test_the_same_names_are_sorted_once() -> None:
+    assert vocabulary(("b", "a")) is vocabulary(("b", "a"))
+    assert vocabulary(("b", "a")).names == ("a", "b")
+
+
+def test_names_longer_than_any_in_ros_are_not_compared() -> None:
+    longest = "a" * LONGEST_NAME
+    assert Vocabulary([longest]).close(longest[1:]) == [longest]
+    assert Vocabulary([longest + "a"]).close(longest) == []
+    assert Vocabulary([longest]).close(longest + "b") == []
+
+
+def test_an_answer_takes_no_longer_among_many_names() -> None:
+    def duration_s(count: int) -> float:
+        names = Vocabulary(f"camera_{number}_driver" for number in range(count))
+        start_s = time.process_time()
+        for number in range(100):
+            names.close(f"camera_{number}_drvier")
+        return time.process_time() - start_s
+
+    assert duration_s(20_000) < 8 * duration_s(200)
