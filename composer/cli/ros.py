@@ -23,25 +23,32 @@ DEFAULT_TIMEOUT_S = 5.0
 
 
 def require_ros(command: str) -> None:
-    """Raise a Failure that says how to get ROS where rclpy cannot be imported."""
+    """Raise a Failure where rclpy cannot be imported, or the environment does not let it start.
+
+    To be called before anything imports rclpy, which may end the process.
+    """
     if find_spec("rclpy") is None:
         raise Failure(
             f"'{command}' needs ROS 2, and rclpy is not installed in this Python",
             hint='pip install "ros2-composer[ros]"   or: source /opt/ros/jazzy/setup.bash',
         )
+    from composer.runtime.environment import StartRefused, prepare_environment
+
+    try:
+        prepare_environment()
+    except StartRefused as refusal:
+        raise Failure(str(refusal), hint=refusal.hint) from refusal
 
 
 @contextmanager
 def ros_session(command: str, timeout_s: float) -> Iterator[tuple[Session, Deadline]]:
     """Join the ROS graph for the length of a ``with`` block; errors of ROS become Failures."""
     require_ros(command)
-    from composer.runtime.environment import StartRefused, prepare_environment
     from composer.runtime.session import Deadline, RosError, Session
 
     deadline = Deadline(timeout_s)
     try:
-        prepare_environment()
         with Session() as session:
             yield session, deadline
-    except (RosError, StartRefused) as error:
+    except RosError as error:
         raise Failure(str(error), hint=error.hint) from error

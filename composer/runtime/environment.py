@@ -33,6 +33,7 @@ def check_environment(environment: MutableMapping[str, str]) -> None:
     _check_domain_id(environment.get("ROS_DOMAIN_ID", ""))
     _check_discovery_range(environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", ""))
     _check_security(environment)
+    _check_middleware(environment)
 
 
 def complete_environment(environment: MutableMapping[str, str]) -> None:
@@ -43,9 +44,13 @@ def complete_environment(environment: MutableMapping[str, str]) -> None:
 
 
 def prepare_environment() -> None:
-    """Check and complete the environment of this process. Raises StartRefused."""
-    check_environment(os.environ)
+    """Check and complete the environment of this process. Raises StartRefused.
+
+    To be called before rclpy is imported: with a middleware that is not there, the import ends
+    the process.
+    """
     complete_environment(os.environ)
+    check_environment(os.environ)
 
 
 def _check_domain_id(text: str) -> None:
@@ -86,4 +91,22 @@ def _check_security(environment: MutableMapping[str, str]) -> None:
             "ROS_SECURITY_ENABLE is true, but the strategy is not Enforce: nodes without "
             "keys would run unsecured",
             "set ROS_SECURITY_STRATEGY=Enforce, or unset ROS_SECURITY_ENABLE",
+        )
+
+
+def _check_middleware(environment: MutableMapping[str, str]) -> None:
+    """Refuse a middleware that no ROS prefix has; unset, rmw_implementation takes what is there."""
+    wanted = environment.get("RMW_IMPLEMENTATION")
+    prefixes = environment.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    index = "share/ament_index/resource_index/rmw_typesupport"
+    known = {
+        entry.name
+        for prefix in prefixes
+        if prefix and Path(prefix, index).is_dir()
+        for entry in Path(prefix, index).iterdir()
+    } - {"rmw_implementation"}
+    if wanted and known and wanted not in known:
+        raise StartRefused(
+            f"RMW_IMPLEMENTATION is '{wanted}', which is not installed",
+            f"installed: {', '.join(sorted(known))}",
         )

@@ -21,7 +21,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import rclpy
@@ -49,6 +50,7 @@ from composer.runtime.events import (
 )
 from composer.runtime.executors import log_exception, make_loop
 from composer.runtime.lifecycle import Result
+from composer.runtime.log import describe
 from composer.runtime.loop import Loop
 from composer.runtime.node import Listener, NodeOptions, RunningNode
 from composer.runtime.parameters import ParameterError
@@ -130,9 +132,12 @@ class Host:
             try:
                 if self._create() and self._bring_up():
                     self._stop.wait(self._options.run_for_s)
-                self._tear_down()
-            finally:
+                with self._hard_exit():
+                    self._tear_down()
+                    self._close()
+            except BaseException:
                 self._close()
+                raise
         return self._outcome()
 
     # --- up
@@ -145,6 +150,9 @@ class Host:
                 self._nodes[node.name.value] = self._create_node(node, executor)
             except ParameterError as error:
                 self._roll_back(node.full_name, str(error))
+                return False
+            except Exception as error:
+                self._roll_back(node.full_name, f"it cannot be created: {describe(error)}")
                 return False
         for loop in self._loops.values():
             loop.start()
@@ -173,6 +181,8 @@ class Host:
     def _bring_up(self) -> bool:
         limit_s = self._options.transition_timeout_s + _STUCK_AFTER_S
         for step in self._up.steps:
+            if self._stop.reason is not None:
+                return False
             result = self._make(step, limit_s, stoppable=True)
             if self._stop.reason is not None:
                 return False
@@ -196,21 +206,29 @@ class Host:
         if self._stop.reason is None:
             self._stop.ask(f"{self._options.run_for_s:g} s are over")
         self._report(Stopping(self._elapsed_s(), self._reason))
-        self._watch_over_the_end()
         end_s = time.monotonic() + self._options.stop_within_s
         for step in self._plan_down:
             node = self._nodes[step.node]
             if node.loop.name in self._hung or step.transition not in node.legal:
                 continue
-            limit_s = min(_STEP_SHARE * self._options.stop_within_s, end_s - time.monotonic())
-            self._make(step, max(limit_s, 0.0), stoppable=False)
+            left_s = end_s - time.monotonic()
+            if left_s <= 0.0:
+                break
+            self._make(
+                step, min(_STEP_SHARE * self._options.stop_within_s, left_s), stoppable=False
+            )
         self._summary = tuple(_summary(node) for node in self._nodes.values())
 
-    def _watch_over_the_end(self) -> None:
-        if self._options.hard_exit is not None:
-            watchdog = threading.Timer(self._options.grace_s, self._options.hard_exit)
-            watchdog.daemon = True
-            watchdog.start()
+    @contextmanager
+    def _hard_exit(self) -> Iterator[None]:
+        """End the process if the block does not end within the grace period."""
+        watchdog = threading.Timer(self._options.grace_s, self._options.hard_exit or (lambda: None))
+        watchdog.daemon = True
+        watchdog.start()
+        try:
+            yield
+        finally:
+            watchdog.cancel()
 
     def _close(self) -> None:
         for name, loop in self._loops.items():
@@ -277,9 +295,13 @@ class Host:
         self._report(Logged(self._elapsed_s(), logger, level, message))
 
     def _report(self, event: Event) -> None:
-        if self._listener is not None:
-            with self._report_lock:
+        with self._report_lock:
+            if self._listener is None:
+                return
+            try:
                 self._listener(event)
+            except Exception:  # nobody reads any more; the system is more than its spectators
+                self._listener = None
 
     def _elapsed_s(self) -> float:
         return time.monotonic() - self._started_at_s

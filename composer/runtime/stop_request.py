@@ -8,6 +8,9 @@ from typing import Any
 
 from composer.runtime.tasks import Future
 
+#: What is left of any time limit once somebody is in a hurry.
+_HURRY_S = 0.05
+
 
 class StopRequest:
     """Whether the system is to stop, and why.
@@ -38,12 +41,16 @@ class StopRequest:
     def wait_for(self, future: Future[Any], limit_s: float, *, stoppable: bool) -> bool:
         """Wait until ``future`` is done, for at most ``limit_s`` seconds, and say whether it is.
 
-        With ``stoppable`` a request to stop ends the wait, without it a second one does.
+        With ``stoppable`` a request to stop ends the wait; without it a second one shortens it.
         """
         future.add_done_callback(lambda _: self._wake.put(None))
         end_s = time.monotonic() + limit_s
         while not future.done():
-            if self.hurry or (stoppable and self.reason is not None) or not self._sleep(end_s):
+            if stoppable and self.reason is not None:
+                break
+            if self.hurry:
+                end_s = min(end_s, time.monotonic() + _HURRY_S)
+            if not self._sleep(end_s):
                 break
         return future.done()
 

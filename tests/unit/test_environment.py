@@ -1,0 +1,83 @@
+"""What is wrong in the environment is said before ROS reads it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.runtime.environment import StartRefused, check_environment, complete_environment
+
+SECURE = {
+    "ROS_SECURITY_ENABLE": "true",
+    "ROS_SECURITY_KEYSTORE": "keys",
+    "ROS_SECURITY_STRATEGY": "Enforce",
+}
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {},
+        {"ROS_DOMAIN_ID": ""},
+        {"ROS_DOMAIN_ID": "0"},
+        {"ROS_DOMAIN_ID": "232", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
+        {"ROS_SECURITY_ENABLE": "false"},
+        {"ROS_SECURITY_ENABLE": "TRUE"},  # rcl takes exactly 'true'
+        SECURE,
+        {"RMW_IMPLEMENTATION": "rmw_anything"},  # no prefix is known: nothing can be said
+    ],
+)
+def test_what_ros_understands_is_left_alone(environment: dict[str, str]) -> None:
+    check_environment(environment)
+
+
+@pytest.mark.parametrize(
+    ("environment", "message", "hint"),
+    [
+        ({"ROS_DOMAIN_ID": "-1"}, "ROS_DOMAIN_ID is '-1'", "from 0 to 232"),
+        ({"ROS_DOMAIN_ID": "x"}, "ROS_DOMAIN_ID is 'x'", "from 0 to 232"),
+        ({"ROS_DOMAIN_ID": "233"}, "ROS_DOMAIN_ID is '233'", "from 0 to 232"),
+        ({"ROS_DOMAIN_ID": "\N{SUPERSCRIPT TWO}"}, "no domain id", "from 0 to 232"),
+        (
+            {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOTS"},
+            "no discovery range",
+            "did you mean LOCALHOST?",
+        ),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "BOGUS"}, "no discovery range", "valid values: SUBNET"),
+        ({"ROS_SECURITY_ENABLE": "true"}, "names no keystore", "create_keystore"),
+        (
+            {**SECURE, "ROS_SECURITY_STRATEGY": "Permissive"},
+            "would run unsecured",
+            "ROS_SECURITY_STRATEGY=Enforce",
+        ),
+    ],
+)
+def test_what_ros_would_take_silently_is_refused(
+    environment: dict[str, str], message: str, hint: str
+) -> None:
+    with pytest.raises(StartRefused) as refusal:
+        check_environment(environment)
+    assert message in str(refusal.value)
+    assert hint in refusal.value.hint
+
+
+def test_a_middleware_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    index = tmp_path / "share" / "ament_index" / "resource_index" / "rmw_typesupport"
+    index.mkdir(parents=True)
+    (index / "rmw_fastrtps_cpp").touch()
+    (index / "rmw_implementation").touch()
+    environment = {"AMENT_PREFIX_PATH": f"/nowhere:{tmp_path}"}
+    check_environment({**environment, "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"})
+    with pytest.raises(StartRefused) as refusal:
+        check_environment({**environment, "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"})
+    assert refusal.value.hint == "installed: rmw_fastrtps_cpp"
+
+
+def test_what_is_set_is_kept() -> None:
+    environment = {"AMENT_PREFIX_PATH": "/opt/ros/jazzy", "RCUTILS_CONSOLE_OUTPUT_FORMAT": "x"}
+    complete_environment(environment)
+    assert environment == {
+        "AMENT_PREFIX_PATH": "/opt/ros/jazzy",
+        "RCUTILS_CONSOLE_OUTPUT_FORMAT": "x",
+    }
