@@ -151,11 +151,12 @@ def _meant(error: _Error, name: str) -> str | None:
 def _unknown_keys(error: _Error, misspelt: _Misspelt) -> Iterator[Diagnostic]:
     entries = error.places.entries(error.place.tree)
     valid = error.schema["properties"]
+    unsaid = [key for key in valid if key not in error.instance]
     for name in error.unknown:
         if error.path in misspelt.deciding and _meant(error, name) not in _DECIDING:
             continue
         message = f"'{shown(name)}' is not a key of {error.owner}"
-        hint = advice(name, error.schema.get("title", ""), set(valid) - set(error.instance))
+        hint = advice(name, error.schema.get("title", ""), unsaid)
         yield Diagnostic(rules.UNKNOWN_KEY, message, entries[name].key.span, hint=hint)
 
 
