@@ -7,7 +7,20 @@ from typing import Annotated
 
 import typer
 
-from composer.cli import graph, lifecycle, rule, run, schema, validate
+from composer.cli import (
+    action,
+    graph,
+    interface,
+    lifecycle,
+    node,
+    param,
+    rule,
+    run,
+    schema,
+    service,
+    topic,
+    validate,
+)
 from composer.cli.help import examples
 from composer.cli.terminal import write
 
@@ -68,7 +81,13 @@ def compose(
 
 app.command("run", epilog=run.EPILOG)(run.run)
 app.command("validate", epilog=validate.EPILOG)(validate.validate)
-app.add_typer(lifecycle.app, name="lifecycle")
 app.command("graph", epilog=graph.EPILOG)(graph.graph)
+app.add_typer(lifecycle.app, name="lifecycle")
+app.add_typer(node.app, name="node")
+app.add_typer(topic.app, name="topic")
+app.add_typer(service.app, name="service")
+app.add_typer(action.app, name="action")
+app.add_typer(param.app, name="param")
+app.add_typer(interface.app, name="interface")
 app.command("rule", epilog=rule.EPILOG)(rule.rule)
 app.command("schema", epilog=schema.EPILOG)(schema.schema)

@@ -14,15 +14,11 @@ from typing import Any
 from lifecycle_msgs.msg import Transition as TransitionMessage
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 
-from composer.diagnostics import nearest
-from composer.runtime.session import MISSING_S, Deadline, NoAnswer, RosError, Session
+from composer.runtime.finding import find_node
+from composer.runtime.session import Deadline, NoAnswer, RosError, Session
 
 _STATE_SERVICE = "/get_state"
 _STATE_TYPE = "lifecycle_msgs/srv/GetState"
-
-
-class UnknownNode(RosError):
-    """No lifecycle node of that name, or more than one, is in the graph."""
 
 
 class TransitionRefused(RosError):
@@ -59,21 +55,8 @@ class Control:
         return self._session.wait_until_still(self._known, self._deadline)
 
     def find(self, name: str) -> str:
-        """Return the full name of the node that ``name`` means.
-
-        That is a full name, or the last part (or parts) of just one. Raises UnknownNode.
-        """
-        patience = Deadline(min(MISSING_S, self._deadline.left_s))
-        found = self._session.wait_for(lambda: _matches(name, self._known()) or None, patience)
-        if found is None:
-            raise UnknownNode(
-                f"no lifecycle node is called '{name}'", _nodes_there(name, self._known())
-            )
-        if name not in found:  # a part of a name: are there others with the same part?
-            found = _matches(name, self.nodes())
-        if len(found) > 1:
-            raise UnknownNode(f"'{name}' is more than one node", "say which: " + ", ".join(found))
-        return found[0]
+        """Return the full name of the node that ``name`` means. Raises NotThere."""
+        return find_node(self._session, self._deadline, name, self._known, "lifecycle node")
 
     def state(self, node: str) -> str:
         """Return the label of the node's state. Raises NoAnswer."""
@@ -139,28 +122,6 @@ class Control:
                 f"{node} did not answer within {self._deadline.timeout_s:g} s",
                 f"{error}; its process may be busy or gone. --timeout gives it longer",
             ) from error
-
-
-def _matches(name: str, known: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the nodes with that full name, else those whose name ends with it."""
-    if name in known:
-        return (name,)
-    if name.startswith("/"):
-        return ()
-    return tuple(node for node in known if node.endswith(f"/{name}"))
-
-
-def _nodes_there(name: str, known: tuple[str, ...]) -> str:
-    if not known:
-        return (
-            "no lifecycle node was found at all: is the system running, with the same"
-            " ROS_DOMAIN_ID and discovery range?"
-        )
-    by_last_part = {node.rpartition("/")[2]: node for node in known}
-    close = nearest(name.rpartition("/")[2], by_last_part)
-    if close is not None:
-        return f"did you mean '{by_last_part[close]}'?"
-    return "there are: " + ", ".join(known)
 
 
 def _possible(legal: tuple[Transition, ...]) -> str:

@@ -13,17 +13,13 @@ from rclpy.action.graph import (
 )
 from rclpy.node import Node
 
-from composer.diagnostics import nearest
-from composer.runtime.session import MISSING_S, Deadline, RosError, Session
+from composer.runtime.finding import find_node, not_there
+from composer.runtime.session import MISSING_S, Deadline, Session
 
 T = TypeVar("T")
 
 #: (name, types): more than one type means that somebody has it wrong.
 Named = tuple[str, tuple[str, ...]]
-
-
-class NotThere(RosError):
-    """Nothing of that name is in the graph; the hint says what is close."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +67,8 @@ class Names:
 
     def topics(self, *, hidden: bool = False) -> tuple[Named, ...]:
         """Return all topics and their types."""
-        return self._still(lambda: _named(self._node.get_topic_names_and_types(), hidden))
+        found = self._still(lambda: _named(self._node.get_topic_names_and_types(), hidden))
+        return found if self._session.others() else ()  # the command's own are not worth telling
 
     def services(self, *, hidden: bool = False) -> tuple[Named, ...]:
         """Return all services and their types."""
@@ -83,13 +80,17 @@ class Names:
 
     def node(self, name: str, *, hidden: bool = False) -> NodeInfo:
         """Return what a node offers and uses. Raises NotThere."""
-        full_name = self.find("node", name, lambda: self._nodes(hidden=True))
+        full_name = self.find_node(name)
         return self._still(lambda: self._node_info(full_name, hidden))
 
     def action(self, name: str) -> ActionInfo:
         """Return who serves and uses an action. Raises NotThere."""
         types = self.types("action", name)
         return self._still(lambda: self._action_info(name, types))
+
+    def find_node(self, name: str) -> str:
+        """Return the full name of the node that ``name`` means. Raises NotThere."""
+        return find_node(self._session, self._deadline, name, lambda: self._nodes(hidden=True))
 
     def types(self, kind: str, name: str) -> tuple[str, ...]:
         """Return the types of a topic, service or action. Raises NotThere."""
@@ -111,16 +112,13 @@ class Names:
         if self._session.wait_for(lambda: wanted in look() or None, patience):
             return wanted
         known = [found for found in look() if not is_hidden(found)]
-        raise NotThere(f"there is no {kind} '{wanted}'", _what_is_there(kind, wanted, known))
+        raise not_there(kind, wanted, known)
 
     def _still(self, look: Callable[[], T]) -> T:
         return self._session.wait_until_still(look, self._deadline)
 
     def _nodes(self, hidden: bool) -> tuple[str, ...]:
-        names = (
-            f"{namespace.rstrip('/')}/{name}"
-            for name, namespace in self._node.get_node_names_and_namespaces()
-        )
+        names = (f"{namespace.rstrip('/')}/{name}" for name, namespace in self._session.others())
         return tuple(sorted(name for name in names if hidden or not is_hidden(name)))
 
     def _node_info(self, full_name: str, hidden: bool) -> NodeInfo:
@@ -154,19 +152,3 @@ def _named(found: Iterable[tuple[str, list[str]]], hidden: bool) -> tuple[Named,
     return tuple(
         sorted((name, tuple(types)) for name, types in found if hidden or not is_hidden(name))
     )
-
-
-def _what_is_there(kind: str, wanted: str, known: list[str]) -> str:
-    if not known:
-        return (
-            f"no {kind} was found at all: is the system running, with the same ROS_DOMAIN_ID and"
-            " discovery range?"
-        )
-    close = nearest(wanted, known)
-    if close is None:
-        last_parts = {name.rpartition("/")[2]: name for name in known}
-        match = nearest(wanted.rpartition("/")[2], last_parts)
-        close = last_parts[match] if match is not None else None
-    if close is not None:
-        return f"did you mean '{close}'?"
-    return "there are: " + ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 from rclpy.node import Node
 from rclpy.qos import (
@@ -81,37 +80,43 @@ class Topics:
             )
         return types[0]
 
-    def listen(
-        self, name: str, type_name: str, qos: QosProfile | None = None, *, raw: bool = False
-    ) -> Iterator[Received]:
-        """Yield what is published, for as long as the deadline is not passed.
+    def matching(self, name: str) -> QosProfile:
+        """Return the strongest profile that all publishers of a topic satisfy."""
+        found = self._session.node.get_publishers_info_by_topic(name)
+        return strongest_for_all([_end(endpoint).qos for endpoint in found], depth=_LISTEN_DEPTH)
 
-        Without ``qos`` it is what gets most from the publishers that are there. With ``raw`` the
-        content is the serialized bytes.
-        """
-        node = self._session.node
-        profile = qos or self._matching(name)
-        waiting: deque[Received] = deque()
-        subscription = node.create_subscription(
+
+class Listener:
+    """A subscription that collects what is published. Use it in a ``with`` block.
+
+    With ``raw`` the content of what is received is the serialized bytes.
+    """
+
+    def __init__(
+        self, session: Session, topic: str, type_name: str, qos: QosProfile, *, raw: bool = False
+    ) -> None:
+        self._session = session
+        self._received: deque[Received] = deque()
+        self._subscription = session.node.create_subscription(
             class_of(type_name),
-            name,
-            lambda content: waiting.append(Received(content, time.monotonic())),
-            rclpy_profile(profile),
+            topic,
+            lambda content: self._received.append(Received(content, time.monotonic())),
+            rclpy_profile(qos),
             raw=raw,
         )
-        try:
-            while not self._deadline.passed:
-                self._session.spin_once(self._deadline)
-                while waiting:
-                    yield waiting.popleft()
-        finally:
-            node.destroy_subscription(subscription)
 
-    def _matching(self, name: str) -> QosProfile:
-        """Return the strongest profile that all publishers satisfy."""
-        found = self._session.node.get_publishers_info_by_topic(name)
-        offers = [_end(endpoint).qos for endpoint in found]
-        return strongest_for_all(offers, depth=_LISTEN_DEPTH)
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._session.node.destroy_subscription(self._subscription)
+
+    def take(self, deadline: Deadline) -> list[Received]:
+        """Return what has come; waits until something has, or the deadline."""
+        self._session.wait_for(lambda: self._received or None, deadline)
+        taken = list(self._received)
+        self._received.clear()
+        return taken
 
 
 def strongest_for_all(offers: list[QosProfile], depth: int) -> QosProfile:

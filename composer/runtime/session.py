@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Hashable, Iterable
-from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from rclpy.client import Client
@@ -22,10 +21,15 @@ T = TypeVar("T")
 H = TypeVar("H", bound=Hashable)
 
 _STEP_S = 0.02
-#: A fresh process knows a hundred nodes after 0.7 s, but now and then it takes 2 s (measured,
-#: Fast DDS): what is there is told once nothing has come for a moment, what is missing later.
+#: What is there is told once nothing has come for so long, what is missing after so long.
 QUIET_S = 0.5
 MISSING_S = 3.0
+#: With Fast DDS a new participant is met at once or, in about half of the cases, only with the
+#: next announcement up to 3 s later (measured). Joining anew is another throw of that coin.
+_MEET_WITHIN_S = 0.25
+_JOINS = 4
+#: Commands do not count as somebody: they come and go.
+_NAME_PREFIX = "_compose_"
 
 
 class RosError(Exception):
@@ -62,31 +66,48 @@ class Session:
     """The node, hidden from node lists by its leading underscore. Use it in a ``with`` block."""
 
     def __init__(self) -> None:
-        self.context = Context()
-        # No signal handlers come with it: Ctrl-C stays Python's KeyboardInterrupt.
-        self.context.init([])
-        self.node = Node(
-            f"_compose_{os.getpid()}",
-            context=self.context,
-            use_global_arguments=False,
-            enable_rosout=False,
-            start_parameter_services=False,
-        )
-        self._executor = SingleThreadedExecutor(context=self.context)
-        self._executor.add_node(self.node)
+        self._began_s = time.monotonic()
+        self._join()
+        for _ in range(_JOINS - 1):
+            if self.wait_for(lambda: self.others() or None, Deadline(_MEET_WITHIN_S)):
+                break
+            self._leave()
+            self._join()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
+        self._leave()
+
+    def _join(self) -> None:
+        self._context = Context()
+        # No signal handlers come with it: Ctrl-C stays Python's KeyboardInterrupt.
+        self._context.init([])
+        self.node = Node(
+            f"{_NAME_PREFIX}{os.getpid()}",
+            context=self._context,
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+
+    def _leave(self) -> None:
         self._executor.shutdown(timeout_sec=1.0)
         self.node.destroy_node()
-        self.context.try_shutdown()
+        self._context.try_shutdown()
+
+    def others(self) -> tuple[tuple[str, str], ...]:
+        """Return name and namespace of every node known now but those of commands."""
+        return tuple(
+            sorted(
+                (name, namespace)
+                for name, namespace in self.node.get_node_names_and_namespaces()
+                if not name.startswith(_NAME_PREFIX)
+            )
+        )
 
     def spin_once(self, deadline: Deadline) -> None:
         """Wait for something to come in, for a moment and not beyond the deadline."""
@@ -103,7 +124,7 @@ class Session:
     def wait_until_still(self, look: Callable[[], H], deadline: Deadline) -> H:
         """Return what ``look`` finds once it stays the same for a moment, or at the deadline.
 
-        What is empty is given longer: it looks like that before the first node is discovered.
+        Where no other node is known it waits longer: so it looks before the first is discovered.
         """
         seen = look()
         changed_s = time.monotonic()
@@ -112,8 +133,8 @@ class Session:
             now = look()
             if now != seen:
                 seen, changed_s = now, time.monotonic()
-            quiet_s = QUIET_S if seen else MISSING_S
-            if time.monotonic() - changed_s >= quiet_s:
+            still_at_s = changed_s + QUIET_S if self.others() else self._began_s + MISSING_S
+            if time.monotonic() >= still_at_s:
                 break
         return seen
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.control import Control, TransitionRefused, UnknownNode
+from composer.runtime.control import Control, TransitionRefused
+from composer.runtime.finding import NotThere
 from composer.runtime.session import Deadline, NoAnswer, Session
 
 PEER = Path(__file__).with_name("hand_written.py")
@@ -59,14 +60,14 @@ def test_a_node_is_found_by_its_full_name_and_by_the_last_part_of_just_one(
 
 
 def test_a_name_that_means_two_nodes_is_refused_with_both(control: Control) -> None:
-    with pytest.raises(UnknownNode, match="'planner' is more than one node") as refusal:
+    with pytest.raises(NotThere, match="'planner' is more than one lifecycle node") as refusal:
         control.find("planner")
     assert refusal.value.hint == "say which: /other/planner, /planning/planner"
 
 
 @pytest.mark.parametrize("name", ["planer", "/planning/planer"])
 def test_an_unknown_name_gets_the_nearest_one(control: Control, name: str) -> None:
-    with pytest.raises(UnknownNode) as refusal:
+    with pytest.raises(NotThere) as refusal:
         control.find(name)
     assert refusal.value.hint in (
         "did you mean '/planning/planner'?",

@@ -1,0 +1,121 @@
+"""``compose action``: the actions of the ROS graph, whoever serves them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from composer.cli.failure import FINDINGS
+from composer.cli.help import examples
+from composer.cli.listing import Count, Json, ShowTypes, print_names
+from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.service import one_type, split_values
+from composer.cli.terminal import say, write
+from composer.cli.values import as_json, as_yaml
+
+app = typer.Typer(
+    help="See the actions, and send goals.",
+    epilog=examples(
+        "compose action list -t",
+        "compose action info /navigate",
+        "compose action send-goal /navigate '{target: {x: 2.0}}' --feedback",
+    ),
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+Action = Annotated[str, typer.Argument(metavar="ACTION")]
+
+
+@app.command("list", epilog=examples("compose action list -t"))
+def list_actions(
+    *,
+    types: ShowTypes = False,
+    count: Count = False,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """List the actions."""
+    with ros_session("compose action", timeout) as (session, deadline):
+        from composer.runtime.inspect_names import Names
+
+        actions = Names(session, deadline).actions()
+    print_names(actions, types=types, count=count, json=json)
+
+
+@app.command("info", epilog=examples("compose action info /navigate"))
+def info(action: Action, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
+    """Print who serves an action and who uses it."""
+    with ros_session("compose action", timeout) as (session, deadline):
+        from dataclasses import asdict
+
+        from composer.runtime.inspect_names import Names
+
+        found = Names(session, deadline).action(action)
+    if json:
+        write(as_json(asdict(found), indent=2))
+        return
+    lines = [f"Action: {found.name}", f"Type: {', '.join(found.types)}"]
+    for title, nodes in (("Action clients", found.clients), ("Action servers", found.servers)):
+        lines += [f"{title}: {len(nodes)}", *(f"  {node}" for node in nodes)]
+    write("\n".join(lines))
+
+
+def send_goal(
+    action: Action,
+    values: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[TYPE] [GOAL]",
+            help="The type may be left out; the goal is YAML.",
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    feedback: Annotated[
+        bool, typer.Option("--feedback", "-f", help="Print what is told on the way.")
+    ] = False,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Send a goal and wait for its end; Ctrl-C cancels it.
+
+    The time limit is for the server and its acceptance. Exit code 1 unless the goal succeeded.
+    """
+    type_name, goal = split_values(values or [])
+    with ros_session("compose action", timeout) as (session, deadline):
+        from composer.runtime.inspect_calls import sent_goal
+        from composer.runtime.inspect_names import Names
+        from composer.runtime.inspect_values import to_plain
+
+        name = action if action.startswith("/") else f"/{action}"
+        found = type_name or one_type(Names(session, deadline), "action", name)
+
+        def show(message: Any) -> None:
+            if feedback:
+                _print("feedback", to_plain(message), json)
+
+        with sent_goal(session, deadline, (name, found), goal, show) as sent:
+            say("goal accepted, Ctrl-C cancels it")
+            try:
+                outcome = sent.result()
+            except KeyboardInterrupt:
+                say("canceling")
+                outcome = sent.cancel()
+        _print("result", to_plain(outcome.result), json, outcome.status)
+    if outcome.status != "succeeded":
+        raise typer.Exit(FINDINGS)
+
+
+def _print(kind: str, content: Any, json: bool, status: str | None = None) -> None:
+    told = {kind: content} if status is None else {kind: content, "status": status}
+    write(as_json(told) if json else f"{as_yaml(told)}\n---")
+
+
+_EPILOG = examples(
+    "compose action send-goal /navigate '{target: {x: 2.0}, max_velocity: 1.0}' --feedback",
+    "compose action send-goal /navigate composer_interfaces/action/Navigate '{target: {x: 2.0}}'",
+)
+app.command("send-goal", epilog=_EPILOG)(send_goal)
+app.command("send_goal", epilog=_EPILOG, hidden=True)(send_goal)  # as ros2 spells it

@@ -1,0 +1,153 @@
+"""``compose param``: the parameters of running nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from composer.cli.failure import Failure, UsageFailure
+from composer.cli.help import examples
+from composer.cli.listing import Json
+from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.terminal import columns, write
+from composer.cli.values import as_json, as_yaml
+
+if TYPE_CHECKING:
+    from composer.runtime.inspect_parameters import Description, Parameters
+
+app = typer.Typer(
+    help="See and set the parameters of running nodes.",
+    epilog=examples(
+        "compose param list planner",
+        "compose param get planner max_velocity",
+        "compose param set planner max_velocity 0.5",
+        "compose param dump planner > planner.yaml",
+    ),
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+Node = Annotated[
+    str, typer.Argument(metavar="NODE", help="Its full name, or the last part of just one.")
+]
+Name = Annotated[str, typer.Argument(metavar="PARAMETER")]
+
+
+@contextmanager
+def _parameters(node: str, timeout: float) -> Iterator[Parameters]:
+    with ros_session("compose param", timeout) as (session, deadline):
+        from composer.runtime.inspect_parameters import Parameters
+
+        yield Parameters(session, deadline, node)
+
+
+@app.command("list", epilog=examples("compose param list planner"))
+def list_parameters(
+    node: Node, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
+) -> None:
+    """List the parameters of a node."""
+    with _parameters(node, timeout) as parameters:
+        names = parameters.names()
+    if json:
+        write(as_json(list(names), indent=2))
+    elif names:
+        write("\n".join(names))
+
+
+@app.command("get", epilog=examples("compose param get planner max_velocity"))
+def get(
+    node: Node, name: Name, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
+) -> None:
+    """Print the value of a parameter."""
+    with _parameters(node, timeout) as parameters:
+        value = parameters.values([name])[name]
+    write(as_json(value) if json else as_yaml(value))
+
+
+@app.command("set", epilog=examples("compose param set planner max_velocity 0.5"))
+def set_value(
+    node: Node,
+    name: Name,
+    value: Annotated[str, typer.Argument(metavar="VALUE", help="As in YAML.")],
+    *,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Set a parameter. A value that the node refuses is told with its reason, exit code 1."""
+    with _parameters(node, timeout) as parameters:
+        (described,) = parameters.describe([name])
+        parameters.set({name: value if described.type == "string" else _yaml(value)})
+    write(f"{parameters.node} {name}: {value}")
+
+
+@app.command("describe", epilog=examples("compose param describe planner max_velocity"))
+def describe(
+    node: Node, name: Name, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
+) -> None:
+    """Print what a node says of a parameter: type, bounds, meaning."""
+    with _parameters(node, timeout) as parameters:
+        (found,) = parameters.describe([name])
+    facts = _facts(found)
+    write(as_json(facts, indent=2) if json else columns([(f"{k}:", str(facts[k])) for k in facts]))
+
+
+@app.command("dump", epilog=examples("compose param dump planner > planner.yaml"))
+def dump(node: Node, *, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
+    """Print all parameters as a ROS parameter file."""
+    with _parameters(node, timeout) as parameters:
+        values = parameters.values(parameters.names())
+    write(as_yaml({parameters.node: {"ros__parameters": values}}))
+
+
+@app.command("load", epilog=examples("compose param load planner planner.yaml"))
+def load(
+    node: Node,
+    file: Annotated[Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False)],
+    *,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Set the parameters that a ROS parameter file has for a node."""
+    content = _yaml(file.read_text(encoding="utf-8"))
+    with _parameters(node, timeout) as parameters:
+        values = _section(content, parameters.node, file)
+        parameters.set(values)
+    write("\n".join(f"{parameters.node} {name}: {value}" for name, value in values.items()))
+
+
+def _yaml(text: str) -> Any:
+    import yaml
+
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise UsageFailure(f"'{text:.40}' is not YAML: {error}") from error
+
+
+def _section(content: Any, node: str, file: Path) -> dict[str, Any]:
+    """Return the part of a parameter file that is for ``node``, by its name or ``/**``."""
+    if isinstance(content, dict):
+        for name in (node, node.lstrip("/"), "/**"):
+            section = content.get(name)
+            if isinstance(section, dict) and isinstance(section.get("ros__parameters"), dict):
+                found: dict[str, Any] = section["ros__parameters"]
+                return found
+    raise Failure(
+        f"'{file}' has nothing for {node}", hint=f"it would stand under '{node}: ros__parameters:'"
+    )
+
+
+def _facts(found: Description) -> dict[str, Any]:
+    facts = {
+        "name": found.name,
+        "type": found.type,
+        "description": found.description,
+        "constraints": found.constraints,
+        "minimum": found.minimum,
+        "maximum": found.maximum,
+        "step": found.step,
+        "read_only": found.read_only or None,
+    }
+    return {name: value for name, value in facts.items() if value not in (None, "")}

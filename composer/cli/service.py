@@ -1,0 +1,117 @@
+"""``compose service``: the services of the ROS graph, whoever serves them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.help import examples
+from composer.cli.listing import Count, Hidden, Json, ShowTypes, print_names
+from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.terminal import write
+from composer.cli.values import as_json, as_yaml
+
+if TYPE_CHECKING:
+    from composer.runtime.inspect_names import Names
+
+app = typer.Typer(
+    help="See the services, and call them.",
+    epilog=examples(
+        "compose service list -t",
+        "compose service type /plan_trajectory",
+        "compose service call /plan_trajectory '{goal: {x: 1.0}, max_velocity: 0.5}'",
+    ),
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+Service = Annotated[str, typer.Argument(metavar="SERVICE")]
+
+
+@app.command("list", epilog=examples("compose service list", "compose service list -t"))
+def list_services(
+    *,
+    types: ShowTypes = False,
+    count: Count = False,
+    hidden: Hidden = False,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """List the services."""
+    with ros_session("compose service", timeout) as (session, deadline):
+        from composer.runtime.inspect_names import Names
+
+        services = Names(session, deadline).services(hidden=hidden)
+    print_names(services, types=types, count=count, json=json)
+
+
+@app.command("type", epilog=examples("compose service type /plan_trajectory"))
+def type_of(service: Service, *, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
+    """Print the type of a service."""
+    with ros_session("compose service", timeout) as (session, deadline):
+        from composer.runtime.inspect_names import Names
+
+        write("\n".join(Names(session, deadline).types("service", service)))
+
+
+@app.command(
+    "call",
+    epilog=examples(
+        "compose service call /plan_trajectory '{goal: {x: 1.0}, max_velocity: 0.5}'",
+        "compose service call /reset std_srvs/srv/Trigger",
+        "compose service call /switch std_srvs/srv/SetBool '{data: true}' --json",
+    ),
+)
+def call(
+    service: Service,
+    values: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[TYPE] [REQUEST]",
+            help="The type may be left out; the request is YAML.",
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Call a service and print the response."""
+    type_name, request = split_values(values or [])
+    with ros_session("compose service", timeout) as (session, deadline):
+        from composer.runtime.inspect_calls import call_service
+        from composer.runtime.inspect_names import Names
+        from composer.runtime.inspect_values import to_plain
+
+        name = service if service.startswith("/") else f"/{service}"
+        found = type_name or one_type(Names(session, deadline), "service", name)
+        response = to_plain(call_service(session, deadline, name, found, request))
+    write(as_json(response, indent=2) if json else as_yaml(response))
+
+
+def split_values(values: list[str]) -> tuple[str | None, str]:
+    """Return the type, if it is given, and the YAML. Raises UsageFailure."""
+    from composer.cli.failure import UsageFailure
+
+    match values:
+        case []:
+            return None, "{}"
+        case [text] if "/" in text and not text.lstrip().startswith("{"):
+            return text, "{}"
+        case [text]:
+            return None, text
+        case [type_name, text]:
+            return type_name, text
+        case _:
+            raise UsageFailure("too many arguments", hint="quote the YAML: '{data: true}'")
+
+
+def one_type(names: Names, kind: str, name: str) -> str:
+    """Return the only type of a service or action. Raises RosError where there are more."""
+    from composer.runtime.session import RosError
+
+    types = names.types(kind, name)
+    if len(types) > 1:
+        raise RosError(f"{kind} '{name}' has more than one type", f"say which: {', '.join(types)}")
+    return types[0]

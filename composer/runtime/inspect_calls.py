@@ -1,0 +1,99 @@
+"""Service calls and action goals from the command line, to any server."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from rclpy.action.client import ActionClient, ClientGoalHandle
+from rclpy.task import Future
+
+from composer.runtime.inspect_values import class_of, compile_content
+from composer.runtime.session import Deadline, NoAnswer, RosError, Session
+
+_STATUS = {
+    GoalStatus.STATUS_SUCCEEDED: "succeeded",
+    GoalStatus.STATUS_CANCELED: "canceled",
+    GoalStatus.STATUS_ABORTED: "aborted",
+}
+_CANCEL_PATIENCE_S = 2.0
+
+
+class Rejected(RosError):
+    """The action server did not take the goal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a goal ended: ``succeeded``, ``canceled`` or ``aborted``, and the result message."""
+
+    status: str
+    result: Any
+
+
+def call_service(
+    session: Session, deadline: Deadline, name: str, type_name: str, request: str
+) -> Any:
+    """Return the response to ``request``, which is YAML. Raises BadValue, NoAnswer."""
+    service = class_of(type_name)
+    message = compile_content(request, service.Request, "the request")({})
+    return session.call(service, name, message, deadline)
+
+
+class Goal:
+    """A goal that an action server has taken."""
+
+    def __init__(self, session: Session, handle: ClientGoalHandle) -> None:
+        self._session = session
+        self._handle = handle
+        self._result: Future = handle.get_result_async()
+
+    def result(self, deadline: Deadline | None = None) -> Outcome:
+        """Wait for the end of the goal. Raises NoAnswer at the deadline."""
+        if not self._wait(self._result, deadline):
+            raise NoAnswer("the goal has not ended in time")
+        response = self._result.result()
+        return Outcome(_STATUS.get(response.status, "unknown"), response.result)
+
+    def cancel(self) -> Outcome:
+        """Ask for the end of the goal and wait for it. Raises NoAnswer when it does not end."""
+        patience = Deadline(_CANCEL_PATIENCE_S)
+        self._wait(self._handle.cancel_goal_async(), patience)
+        return self.result(patience)
+
+    def _wait(self, future: Future, deadline: Deadline | None) -> bool:
+        while not future.done() and (deadline is None or not deadline.passed):
+            self._session.spin_once(deadline or Deadline(1.0))
+        return bool(future.done())
+
+
+@contextmanager
+def sent_goal(
+    session: Session,
+    deadline: Deadline,
+    target: tuple[str, str],
+    goal: str,
+    on_feedback: Callable[[Any], None],
+) -> Iterator[Goal]:
+    """Send a goal, which is YAML, to ``target`` (name and type); it is taken in the block.
+
+    Raises BadValue, NoAnswer, Rejected.
+    """
+    name, type_name = target
+    action = class_of(type_name)
+    message = compile_content(goal, action.Goal, "the goal")({})
+    client = ActionClient(session.node, action, name)
+    try:
+        if not session.wait_for(lambda: client.server_is_ready() or None, deadline):
+            raise NoAnswer(f"no server of '{name}' was there within {deadline.timeout_s:g} s")
+        answer: Future = client.send_goal_async(message, lambda item: on_feedback(item.feedback))
+        if not session.wait_for(lambda: answer.done() or None, deadline):
+            raise NoAnswer(f"'{name}' did not say within {deadline.timeout_s:g} s if it takes it")
+        if not answer.result().accepted:
+            raise Rejected(f"'{name}' rejected the goal")
+        yield Goal(session, answer.result())
+    finally:
+        client.destroy()

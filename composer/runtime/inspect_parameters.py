@@ -1,0 +1,167 @@
+"""Parameters of any node, through its parameter services (rcl_interfaces)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterDescriptor, ParameterType, ParameterValue
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParameters,
+)
+from rclpy.parameter import Parameter, parameter_value_to_python
+
+from composer.diagnostics import suggestion
+from composer.runtime.inspect_names import Names
+from composer.runtime.session import Deadline, NoAnswer, RosError, Session
+
+_NOT_SET = "not set"
+_TYPES = {
+    ParameterType.PARAMETER_NOT_SET: _NOT_SET,
+    ParameterType.PARAMETER_BOOL: "bool",
+    ParameterType.PARAMETER_INTEGER: "integer",
+    ParameterType.PARAMETER_DOUBLE: "double",
+    ParameterType.PARAMETER_STRING: "string",
+    ParameterType.PARAMETER_BYTE_ARRAY: "byte_array",
+    ParameterType.PARAMETER_BOOL_ARRAY: "bool_array",
+    ParameterType.PARAMETER_INTEGER_ARRAY: "integer_array",
+    ParameterType.PARAMETER_DOUBLE_ARRAY: "double_array",
+    ParameterType.PARAMETER_STRING_ARRAY: "string_array",
+}
+
+
+class UnknownParameter(RosError):
+    """The node has no such parameter."""
+
+
+class ParameterRefused(RosError):
+    """The node did not take the value."""
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What a node says of a parameter. Bounds are None where there are none."""
+
+    name: str
+    type: str
+    description: str
+    constraints: str
+    read_only: bool
+    minimum: float | None
+    maximum: float | None
+    step: float | None
+
+
+class Parameters:
+    """The parameters of one node. Raises NotThere when there is no such node."""
+
+    def __init__(self, session: Session, deadline: Deadline, node: str) -> None:
+        self._session = session
+        self._deadline = deadline
+        self.node = Names(session, deadline).find_node(node)
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of all parameters, sorted. Raises NoAnswer."""
+        response = self._call(ListParameters, "list_parameters", ListParameters.Request())
+        return tuple(sorted(response.result.names))
+
+    def values(self, names: Iterable[str]) -> dict[str, Any]:
+        """Return the values of parameters; None for one without. Raises UnknownParameter."""
+        wanted = list(names)
+        self._check_known(wanted)
+        request = GetParameters.Request(names=wanted)
+        response = self._call(GetParameters, "get_parameters", request)
+        return {name: _python(value) for name, value in zip(wanted, response.values, strict=True)}
+
+    def describe(self, names: Iterable[str]) -> tuple[Description, ...]:
+        """Return what the node says of parameters. Raises UnknownParameter."""
+        wanted = list(names)
+        self._check_known(wanted)
+        request = DescribeParameters.Request(names=wanted)
+        response = self._call(DescribeParameters, "describe_parameters", request)
+        return tuple(map(_description, response.descriptors))
+
+    def set(self, values: Mapping[str, Any]) -> None:
+        """Set parameters. Raises UnknownParameter, ParameterRefused with the node's reason.
+
+        A whole number becomes a double where the node has one.
+        """
+        types = {item.name: item.type for item in self.describe(values)}
+        request = SetParameters.Request(
+            parameters=[_message(name, value, types[name]) for name, value in values.items()]
+        )
+        response = self._call(SetParameters, "set_parameters", request)
+        refused = [
+            f"{name}: {result.reason or 'no reason given'}"
+            for name, result in zip(values, response.results, strict=True)
+            if not result.successful
+        ]
+        if refused:
+            raise ParameterRefused(f"{self.node} refused " + "; ".join(refused))
+
+    def _check_known(self, names: Iterable[str]) -> None:
+        known = self.names()
+        for name in names:
+            if name not in known:
+                raise UnknownParameter(
+                    f"{self.node} has no parameter '{name}'", suggestion(name, known)
+                )
+
+    def _call(self, service: Any, name: str, request: Any) -> Any:
+        try:
+            return self._session.call(service, f"{self.node}/{name}", request, self._deadline)
+        except NoAnswer as error:
+            raise NoAnswer(
+                f"{self.node} did not answer within {self._deadline.timeout_s:g} s",
+                "its parameter services may be switched off, or its process busy",
+            ) from error
+
+
+def _python(value: ParameterValue) -> Any:
+    """Return the value as plain data; byte strings become numbers."""
+    found = parameter_value_to_python(value)
+    if isinstance(found, list):
+        return [item[0] if isinstance(item, bytes) else item for item in found]
+    return found
+
+
+def _message(name: str, value: Any, kind: str) -> ParameterMessage:
+    """Return the parameter with the type that the node has it in. Raises ParameterRefused."""
+    try:
+        if kind == _NOT_SET:
+            return Parameter(name, value=value).to_parameter_msg()
+        wanted = Parameter.Type[kind.upper()]
+        return Parameter(name, wanted, _converted(value, kind)).to_parameter_msg()
+    except (TypeError, ValueError) as error:
+        raise ParameterRefused(f"'{name}' is a {kind}, which {value!r} is not") from error
+
+
+def _converted(value: Any, kind: str) -> Any:
+    match kind, value:
+        case "double", int() if not isinstance(value, bool):
+            return float(value)
+        case "double_array", list():
+            return [float(item) if type(item) is int else item for item in value]
+        case "byte_array", list():
+            return [bytes([item]) if type(item) is int else item for item in value]
+        case _:
+            return value
+
+
+def _description(found: ParameterDescriptor) -> Description:
+    bounds = [*found.floating_point_range, *found.integer_range]
+    return Description(
+        name=found.name,
+        type=_TYPES[found.type],
+        description=found.description,
+        constraints=found.additional_constraints,
+        read_only=found.read_only,
+        minimum=bounds[0].from_value if bounds else None,
+        maximum=bounds[0].to_value if bounds else None,
+        step=(bounds[0].step or None) if bounds else None,
+    )
