@@ -14,7 +14,7 @@ def as_yaml(value: Any) -> str:
     import yaml
 
     text: str = yaml.safe_dump(value, sort_keys=False, allow_unicode=True, width=120)
-    return text.removesuffix("...\n").rstrip("\n")
+    return text.removesuffix("\n...\n").rstrip("\n")  # the dots end a document of one scalar
 
 
 def as_json(value: Any, *, indent: int | None = None) -> str:

@@ -1,0 +1,298 @@
+"""The debugging commands, each as a process of its own, on a hand-written rclpy node."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import rclpy
+import yaml
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import qos_profile_sensor_data
+from std_msgs.msg import Int32
+
+COMPOSE = [sys.executable, "-m", "composer"]
+PEER = Path(__file__).with_name("hand_written_talker.py")
+PATIENCE_S = 30.0
+
+
+@pytest.fixture(scope="module", autouse=True)
+def peer() -> Iterator[None]:
+    process = subprocess.Popen([sys.executable, str(PEER)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    yield
+    process.kill()
+    process.wait()
+
+
+def compose(*arguments: str, code: int = 0) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(
+        [*COMPOSE, *arguments], check=False, capture_output=True, text=True, timeout=PATIENCE_S
+    )
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def out(*arguments: str) -> str:
+    return compose(*arguments).stdout
+
+
+def error(*arguments: str) -> str:
+    done = compose(*arguments, code=1)
+    assert done.stdout == ""
+    return done.stderr
+
+
+def test_nodes() -> None:
+    assert out("node", "list") == "/lab/talker\n"
+    assert out("node", "list", "--count") == "1\n"
+    assert json.loads(out("node", "list", "--json")) == ["/lab/talker"]
+
+
+def test_a_node_tells_what_it_offers_and_uses() -> None:
+    found = json.loads(out("node", "info", "talker", "--json"))
+    assert ["/lab/count", ["std_msgs/msg/Int32"]] in found["publishers"]
+    assert found["subscriptions"] == [["/lab/in", ["std_msgs/msg/String"]]]
+    assert ["/lab/add", ["std_srvs/srv/SetBool"]] in found["services"]
+    assert found["action_servers"] == [["/lab/navigate", ["composer_interfaces/action/Navigate"]]]
+    assert not any("_action" in name for name, _ in found["services"])
+    text = out("node", "info", "/lab/talker")
+    assert "  Action Servers:\n    /lab/navigate:  composer_interfaces/action/Navigate\n" in text
+
+
+def test_topics() -> None:
+    names = out("topic", "list").split()
+    assert {"/lab/count", "/lab/text", "/lab/in"} <= set(names)
+    assert not any("_action" in name for name in names)
+    assert "/lab/navigate/_action/feedback" in out("topic", "list", "--include-hidden")
+    types = {item["name"]: item["types"] for item in json.loads(out("topic", "list", "--json"))}
+    assert types["/lab/count"] == ["std_msgs/msg/Int32"]
+
+
+def test_a_topic_tells_who_is_at_its_ends_with_which_qos() -> None:
+    found = json.loads(out("topic", "info", "/lab/text", "--json"))
+    assert found["types"] == ["std_msgs/msg/String"]
+    assert found["subscriptions"] == []
+    assert found["publishers"] == [
+        {
+            "node": "/lab/talker",
+            "type": "std_msgs/msg/String",
+            "qos": {
+                "reliability": "reliable",
+                "durability": "transient_local",
+                "liveliness": "automatic",
+            },
+        }
+    ]
+    assert "Publisher count: 1\n" in out("topic", "info", "lab/text")
+    assert "durability: transient_local" in out("topic", "info", "-v", "/lab/text")
+
+
+def test_echo_gets_what_a_best_effort_publisher_sends() -> None:
+    lines = out("topic", "echo", "/lab/count", "--count", "5", "--json").splitlines()
+    values = [json.loads(line)["data"] for line in lines]
+    assert values == list(range(values[0], values[0] + 5))
+
+
+def test_echo_gets_what_was_published_before_and_cuts_it() -> None:
+    text = yaml.safe_load(out("topic", "echo", "/lab/text", "--once").removesuffix("---\n"))
+    assert text == {"data": "x" * 128 + "..."}
+    full = out("topic", "echo", "/lab/text", "--once", "--full-length", "--field", "data")
+    assert full == "x" * 200 + "\n---\n"
+
+
+def test_echo_filters_by_an_expression() -> None:
+    condition = "message.data > 20 and message.data < 1000000"
+    value = out("topic", "echo", "/lab/count", "--once", "--filter", condition, "--field", "data")
+    assert int(value.removesuffix("---\n")) > 20
+    assert "has no field 'x'" in error("topic", "echo", "/lab/count", "--filter", "message.x > 1")
+    done = compose("topic", "echo", "/lab/count", "--filter", "message.data >", code=2)
+    assert done.stderr.startswith("compose: --filter: ")
+
+
+def test_echo_says_what_is_wrong_with_names_and_fields() -> None:
+    assert "did you mean '/lab/count'?" in error("topic", "echo", "/lab/cuont", "--once")
+    assert "valid here: data" in error("topic", "echo", "/lab/count", "--once", "--field", "odd")
+    assert "nothing came over '/lab/in' for 0.3 s" in error(
+        "topic", "echo", "/lab/in", "--silence", "0.3"
+    )
+
+
+def test_echo_ends_quietly_at_ctrl_c() -> None:
+    process = subprocess.Popen(
+        [*COMPOSE, "topic", "echo", "/lab/count"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline().startswith("data: ")
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, err) == (130, "")
+
+
+def test_hz_agrees_with_a_hand_written_subscriber_to_one_percent() -> None:
+    with hand_written_times() as times_s:
+        last = out("topic", "hz", "/lab/count", "--count", "200", "--json").splitlines()[-1]
+        seen_s = times_s[-200:]
+    rate = json.loads(last)
+    assert rate["window"] == 199
+    assert rate["average_hz"] == pytest.approx(199 / (seen_s[-1] - seen_s[0]), rel=0.01)
+
+
+@contextmanager
+def hand_written_times() -> Iterator[list[float]]:
+    """Yield a list to which a plain subscription adds the time of each message."""
+    times_s: list[float] = []
+    context = rclpy.Context()
+    context.init([])
+    node = rclpy.create_node("by_hand", context=context)
+    node.create_subscription(
+        Int32, "/lab/count", lambda _: times_s.append(time.monotonic()), qos_profile_sensor_data
+    )
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    try:
+        yield times_s
+    finally:
+        executor.shutdown()
+        thread.join()
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def test_hz_tells_people_in_words() -> None:
+    assert "average rate: " in out("topic", "hz", "/lab/count", "--count", "10")
+
+
+def test_bw_counts_serialized_bytes() -> None:
+    last = out("topic", "bw", "/lab/count", "--count", "50", "--json").splitlines()[-1]
+    found = json.loads(last)
+    assert (found["smallest"], found["largest"]) == (8, 8)  # header of 4, int32
+    assert found["bytes_per_s"] == pytest.approx(400.0, rel=0.1)
+
+
+def test_what_is_published_arrives() -> None:
+    arguments = ("/lab/in", "std_msgs/msg/String", '{data: "number {count}"}')
+    done = compose("topic", "pub", "-r", "20", "--times", "2", *arguments)
+    assert done.stdout == ""
+    assert "published #2" in done.stderr
+    heard = out("topic", "echo", "/lab/heard", "--once", "--field", "data")
+    assert heard == "number 1\n---\n"
+
+
+def test_publishing_says_what_is_wrong() -> None:
+    topic = ("topic", "pub", "--once", "/lab/in", "std_msgs/msg/String")
+    assert "String has no field 'dta'" in error(*topic, "{dta: hello}")
+    assert "takes a text" in error(*topic, "{data: 5}")
+    assert "is not a YAML map" in error(*topic, "hello")
+    assert "is not installed" in error("topic", "pub", "/lab/in", "std_msgs/msg/Strin")
+    nobody = ("topic", "pub", "--once", "/nobody", "std_msgs/msg/String", "--timeout", "0.5")
+    assert "0 of 1 subscriptions to '/nobody'" in error(*nobody)
+
+
+def test_services() -> None:
+    assert "/lab/add" in out("service", "list").split()
+    assert out("service", "type", "/lab/add") == "std_srvs/srv/SetBool\n"
+    answer = {"success": True, "message": "switched"}
+    assert yaml.safe_load(out("service", "call", "/lab/add", "{data: true}")) == answer
+    typed = ("service", "call", "/lab/add", "std_srvs/srv/SetBool", "{data: true}", "--json")
+    assert json.loads(out(*typed)) == answer
+    assert "SetBool_Request has no field 'dta'" in error("service", "call", "/lab/add", "{dta: 1}")
+    assert "did you mean '/lab/add'?" in error("service", "call", "/lab/ad", "{data: true}")
+    gone = ("service", "call", "/lab/gone", "std_srvs/srv/SetBool", "{}", "--timeout", "0.5")
+    assert "did not answer within 0.5 s" in error(*gone)
+
+
+def test_actions() -> None:
+    assert out("action", "list", "-t").split() == [
+        "/lab/navigate",
+        "composer_interfaces/action/Navigate",
+    ]
+    info = json.loads(out("action", "info", "/lab/navigate", "--json"))
+    assert info["servers"] == ["/lab/talker"]
+
+
+def test_a_goal_gives_feedback_and_a_result() -> None:
+    goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: 1.0}", "--feedback", "--json")
+    told = [json.loads(line) for line in out(*goal).splitlines()]
+    assert [item["feedback"]["progress_percent"] for item in told[:-1]] == [0.0, 1.0, 2.0]
+    assert told[-1]["status"] == "succeeded"
+    assert told[-1]["result"]["distance_traveled"] == 2.5
+
+
+def test_a_rejected_goal_is_told() -> None:
+    assert "'/lab/navigate' rejected the goal" in error(
+        "action", "send_goal", "/lab/navigate", "composer_interfaces/action/Navigate", "{}"
+    )
+
+
+def test_ctrl_c_cancels_a_goal() -> None:
+    process = subprocess.Popen(
+        [*COMPOSE, "action", "send-goal", "/lab/navigate", "{max_velocity: -1}", "-f", "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert "feedback" in process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    rest, err = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 1
+    last = json.loads(rest.splitlines()[-1])
+    assert (last["status"], last["result"]["message"]) == ("canceled", "stopped")
+    assert "canceling" in err
+    assert "Traceback" not in err
+
+
+def test_parameters_are_read_and_set() -> None:
+    assert {"speed", "name", "gains"} <= set(out("param", "list", "talker").split())
+    assert out("param", "get", "talker", "speed") == "1.5\n"
+    assert out("param", "set", "talker", "speed", "2") == "/lab/talker speed: 2\n"
+    assert json.loads(out("param", "get", "/lab/talker", "speed", "--json")) == 2.0
+    out("param", "set", "talker", "name", "123")
+    assert json.loads(out("param", "get", "talker", "name", "--json")) == "123"
+    out("param", "set", "talker", "gains", "[3, 4.5]")
+    assert json.loads(out("param", "get", "talker", "gains", "--json")) == [3.0, 4.5]
+
+
+def test_a_parameter_that_is_not_taken_is_told_with_the_reason() -> None:
+    assert "out of range" in error("param", "set", "talker", "speed", "99")
+    assert "'speed' is a double, which 'fast' is not" in error(
+        "param", "set", "talker", "speed", "fast"
+    )
+    assert "did you mean 'speed'?" in error("param", "set", "talker", "sped", "1")
+    assert "did you mean '/lab/talker'?" in error("param", "list", "taker")
+
+
+def test_a_parameter_is_described() -> None:
+    assert json.loads(out("param", "describe", "talker", "speed", "--json")) == {
+        "name": "speed",
+        "type": "double",
+        "description": "How fast.",
+        "minimum": 0.0,
+        "maximum": 5.0,
+    }
+
+
+def test_what_is_dumped_can_be_loaded(tmp_path: Path) -> None:
+    file = tmp_path / "talker.yaml"
+    dumped = yaml.safe_load(out("param", "dump", "talker"))
+    dumped["/lab/talker"]["ros__parameters"] = {"speed": 0.25, "name": "loaded"}
+    file.write_text(yaml.safe_dump(dumped))
+    out("param", "load", "talker", str(file))
+    assert out("param", "get", "talker", "speed") == "0.25\n"
+    file.write_text("/other: {ros__parameters: {speed: 1.0}}\n")
+    assert "has nothing for /lab/talker" in error("param", "load", "talker", str(file))
