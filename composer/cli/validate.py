@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.failure import FINDINGS, UsageFailure
-from composer.cli.files import yaml_files
 from composer.cli.help import examples
 from composer.cli.terminal import say, use_color, write_raw
 
@@ -89,18 +88,20 @@ class _Checked:
 
 
 def _check(paths: Sequence[Path]) -> _Checked:
+    from composer.catalog import find_files
     from composer.loading import load, load_bytes
 
-    found = yaml_files([path for path in paths if path != _STDIN])
+    for path in paths:
+        if path != _STDIN and not path.exists():
+            raise UsageFailure(f"there is no file or folder '{path}'")
+    found = find_files(path for path in paths if path != _STDIN)
     findings: list[Diagnostic] = []
     if _STDIN in paths:
         content = sys.stdin.buffer.read()
         findings += load_bytes(content, Path.cwd(), shown="<stdin>").diagnostics
-    for path in found.files:
+    for path in found:
         findings += load(path, shown=str(path)).diagnostics
-    if found.ignored:
-        say(f"not checked, no 'system:' or 'node:' in it: {', '.join(map(str, found.ignored))}")
-    files = len(found.files) + (_STDIN in paths)
+    files = len(found) + (_STDIN in paths)
     if not files:
         raise UsageFailure("there is no system and no node type in " + ", ".join(map(str, paths)))
     # A node type is read with each system that uses it: its findings are told once.
