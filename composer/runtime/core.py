@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
 from composer.behavior import CallCancelled
@@ -26,6 +27,7 @@ class Core:
     """One node's ROS handle, loop, gate, log and counters.
 
     ``names`` is what every expression of the node may use: ``parameters``, ``state``, ``node``.
+    ``group`` is the callback group of its ports.
     """
 
     node: Node
@@ -37,6 +39,7 @@ class Core:
     statistics: Statistics
     names: dict[str, Any]
     tasks: set[Future[Any]] = field(default_factory=set)
+    group: CallbackGroup = field(default_factory=MutuallyExclusiveCallbackGroup)
 
     def now_s(self) -> float:
         """Return the node's time in seconds."""
@@ -66,7 +69,9 @@ class Core:
         except BaseException as error:
             self.faults.take(name, error)
             return None
-        return self._rest(name, result) if isinstance(result, Awaitable) else None
+        if result is None or not isinstance(result, Awaitable):
+            return None
+        return self._rest(name, result)
 
     async def _rest(self, name: str, result: Awaitable[Any]) -> None:
         try:

@@ -60,10 +60,10 @@ def interface_class(name: str) -> Any:
 
     Raises MessageError when it is not installed.
     """
-    package, folder, type_name = name.split("/")
+    module, _, class_name = name.rpartition("/")
     try:
-        return getattr(import_module(f"{package}.{folder}"), type_name)
-    except (ImportError, AttributeError) as error:
+        return getattr(import_module(module.replace("/", ".")), class_name)
+    except (ImportError, AttributeError, ValueError) as error:
         raise MessageError(f"interface '{name}' is not installed for Python: {error}") from error
 
 

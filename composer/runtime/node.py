@@ -11,6 +11,7 @@ from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node as RosNode
 
 from composer.behavior import TransitionFailed
@@ -174,6 +175,8 @@ class RunningNode:
         state.update({name.value: deepcopy(value) for name, value in self.model.state})
         if self.model.behavior is not None:
             self._behavior = behavior_class(self.model.behavior)()
+        # A callback group never forgets what was in it, so an old one is not used again.
+        self._core.group = MutuallyExclusiveCallbackGroup()
         self._assembly = Assembly(self._core)
         self._assembly.build(self.model, self._behavior)
         if self._behavior is not None:

@@ -78,6 +78,7 @@ class ActionClientPort:
             core.node,
             self.action_type,
             port.full_name,
+            callback_group=core.group,
             goal_service_qos_profile=profile,
             result_service_qos_profile=profile,
             cancel_service_qos_profile=profile,

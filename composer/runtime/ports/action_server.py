@@ -65,7 +65,7 @@ class ActionServerPort:
             self._type,
             port.full_name,
             execute_callback=_never_called,
-            callback_group=callback_group(port),
+            callback_group=callback_group(core, port),
             goal_callback=self._decide,
             handle_accepted_callback=self._take,
             cancel_callback=self._cancel,

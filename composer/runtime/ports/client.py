@@ -28,7 +28,10 @@ class ClientPort:
         self.service_type: Any = interface_class(port.interface.value)
         self._reactions: dict[Event, RunningReaction] = {}
         self._client = core.node.create_client(
-            self.service_type, port.full_name, qos_profile=rclpy_profile(port.qos.profile)
+            self.service_type,
+            port.full_name,
+            qos_profile=rclpy_profile(port.qos.profile),
+            callback_group=core.group,
         )
         core.loop.add_client(self._client)
 

@@ -7,6 +7,7 @@ from typing import Protocol
 from rclpy.callback_groups import CallbackGroup, ReentrantCallbackGroup
 
 from composer.model import Port
+from composer.runtime.core import Core
 
 
 class RunningPort(Protocol):
@@ -22,6 +23,6 @@ class RunningPort(Protocol):
         """Give back everything."""
 
 
-def callback_group(port: Port) -> CallbackGroup | None:
-    """Return the callback group of the port: its node's own, which is exclusive, as None."""
-    return ReentrantCallbackGroup() if port.reentrant else None
+def callback_group(core: Core, port: Port) -> CallbackGroup:
+    """Return the callback group of the port: the one all ports of its node share, if it may."""
+    return ReentrantCallbackGroup() if port.reentrant else core.group

@@ -20,7 +20,10 @@ class PublisherPort:
         self._name = port.name.value
         self.message_type: Any = interface_class(port.interface.value)
         self._publisher = core.node.create_publisher(
-            self.message_type, port.full_name, rclpy_profile(port.qos.profile)
+            self.message_type,
+            port.full_name,
+            rclpy_profile(port.qos.profile),
+            callback_group=core.group,
         )
         self._send = self._publisher.publish
         self._warned = False

@@ -63,7 +63,7 @@ class ServicePort:
             port.full_name,
             _never_called,
             qos_profile=rclpy_profile(port.qos.profile),
-            callback_group=callback_group(port),
+            callback_group=callback_group(core, port),
         )
         core.loop.add_service(self._service, self.receive)
 

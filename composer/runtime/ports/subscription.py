@@ -46,7 +46,7 @@ class SubscriptionPort:
             port.full_name,
             self.receive,
             rclpy_profile(port.qos.profile),
-            callback_group=callback_group(port),
+            callback_group=callback_group(core, port),
         )
         core.loop.add_subscription(self._subscription, self.receive)
 

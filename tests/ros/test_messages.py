@@ -1,0 +1,150 @@
+"""Template values become ROS messages, or an error that names the field."""
+
+from __future__ import annotations
+
+from array import array
+from pathlib import Path
+from typing import Any
+
+import pytest
+from builtin_interfaces.msg import Duration, Time
+from composer_interfaces.srv import PlanTrajectory
+from geometry_msgs.msg import PoseWithCovariance
+from nav_msgs.msg import Odometry
+from nav_msgs.msg import Path as PathMessage
+from sensor_msgs.msg import BatteryState, Image, JointState
+from shape_msgs.msg import SolidPrimitive
+from std_msgs.msg import Bool, Byte, Float64, Header, Int8, String, UInt64
+
+from composer.document import parse_bytes
+from composer.runtime.messages import (
+    MessageError,
+    compile_message,
+    convert_message,
+    interface_class,
+)
+from composer.templates import Template, compile_template
+
+WHERE = "'publish' to 'output'"
+
+
+def template(text: str) -> Template:
+    tree, _, findings = parse_bytes(f"value: {text}".encode(), "test.yaml")
+    assert tree is not None, findings
+    value = tree.get("value")
+    assert value is not None
+    compiled, problems = compile_template(value)
+    assert compiled is not None, problems
+    return compiled
+
+
+def message(text: str, kind: Any, **scope: Any) -> Any:
+    return compile_message(template(text), kind, WHERE)(scope)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "expected"),
+    [
+        ("{data: 3}", Float64, Float64(data=3.0)),
+        ("{data: '{x * 2}'}", Float64, Float64(data=14.0)),
+        ("{data: 'x is {x:03d}'}", String, String(data="x is 007")),
+        ("{data: '{x > 6}'}", Bool, Bool(data=True)),
+        ("{data: -128}", Int8, Int8(data=-128)),
+        ("{data: 18446744073709551615}", UInt64, UInt64(data=2**64 - 1)),
+        ("{data: 7}", Byte, Byte(data=b"\x07")),
+        ("{stamp: 1.5, frame_id: map}", Header, Header(stamp=Time(sec=1, nanosec=500_000_000), frame_id="map")),
+        ("{stamp: {sec: 3}}", Header, Header(stamp=Time(sec=3))),
+        ("{sec: '{x}'}", Duration, Duration(sec=7)),
+        ("{name: [a, b], position: [1, '{x}']}", JointState, JointState(name=["a", "b"], position=[1.0, 7.0])),
+        ("{}", Odometry, Odometry()),
+    ],
+)  # fmt: skip
+def test_values_become_fields(text: str, kind: Any, expected: Any) -> None:
+    assert message(text, kind, x=7) == expected
+
+
+def test_nested_messages_keep_the_defaults_of_what_is_not_given() -> None:
+    text = "{pose: {pose: {position: {x: '{x}'}, orientation: {w: 1}}}, header: {frame_id: odom}}"
+    odometry = message(text, Odometry, x=2)
+    assert odometry.pose.pose.position.x == 2.0
+    assert odometry.pose.pose.orientation.w == 1.0
+    assert odometry.header.frame_id == "odom"
+    assert odometry.twist == Odometry().twist
+
+
+def test_lists_of_messages() -> None:
+    text = "{poses: [{pose: {position: {x: 1}}}, {header: {stamp: '{x}'}}]}"
+    path = message(text, PathMessage, x=0.25)
+    assert [pose.pose.position.x for pose in path.poses] == [1.0, 0.0]
+    assert path.poses[1].header.stamp == Time(nanosec=250_000_000)
+
+
+def test_a_whole_message_is_passed_on_as_it_is() -> None:
+    received = Image(data=array("B", b"\x01\x02"), width=2)
+    assert message("'{message}'", Image, message=received) is received
+    assert message("{data: '{message.data}'}", Image, message=received).data == received.data
+
+
+def test_each_message_is_a_new_one() -> None:
+    build = compile_message(template("{frame_id: map}"), Header, WHERE)
+    first = build({})
+    first.frame_id = "changed"
+    assert build({}).frame_id == "map"
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "words"),
+    [
+        ("{data: text}", Float64, "field data takes a number, not str 'text'"),
+        ("{data: true}", Float64, "field data takes a number, not bool True"),
+        ("{data: 1.0}", Int8, "field data takes an integer, not float 1.0"),
+        ("{data: 128}", Int8, "field data takes an integer from -128 to 127, not 128"),
+        ("{data: 1}", Bool, "field data takes a boolean, not int 1"),
+        ("{data: 1}", String, "field data takes a text, not int 1"),
+        ("{data: '{x}'}", String, "field data takes a text, not int 7"),
+        ("{dat: 1}", Float64, "std_msgs/Float64 has no field 'dat'"),
+        ("{data: {a: 1}}", Float64, "field data is a double, not a map of fields"),
+        ("{data: [1]}", Float64, "field data is a double, not a list"),
+        ("{header: 1}", Odometry, "field header takes a std_msgs/Header, not int 1"),
+        ("{header: {frame_id: 1}}", Odometry, "field header.frame_id takes a text"),
+        ("{stamp: soon}", Header, "field stamp takes a builtin_interfaces/Time, not str 'soon'"),
+        ("{stamp: 1.0e12}", Header, "field stamp takes seconds from -2147483648 to 2147483647"),
+        ("{stamp: true}", Header, "field stamp takes seconds"),
+        ("{poses: [{pose: 1}]}", PathMessage, "field poses[0].pose takes a geometry_msgs/Pose"),
+        ("{covariance: [1, 2]}", PoseWithCovariance, "field covariance takes 36 items, not 2"),
+        ("{dimensions: [1, 2, 3, 4]}", SolidPrimitive, "field dimensions takes up to 3 items"),
+        ("{position: [1, x]}", JointState, "field position[1] takes a number"),
+        ("{name: abc}", JointState, "field name takes a list, not str 'abc'"),
+        ("'{x}'", Float64, "takes a std_msgs/Float64, not int 7"),
+        ("text", Float64, "std_msgs/Float64 is made of a map of fields"),
+    ],
+)
+def test_what_does_not_fit_is_told_with_the_name_of_the_field(
+    text: str, kind: Any, words: str
+) -> None:
+    with pytest.raises(MessageError) as error:
+        message(text, kind, x=7)
+    assert str(error.value).startswith(WHERE)
+    assert words in str(error.value)
+
+
+def test_constants_are_looked_at_when_the_template_is_compiled() -> None:
+    with pytest.raises(MessageError):
+        compile_message(template("{cell_voltage: [1, x]}"), BatteryState, WHERE)({})
+    with pytest.raises(MessageError):
+        compile_message(template("{present: 1}"), BatteryState, WHERE)
+
+
+def test_plain_data_becomes_a_message() -> None:
+    plain = {"start": {"x": 1}, "max_velocity": 2}
+    request = convert_message(plain, PlanTrajectory.Request, "request")
+    assert (request.start.x, request.max_velocity) == (1.0, 2.0)
+    with pytest.raises(MessageError, match="request.goal.z takes a number"):
+        convert_message({"goal": {"z": "up"}}, PlanTrajectory.Request, "request")
+
+
+def test_an_interface_that_is_not_installed_is_told_of(tmp_path: Path) -> None:
+    assert interface_class("std_msgs/msg/String") is String
+    for name in ("nowhere/msg/String", "std_msgs/msg/Strin", "std_msgs/srv/String", "String"):
+        with pytest.raises(MessageError, match=f"'{name}'"):
+            interface_class(name)
