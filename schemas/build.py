@@ -15,7 +15,7 @@ from composer.document import read_document
 from composer.tree import plain
 
 FOLDER = Path(__file__).resolve().parent
-NAMES = ("system", "node")
+NAMES = ("system", "node", "project")
 _DEFINITIONS = "#/definitions/"
 
 

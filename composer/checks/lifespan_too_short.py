@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
-from composer.checks.publishing import timed_publishers
+from composer.checks.rates import timed_publishers
 from composer.checks.words import number
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 

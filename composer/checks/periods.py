@@ -1,9 +1,8 @@
-"""How often timers fire and ports publish, as far as the model tells."""
+"""How often timers fire, as far as the model tells."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 from composer.expressions import EvaluationError, Expression
 from composer.model import Node, Timer
@@ -35,29 +34,9 @@ def period_seconds(node: Node, timer: Timer) -> float | None:
 
 
 def start_values(node: Node) -> dict[str, object]:
-    """Return the parameters that have a value, as expressions see them: dots are levels."""
+    """Return the parameters that have a value, as expressions see them."""
     values: dict[str, object] = {}
     for parameter in node.parameters:
         if parameter.value is not None:
             values[parameter.name.value] = parameter.value.value
     return values
-
-
-def publishing_periods(node: Node) -> Iterator[tuple[str, float]]:
-    """Yield port and period in seconds of everything a timer publishes in YAML.
-
-    A port that something else publishes through too is left out: its rate is not known.
-    """
-    periods: dict[str, list[float | None]] = {}
-    for timer in node.timers:
-        if timer.reaction is not None:
-            for send in timer.reaction.publish:
-                known = period_seconds(node, timer)
-                periods.setdefault(send.port.value, []).append(known)
-    others = [reaction for _, reaction in node.reactions]
-    others += [reaction for port in node.ports for _, reaction in port.reactions]
-    elsewhere = {send.port.value for reaction in others for send in reaction.publish}
-    for name, found in periods.items():
-        known_periods = [period for period in found if period is not None]
-        if name not in elsewhere and len(known_periods) == len(found):
-            yield name, min(known_periods)

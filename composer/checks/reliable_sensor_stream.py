@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
-from composer.checks.publishing import timed_publishers
+from composer.checks.rates import rates
 from composer.checks.words import number
 from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.model import PortKind, PortOfNode
 from composer.qos import Reliability
 
 RULE = register(
@@ -37,20 +38,24 @@ nodes:
     )
 )
 
-FAST_S = 0.1
+FAST_HZ = 10.0
 _PACKAGE = "sensor_msgs/msg/"
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at publishers of sensor messages whose rate is known."""
-    for end, period_s in context.once(timed_publishers):
-        port = end.port
-        if not port.interface.value.startswith(_PACKAGE) or period_s > FAST_S:
-            continue
-        if port.qos.known and port.qos.profile.reliability is Reliability.RELIABLE:
-            yield Diagnostic(
-                RULE,
-                f"sensor data on '{port.full_name}' at {number(1 / period_s)} Hz is sent reliably",
-                port.qos.policy_span("reliability"),
-                hint="use 'qos: sensor_data'",
-            )
+    known = context.once(rates)
+    for node in context.system.nodes:
+        for port in node.ports_of(PortKind.PUBLISHER):
+            if not port.interface.value.startswith(_PACKAGE) or not port.qos.known:
+                continue
+            rate_hz = known.publisher_hz(PortOfNode(node, port))
+            if rate_hz is None or rate_hz < FAST_HZ:
+                continue
+            if port.qos.profile.reliability is Reliability.RELIABLE:
+                yield Diagnostic(
+                    RULE,
+                    f"sensor data on '{port.full_name}' at {number(rate_hz)} Hz is sent reliably",
+                    port.qos.policy_span("reliability"),
+                    hint="use 'qos: sensor_data'",
+                )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context
-from composer.checks.publishing import fastest_period_s
+from composer.checks.rates import rates
 from composer.checks.words import number
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import ChannelKind
@@ -41,22 +41,22 @@ nodes:
     )
 )
 
-#: Slower than this a message is taken before the next one comes.
-FAST_S = 0.1
+#: In hertz: on a slower topic a message is taken before the next one comes.
+FAST_HZ = 10.0
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the ends of topics whose rate is known."""
-    periods = context.once(fastest_period_s)
+    known = context.once(rates)
     for node in context.system.nodes:
         for port in node.ports:
-            period_s = periods.get(port.full_name)
-            if port.kind.channel is not ChannelKind.TOPIC or period_s is None:
+            if port.kind.channel is not ChannelKind.TOPIC or not port.qos.known:
                 continue
-            if period_s <= FAST_S and port.qos.known and _is_shallow(port.qos.profile):
+            rate_hz = known.topic_hz(port.full_name) if _is_shallow(port.qos.profile) else None
+            if rate_hz is not None and rate_hz >= FAST_HZ:
                 yield Diagnostic(
                     RULE,
-                    f"reliable topic '{port.full_name}' at {number(1 / period_s)} Hz "
+                    f"reliable topic '{port.full_name}' at {number(rate_hz)} Hz "
                     "has room for one message only",
                     port.qos.policy_span("depth"),
                     hint="give it a depth of 10, or make it best effort",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context, is_opaque
+from composer.checks.endpoints import endpoints
 from composer.checks.places import part_of
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.model import Endpoint, Node
@@ -34,9 +35,8 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the ends of connections, at what nodes depend on, at the command line."""
-    for connection in context.system.connections:
-        for endpoint in (*connection.sources, *connection.sinks):
-            yield from _endpoint(context, endpoint)
+    for endpoint in endpoints(context.system):
+        yield from _endpoint(context, endpoint)
     for node in context.system.nodes:
         yield from _dependencies(context, node)
     for unknown in context.system.unknown:
@@ -51,6 +51,10 @@ def check(context: Context) -> Iterator[Diagnostic]:
 def _endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
     name = endpoint.node
     if is_opaque(endpoint.text.value) or context.system.node(name) is not None:
+        return
+    if not name:
+        message = f"'{endpoint.text}' is not of the form 'node.port'"
+        yield Diagnostic(RULE, message, endpoint.text.span)
         return
     yield Diagnostic(
         RULE,

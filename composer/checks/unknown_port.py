@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from composer.checks.context import Context, is_opaque
 from composer.checks.doubt import PORT_SECTIONS, doubt
+from composer.checks.endpoints import endpoints
 from composer.checks.places import part_of
 from composer.checks.reactions import sends
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
@@ -45,10 +46,9 @@ _SENDERS = {
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the ends of connections, at what reactions send through, at what instances refine."""
     doubts = context.once(doubt)
-    for connection in context.system.connections:
-        for endpoint in (*connection.sources, *connection.sinks):
-            if not doubts.may_have(endpoint.node, *PORT_SECTIONS):
-                yield from _endpoint(context, endpoint)
+    for endpoint in endpoints(context.system):
+        if not doubts.may_have(endpoint.node, *PORT_SECTIONS):
+            yield from _endpoint(context, endpoint)
     for site, key, send in sends(context.system):
         name = send.port
         if not site.node.complete or is_opaque(name.value):

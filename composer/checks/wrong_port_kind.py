@@ -9,7 +9,7 @@ from composer.checks.context import Context
 from composer.checks.reactions import sends
 from composer.checks.words import a, either
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
-from composer.model import ChannelKind, Connection, Endpoint, Port, PortKind
+from composer.model import Chain, ChannelKind, Connection, Endpoint, Port, PortKind
 
 RULE = register(
     Rule(
@@ -60,6 +60,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the ends of connections and at the ports that reactions send through."""
     for connection in context.system.connections:
         yield from _connection(context, connection)
+    for chain in context.system.chains:
+        yield from _chain(context, chain)
     for site, key, send in sends(context.system):
         port = site.node.port(send.port.value)
         allowed = _SENDERS[key]
@@ -70,6 +72,19 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 send.port.span,
                 (Label(port.name.span, f"declared as {a(port.kind)}"),),
                 _hint(port.kind),
+            )
+
+
+def _chain(context: Context, chain: Chain) -> Iterator[Diagnostic]:
+    for endpoint in chain.through:
+        port = context.system.port(endpoint)
+        if port is not None and port.kind is not PortKind.PUBLISHER:
+            yield Diagnostic(
+                RULE,
+                f"chain '{chain.name}' goes through publishers, but '{endpoint.text}' "
+                f"is {a(port.kind)}",
+                endpoint.text.span,
+                (Label(port.name.span, f"declared as {a(port.kind)}"),),
             )
 
 

@@ -22,6 +22,7 @@ from composer.model.ports import (
 )
 from composer.model.system import (
     BehaviorReference,
+    Chain,
     Channel,
     Connection,
     Dependency,
@@ -41,6 +42,7 @@ from composer.model.system import (
 
 __all__ = [
     "BehaviorReference",
+    "Chain",
     "Channel",
     "ChannelKind",
     "Connection",

@@ -151,6 +151,7 @@ class Port:
     accept_span: Span | None = field(default=None, compare=False)
     feedback: FeedbackSteps | None = None  # action servers
     result: Template | None = None  # action servers
+    budget_ms: Located[float] | None = None  # how long its callback may take
     reentrant: bool = False
     external: bool = False  # the other end is outside this system
     required: bool | None = None  # whether an other end must be there; None: nobody said
@@ -189,6 +190,7 @@ class Timer:
     period: Period
     span: Span = field(compare=False)
     reaction: Reaction | None = None
+    budget_ms: Located[float] | None = None  # how long its callback may take
     reentrant: bool = False
     description: str = ""
 

@@ -166,6 +166,19 @@ class Connection:
     qos: Located[str] | None = None  # the profile's name, where it is named
 
 
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """A way that data takes: publishers, each heard by the node of the next.
+
+    ``latency_ms`` is the longest time from a message of the first to one of the last.
+    """
+
+    name: Located[str]
+    through: tuple[Endpoint, ...]
+    latency_ms: Located[float]
+    span: Span = field(compare=False)
+
+
 class ExecutorKind(StrEnum):
     """Who calls the callbacks."""
 
@@ -214,6 +227,7 @@ class System:
     span: Span = field(compare=False)
     description: str = ""
     connections: tuple[Connection, ...] = ()
+    chains: tuple[Chain, ...] = ()
     qos_profiles: tuple[NamedQos, ...] = ()
     qos_references: tuple[QosReference, ...] = ()
     executors: tuple[Executor, ...] = ()

@@ -84,6 +84,7 @@ def _port(kind: PortKind, entry: Entry, qos: QosTable, findings: list[Diagnostic
         accept_span=accept.span if accept is not None else None,
         feedback=_feedback(tree.entry("feedback"), findings),
         result=template(tree.get("result"), findings),
+        budget_ms=number(tree.get("budget_ms")),
         reentrant=flag(tree.get("reentrant"), default=False),
         external=flag(tree.get("external"), default=False),
         required=_required(tree.get("required")),
@@ -132,6 +133,7 @@ def _timer(entry: Entry, findings: list[Diagnostic]) -> Timer:
         period=_period(tree, span, findings),
         span=span,
         reaction=reaction(tree, span, findings),
+        budget_ms=number(tree.get("budget_ms")),
         reentrant=flag(tree.get("reentrant"), default=False),
         description=plain_text(tree.get("description")),
     )

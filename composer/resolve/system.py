@@ -15,6 +15,7 @@ from composer.model import (
     UnknownKey,
 )
 from composer.names import join
+from composer.resolve.chains import chains
 from composer.resolve.connections import connections
 from composer.resolve.declaration import declare
 from composer.resolve.node import Surroundings, node, placed, state
@@ -58,6 +59,7 @@ def resolve_system(
         span=_name_span(tree, "system"),
         description=plain_text(tree.get("description")),
         connections=joined,
+        chains=chains(tree.get("chains")),
         qos_profiles=qos.named,
         qos_references=tuple(qos.references),
         executors=tuple(_executor(entry) for entry in entries(tree.get("executors"))),

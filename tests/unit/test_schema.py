@@ -67,7 +67,7 @@ def profile(text: str) -> str:
         ),
         (
             "system: demo\nnode: {robot: {}}\nnodes: {a: {}}",
-            "unknown-key", "node", "'node' is not a key of a system", "valid here: connections",
+            "unknown-key", "node", "'node' is not a key of a system", "valid here: chains",
         ),
         ("node: demo\nxyzzy: 1", "unknown-key", "xyzzy", "'xyzzy' is not a key of a node type", ""),
         (
