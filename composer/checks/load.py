@@ -11,7 +11,7 @@ from composer.checks.rates import Rates, rates
 from composer.checks.unknown_executor import DEFAULT
 from composer.checks.words import number
 from composer.diagnostics import Label
-from composer.model import Executor, ExecutorKind, Node
+from composer.model import Executor, ExecutorKind, Node, Port, Timer
 from composer.source import Located, Span
 
 #: So many callbacks are named in a message and shown beside it, those with most to do first.
@@ -105,9 +105,10 @@ def _threads(executor: Executor) -> int:
 
 
 def _shares(known: Rates, node: Node) -> Iterator[Share]:
-    causes = [(timer, Cause(timer=timer)) for timer in node.timers]
-    of_ports = [(port, Cause(port=port)) for port in node.ports]
-    for callback, cause in (*causes, *of_ports):
+    callbacks: list[tuple[Timer | Port, Cause]] = []
+    callbacks += [(timer, Cause(timer=timer)) for timer in node.timers]
+    callbacks += [(port, Cause(port=port)) for port in node.ports]
+    for callback, cause in callbacks:
         budget_ms = callback.budget_ms
         rate_hz = known.callback_hz(node, cause) if budget_ms is not None else None
         if budget_ms is not None and rate_hz is not None:
