@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from composer.loading import Loading
 
 
-def _complete_system(incomplete: str) -> list[str]:
+def complete_system(incomplete: str) -> list[str]:
     """Complete the names of example systems, and paths."""
     from composer.cli.files import example_systems
 
@@ -24,14 +25,16 @@ def _complete_system(incomplete: str) -> list[str]:
 
 
 def _paths(incomplete: str) -> Iterable[str]:
-    folder = Path(incomplete) if incomplete.endswith("/") else Path(incomplete).parent
-    for path in sorted(folder.glob("*")):
-        text = str(path)
-        if text.startswith(incomplete.removeprefix("./")) and not path.name.startswith("."):
-            if path.is_dir():
-                yield f"{text}/"
-            elif path.suffix in (".yaml", ".yml"):
-                yield text
+    """Yield folders and YAML files that begin so, written as they were begun."""
+    begun, _, last = incomplete.rpartition("/")
+    prefix = f"{begun}/" if "/" in incomplete else ""
+    for path in sorted(Path(prefix or ".").glob(f"{glob.escape(last)}*")):
+        if path.name.startswith("."):
+            continue
+        if path.is_dir():
+            yield f"{prefix}{path.name}/"
+        elif path.suffix in (".yaml", ".yml"):
+            yield f"{prefix}{path.name}"
 
 
 SystemName = Annotated[
@@ -40,7 +43,7 @@ SystemName = Annotated[
         metavar="SYSTEM",
         help="A system file, or the name of an example system.",
         show_default=False,
-        autocompletion=_complete_system,
+        autocompletion=complete_system,
     ),
 ]
 

@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+from tests.cli.compose import compose
+
+
+def test_a_message_is_shown_with_the_messages_in_it() -> None:
+    done = compose("interface", "show", "geometry_msgs/msg/PointStamped")
+    assert done.code == 0
+    assert done.out.splitlines() == [
+        "std_msgs/msg/Header header",
+        "  builtin_interfaces/msg/Time stamp",
+        "    int32 sec",
+        "    uint32 nanosec",
+        "  string frame_id",
+        "geometry_msgs/msg/Point point",
+        "  float64 x",
+        "  float64 y",
+        "  float64 z",
+    ]
+
+
+def test_a_message_is_shown_flat() -> None:
+    done = compose("interface", "show", "geometry_msgs/msg/PointStamped", "--flat")
+    assert done.out == "std_msgs/msg/Header header\ngeometry_msgs/msg/Point point\n"
+
+
+def test_services_and_actions_have_parts_and_constants_have_values() -> None:
+    shown = compose("interface", "show", "std_srvs/srv/SetBool").out
+    assert shown == "bool data\n---\nbool success\nstring message\n"
+    action = compose("interface", "show", "composer_interfaces/action/Navigate", "--flat").out
+    assert action.count("---\n") == 2
+    assert "uint8 DEBUG=10" in compose("interface", "show", "rcl_interfaces/msg/Log").out
+
+
+def test_types_are_listed_by_kind() -> None:
+    services = compose("interface", "list", "--only-srvs").out.split()
+    assert "std_srvs/srv/Trigger" in services
+    assert all("/srv/" in name for name in services)
+    everything = compose("interface", "list").out.split()
+    assert {"std_msgs/msg/String", "composer_interfaces/action/Navigate"} <= set(everything)
+
+
+def test_an_unknown_type_gets_the_nearest() -> None:
+    done = compose("interface", "show", "std_msgs/msg/Sting")
+    assert done.code == 1
+    assert "did you mean 'std_msgs/msg/String'?" in done.err

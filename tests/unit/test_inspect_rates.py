@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import pytest
+
+from composer.runtime.inspect_rates import BandwidthWindow, RateWindow
+
+
+def test_the_rate_is_that_of_the_periods() -> None:
+    window = RateWindow(100)
+    for at_s in (10.0, 10.1, 10.2, 10.5):
+        window.add(at_s)
+    rate = window.rate()
+    assert rate is not None
+    assert rate.average_hz == pytest.approx(3 / 0.5)
+    assert (rate.shortest_s, rate.longest_s) == (pytest.approx(0.1), pytest.approx(0.3))
+    assert rate.deviation_s == pytest.approx(0.0942809)
+    assert rate.window == 3
+
+
+def test_one_message_has_no_rate_and_none_has_no_bandwidth() -> None:
+    window = RateWindow(10)
+    assert window.rate() is None
+    window.add(1.0)
+    assert window.rate() is None
+    assert BandwidthWindow(10).bandwidth(5.0) is None
+
+
+def test_only_the_last_messages_count() -> None:
+    window = RateWindow(2)
+    for at_s in (0.0, 100.0, 100.5, 101.0):
+        window.add(at_s)
+    rate = window.rate()
+    assert rate is not None
+    assert (rate.average_hz, rate.window) == (2.0, 2)
+
+
+def test_bandwidth_goes_down_when_nothing_comes_any_more() -> None:
+    window = BandwidthWindow(10)
+    window.add(0.0, 100)
+    window.add(1.0, 300)
+    found = window.bandwidth(2.0)
+    assert found is not None
+    assert (found.bytes_per_s, found.mean, found.smallest, found.largest) == (
+        200.0,
+        200.0,
+        100,
+        300,
+    )
+    later = window.bandwidth(4.0)
+    assert later is not None
+    assert later.bytes_per_s == 100.0
