@@ -6,17 +6,26 @@ Together with :mod:`composer.runtime.sources`, what reaches into rclpy.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, Protocol, TypeVar
 
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse
 
 from composer.runtime import readiness
 from composer.runtime.readiness import Announcement, Handle, Signal
-from composer.runtime.sources import RunTask
-from composer.runtime.tasks import Cancelled, Report, name_of
+from composer.runtime.tasks import Calls, Cancelled, Future, Report, name_of
+
+T = TypeVar("T")
+
+
+class TaskLoop(Calls, Protocol):
+    """The part of a loop that actions need."""
+
+    def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
+        """Run a coroutine; the future is its outcome."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,33 +44,40 @@ _SERVER = _Side(
     readiness.ACTION_SERVER,
     ("_is_goal_request_ready", "_is_cancel_request_ready", "_is_result_request_ready"),
 )
+# In this order: once the result is there, rclpy drops the feedback that is still to be taken.
 _CLIENT = _Side(
     "action client",
     "_client_handle",
     readiness.ACTION_CLIENT,
     (
         "_is_goal_response_ready",
-        "_is_cancel_response_ready",
-        "_is_result_response_ready",
         "_is_feedback_ready",
         "_is_status_ready",
+        "_is_cancel_response_ready",
+        "_is_result_response_ready",
     ),
 )
+#: Where an action client keeps the requests that wait for each kind of response.
+_PENDING = {
+    "goal": "_goal_sequence_number_to_goal_id",
+    "cancel": "_pending_cancel_requests",
+    "result": "_pending_result_requests",
+}
+_RETRIES = 20
+_RETRY_AFTER_S = 0.001
 
 
 class ActionSource:
-    """Everything one action server or client receives."""
+    """Everything one action server or client receives, one thing at a time."""
 
     def __init__(
-        self, waitable: ActionServer | ActionClient, executor: object, run_task: RunTask
+        self, waitable: ActionServer | ActionClient, executor: object, loop: TaskLoop
     ) -> None:
         self._waitable: Any = waitable
         self._side = _SERVER if isinstance(waitable, ActionServer) else _CLIENT
         self._handle: Handle = getattr(waitable, self._side.handle)
         self._executor = executor
-        self._run_task = run_task
-        if isinstance(waitable, ActionServer):
-            waitable._is_goal_expired = False  # a timer asks, see forget_expired_goals
+        self._loop = loop
 
     @property
     def name(self) -> str:
@@ -77,21 +93,38 @@ class ActionSource:
         signal.detach(self._handle)
 
     def take(self) -> Any:
-        """Return one of each kind of thing an action consists of."""
-        for flag in self._side.ready_flags:
-            setattr(self._waitable, flag, True)
-        return self._waitable.take_data() or None
+        """Return one thing the action consists of, by its kind."""
+        waitable = self._waitable
+        waitable._is_goal_expired = False  # asked for by a timer, see forget_expired_goals
+        for wanted in self._side.ready_flags:
+            for flag in self._side.ready_flags:
+                setattr(waitable, flag, flag == wanted)
+            if taken := waitable.take_data():
+                return taken
+        return None
 
     def call(self, taken: Any) -> None:
         """Have rclpy work on it."""
-        work_on(self._waitable, taken, self._executor, self._run_task)
+        self._work_on(taken, _RETRIES)
 
+    def _work_on(self, taken: Any, retries: int) -> None:
+        if retries and self._is_early(taken):
+            later = partial(self._work_on, taken, retries - 1)
+            self._loop.call_later(_RETRY_AFTER_S, later)
+            return
+        for future in self._waitable._futures:
+            future._set_executor(self._executor)
+        self._loop.run_task(self._waitable.execute(taken))
 
-def work_on(waitable: Any, taken: Any, executor: object, run_task: RunTask) -> None:
-    """Have rclpy work on what was taken; done callbacks of futures run by ``executor``."""
-    for future in waitable._futures:
-        future._set_executor(executor)
-    run_task(waitable.execute(taken))
+    def _is_early(self, taken: dict[str, Any]) -> bool:
+        """Tell whether a response came before its request was noted down.
+
+        rclpy does that after sending, without a lock: another thread may be in between.
+        """
+        return self._side is _CLIENT and any(
+            kind in _PENDING and item[0] not in getattr(self._waitable, _PENDING[kind])
+            for kind, item in taken.items()
+        )
 
 
 def keeps_goals(server: ActionServer) -> bool:

@@ -64,12 +64,12 @@ class EventLoop(Scheduler):
     def add_action_server(self, server: ActionServer) -> None:
         """Run the server's goal, cancel and result requests."""
         actions.contain(server, self._report)
-        self._add(server, actions.ActionSource(server, self._futures, self.run_task))
+        self._add(server, actions.ActionSource(server, self._futures, self))
         self.call_later(_EXPIRY_PERIOD_S, lambda: self._expire(server))
 
     def add_action_client(self, client: ActionClient) -> None:
         """Complete the futures of the client and deliver its feedback."""
-        self._add(client, actions.ActionSource(client, self._futures, self.run_task))
+        self._add(client, actions.ActionSource(client, self._futures, self))
 
     def remove(self, entity: object) -> None:
         """Stop serving one entity. To be called before it is destroyed."""

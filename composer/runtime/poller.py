@@ -10,12 +10,15 @@ import ctypes
 import os
 import select
 import time
+from collections.abc import Callable
+from functools import partial
 
 _LIBC = ctypes.CDLL(None, use_errno=True)
 _CLOCK_MONOTONIC = 1
 _TFD_NONBLOCK_CLOEXEC = os.O_NONBLOCK | os.O_CLOEXEC
 _TFD_TIMER_ABSTIME = 1
 _NANOSECONDS = 1_000_000_000
+_AT_ONCE = 64  # what one call reports; the rest comes with the next
 
 
 class _TimeSpecification(ctypes.Structure):
@@ -37,6 +40,9 @@ class Poller:
 
     def __init__(self) -> None:
         self._epoll = select.epoll()
+        #: Returns what was written since the last time, as (fd, event mask), without waiting.
+        #: Not a method: this is called for each message.
+        self.ready: Callable[[], list[tuple[int, int]]] = partial(self._epoll.poll, 0, _AT_ONCE)
         self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._timer_fd = _LIBC.timerfd_create(_CLOCK_MONOTONIC, _TFD_NONBLOCK_CLOEXEC)
         if self._timer_fd < 0:
@@ -59,18 +65,14 @@ class Poller:
         """End the current or the next wait."""
         os.eventfd_write(self._wake_fd, 1)
 
-    def ready(self) -> list[tuple[int, int]]:
-        """Return what was written since the last time, as (fd, event mask), without waiting."""
-        return self._epoll.poll(0)
-
     def wait(self, until_s: float | None) -> list[tuple[int, int]]:
         """Wait until something is written or ``time.monotonic()`` reaches ``until_s``."""
         if until_s is None:
-            return self._epoll.poll()
+            return self._epoll.poll(None, _AT_ONCE)
         if until_s <= time.monotonic():
-            return self._epoll.poll(0)
+            return self.ready()
         self._arm(until_s)
-        return self._epoll.poll()
+        return self._epoll.poll(None, _AT_ONCE)
 
     def __del__(self) -> None:
         # Not sooner: a late wake() must not write to a descriptor that is somebody else's by now.

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import resource
 from collections.abc import Callable
 from typing import Protocol
 
@@ -78,6 +79,7 @@ class Signal:
 
     def __init__(self) -> None:
         self.fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        _leave_room_above(self.fd)
         self._attached: list[tuple[Handle, tuple[Announcement, ...]]] = []
 
     def attach(self, handle: Handle, *announcements: Announcement) -> None:
@@ -110,3 +112,13 @@ class Signal:
         for handle, _ in list(self._attached):
             self.detach(handle)
         os.close(self.fd)
+
+
+def _leave_room_above(fd: int) -> None:
+    """Raise the limit of open files when half of it is used: a large system needs thousands.
+
+    Linux gives out the lowest free descriptor, so ``fd`` tells how many there are.
+    """
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if fd > soft // 2 and soft < hard:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 2 * soft), hard))

@@ -26,6 +26,7 @@ from composer.runtime.timers import ScheduledCall, TimerHeap
 T = TypeVar("T")
 
 _ROUND = 64  # calls, then items of entities, before readiness is looked at again
+_PATIENCE = 256  # turns that go by before what may have more is served among what was announced
 
 
 class Scheduler:
@@ -37,7 +38,8 @@ class Scheduler:
         self._poller = Poller()
         self._timers = TimerHeap()
         self._calls: deque[Callable[[], object]] = deque()
-        self._ready: deque[Slot] = deque()
+        self._ready: deque[Slot] = deque()  # announced
+        self._again: deque[Slot] = deque()  # something was taken, there may be more
         self._slots: dict[int, Slot] = {}  # by the file descriptor of their signal
         self._tasks: set[Task[Any]] = set()
         self._running: object = None  # a source or a callback, while it is called
@@ -137,25 +139,43 @@ class Scheduler:
     def _spin(self) -> None:
         while not self._stopping:
             try:
-                self._turn()
+                self._take_turns()
             except BaseException as error:  # an asynchronous one, between two callbacks
                 self._report(f"executor '{self._name}'", error)
         self._wind_up()
 
-    def _turn(self) -> None:
+    def _take_turns(self) -> None:
+        timers, calls, ready, again = self._timers, self._calls, self._ready, self._again
+        turns_since = 0
+        while not self._stopping:
+            if monotonic() >= timers.next_s:
+                self._run_timers()
+            if calls:
+                self._run_calls()
+            waiting = not (calls or ready or again)
+            self._gather(self._wait() if waiting else self._poller.ready())
+            turns_since += 1
+            if again and (not ready or turns_since > _PATIENCE):
+                turns_since = 0
+                self._look_again()
+            for _ in range(_ROUND):
+                if not ready:
+                    break
+                self._serve(ready.popleft())
+                if monotonic() >= timers.next_s:
+                    break
+
+    def _run_timers(self) -> None:
         for call in self._timers.take_due():
             if not call.cancelled:  # by one of those before it
                 self._call(call.callback)
                 self._timers.repeat(call)
+
+    def _run_calls(self) -> None:
         for _ in range(min(len(self._calls), _ROUND)):
             self._call(self._calls.popleft())
-            if self._timers.due():
-                break
-        self._gather(self._poller.ready() if self._ready or self._calls else self._wait())
-        for _ in range(_ROUND):
-            if not self._ready or self._timers.due():
-                break
-            self._serve(self._ready.popleft())
+            if monotonic() >= self._timers.next_s:
+                return
 
     def _wait(self) -> list[tuple[int, int]]:
         self._sleeping = True
@@ -169,12 +189,23 @@ class Scheduler:
     def _gather(self, announced: list[tuple[int, int]]) -> None:
         for fd, _ in announced:
             slot = self._slots.get(fd)
-            if slot is not None and not slot.queued:
-                slot.queued = True
+            if slot is not None and not slot.ready:
+                slot.ready = True
+                self._ready.append(slot)
+
+    def _look_again(self) -> None:
+        # An announcement may stand for several items, so each take that brought one is followed
+        # by one that brings none. While much is announced that second take can wait: mostly the
+        # next announcement of the entity makes it needless.
+        while self._again:
+            slot = self._again.popleft()
+            slot.again = False
+            if not slot.ready:
+                slot.ready = True
                 self._ready.append(slot)
 
     def _serve(self, slot: Slot) -> None:
-        slot.queued = False
+        slot.ready = False
         for source in slot.sources:
             self._running = source
             try:
@@ -185,9 +216,9 @@ class Scheduler:
                 continue
             if taken is None:
                 continue
-            if not slot.queued:
-                slot.queued = True
-                self._ready.append(slot)
+            if not slot.again:
+                slot.again = True
+                self._again.append(slot)
             try:
                 source.call(taken)
             except BaseException as error:
@@ -227,3 +258,4 @@ class Scheduler:
         for slot in list(self._slots.values()):
             self.close_slot(slot)
         self._ready.clear()
+        self._again.clear()

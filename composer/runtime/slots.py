@@ -9,12 +9,14 @@ from composer.runtime.sources import Source
 class Slot:
     """Sources that share one signal. The loop serves them together, one item each."""
 
-    __slots__ = ("queued", "signal", "sources")
+    __slots__ = ("again", "ready", "signal", "sources")
 
     def __init__(self) -> None:
         self.signal = Signal()
         self.sources: tuple[Source, ...] = ()
-        self.queued = False  # true while in the ready deque, so that it is in there once
+        # True while in the loop's deque of that name, so that it is in there once.
+        self.ready = False
+        self.again = False
 
     def add(self, source: Source) -> None:
         """Serve ``source`` from now on. Raises InvalidHandle when its entity is destroyed."""

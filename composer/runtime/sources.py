@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Any, Protocol
 
 from rclpy.client import Client
@@ -50,14 +51,15 @@ class Source(Protocol):
 class SubscriptionSource:
     """Calls ``callback(message)`` for each message."""
 
-    __slots__ = ("_callback", "_raw", "_subscription", "_take", "_type")
+    __slots__ = ("_callback", "_subscription", "take")
 
     def __init__(self, subscription: Subscription, callback: Callable[[Any], object]) -> None:
         self._subscription = subscription
         self._callback = callback
-        self._take = subscription.handle.take_message
-        self._type = subscription.msg_type
-        self._raw = subscription.raw
+        #: Returns a message and its information. Not a method: this is called for each message.
+        self.take: Callable[[], Any] = partial(
+            subscription.handle.take_message, subscription.msg_type, subscription.raw
+        )
 
     @property
     def name(self) -> str:
@@ -71,10 +73,6 @@ class SubscriptionSource:
     def detach(self, signal: Signal) -> None:
         """End that."""
         signal.detach(self._subscription.handle)
-
-    def take(self) -> Any:
-        """Return a message and its information."""
-        return self._take(self._type, self._raw)
 
     def call(self, taken: Any) -> None:
         """Call with the message."""

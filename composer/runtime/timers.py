@@ -39,23 +39,22 @@ class TimerHeap:
         self._heap: list[tuple[float, int, ScheduledCall]] = []
         self._order = itertools.count()  # calls due at the same time keep their order
         self._sweep_at = _MANY
+        self.next_s = math.inf  # nothing is due before; a cancelled call may still count here
 
     def add(self, call: ScheduledCall) -> None:
         """Put a call in its place."""
         if len(self._heap) >= self._sweep_at:
             self._sweep()
         heapq.heappush(self._heap, (call.due_s, next(self._order), call))
+        self.next_s = self._heap[0][0]
 
     def next_due_s(self) -> float | None:
         """Return when the next call is due, or None when there is none."""
         heap = self._heap
         while heap and heap[0][2].cancelled:
             heapq.heappop(heap)
+        self.next_s = heap[0][0] if heap else math.inf
         return heap[0][0] if heap else None
-
-    def due(self) -> bool:
-        """Tell whether a call is due by now."""
-        return bool(self._heap) and self._heap[0][0] <= monotonic()
 
     def take_due(self) -> list[ScheduledCall]:
         """Take out every call that is due by now, in order."""
@@ -65,6 +64,7 @@ class TimerHeap:
             call = heapq.heappop(self._heap)[2]
             if not call.cancelled:
                 due.append(call)
+        self.next_s = self._heap[0][0] if self._heap else math.inf
         return due
 
     def repeat(self, call: ScheduledCall) -> None:

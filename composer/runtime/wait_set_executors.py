@@ -32,6 +32,7 @@ from rclpy.executors import (
 from rclpy.guard_condition import GuardCondition
 from rclpy.task import Future as RclpyFuture
 from rclpy.timer import Timer
+from rclpy.waitable import Waitable
 
 from composer.runtime import actions
 from composer.runtime.loop import Loop
@@ -128,7 +129,7 @@ class MendedExecutor(Executor):
         if source is None:
             return None
         taken: list[Any] = []
-        self._loop.call(lambda: source.name, lambda: taken.append(_take(source)))
+        self._loop.call(lambda: source.name, lambda: taken.append(_take(entity, source)))
         if not taken or taken[0] is None:
             return None
 
@@ -143,14 +144,12 @@ class MendedExecutor(Executor):
         if isinstance(waitable, EventHandler):
             waitable._ready_to_take_data = False
             return self._take_entity(waitable)
-        if not isinstance(waitable, ActionServer | ActionClient):
-            return self._contained(waitable, super()._take_waitable)
-        taken = waitable.take_data()
-
-        async def execute() -> None:
-            actions.work_on(waitable, taken, self, self._loop.run_task)
-
-        return execute if taken else None
+        if isinstance(waitable, ActionServer) and waitable._is_goal_expired:
+            self._loop.run_task(actions.forget_expired_goals(waitable))
+            return None
+        if isinstance(waitable, ActionServer | ActionClient):
+            return self._take_entity(waitable)
+        return self._contained(waitable, super()._take_waitable)
 
     def _take_timer(self, timer: Any) -> _Execute | None:
         return self._contained(timer, super()._take_timer)
@@ -216,8 +215,10 @@ def _is_rclpy_only(entity: object) -> bool:
     return isinstance(entity, Timer | GuardCondition)
 
 
-def _take(source: Source) -> Any:
+def _take(entity: Any, source: Source) -> Any:
     try:
-        return source.take()
+        # In use, so that no other thread destroys it before it is taken from.
+        with entity if isinstance(entity, Waitable) else entity.handle:
+            return source.take()
     except InvalidHandle:
         return None  # destroyed since it was found ready

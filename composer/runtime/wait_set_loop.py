@@ -89,11 +89,14 @@ class WaitSetLoop:
     def add_action_server(self, server: ActionServer) -> None:
         """Run the server's goal, cancel and result requests."""
         actions.contain(server, self.report)
-        self._executor.serve(server, None)
+        self._executor.serve(server, self._action_source(server))
 
     def add_action_client(self, client: ActionClient) -> None:
         """Complete the futures of the client and deliver its feedback."""
-        self._executor.serve(client, None)
+        self._executor.serve(client, self._action_source(client))
+
+    def _action_source(self, waitable: ActionServer | ActionClient) -> actions.ActionSource:
+        return actions.ActionSource(waitable, self._executor, self)
 
     def remove(self, entity: object) -> None:
         """Stop serving one entity. To be called before it is destroyed."""
