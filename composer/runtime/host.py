@@ -262,6 +262,8 @@ class Host:
             if not (stoppable and self._stop.reason is not None):
                 self._take_stuck(node, step.transition)
             return None
+        if future.cancelled():
+            return None  # the executor stops
         result = future.result()
         if not result.success:
             self._failed = True

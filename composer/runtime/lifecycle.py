@@ -27,8 +27,6 @@ from composer.runtime.log import describe, traceback_of
 from composer.runtime.loop import Reply
 from composer.runtime.tasks import Cancelled, Future, within
 
-RCLError = rclpy_implementation.RCLError
-
 _NAMES = {
     Transition.TRANSITION_CONFIGURE: "configure",
     Transition.TRANSITION_CLEANUP: "cleanup",
@@ -146,10 +144,10 @@ class Lifecycle:
         """Make a transition; the right to has been taken and is given back."""
         try:
             return await self._transition(transition)
-        except RCLError as error:
-            reason = f"rcl refused '{transition}' in state {self.state}: {error}"
-            self._log.error(reason)
-            return Result(success=False, state=self.state, reason=reason)
+        except Exception as error:
+            # What user code raises is dealt with: this is rcl, whose context may have gone, or us.
+            self._log.error(f"'{transition}' came to nothing: {traceback_of(error)}")
+            return Result(success=False, state=self.state, reason=describe(error))
         finally:
             self._finish()
 

@@ -52,13 +52,13 @@ def message(text: str, kind: Any, **scope: Any) -> Any:
         ("{data: -128}", Int8, Int8(data=-128)),
         ("{data: 18446744073709551615}", UInt64, UInt64(data=2**64 - 1)),
         ("{data: 7}", Byte, Byte(data=b"\x07")),
-        ("{stamp: 1.5, frame_id: map}", Header, Header(stamp=Time(sec=1, nanosec=500_000_000), frame_id="map")),
+        ("{stamp: 1.5}", Header, Header(stamp=Time(sec=1, nanosec=500_000_000))),
         ("{stamp: {sec: 3}}", Header, Header(stamp=Time(sec=3))),
         ("{sec: '{x}'}", Duration, Duration(sec=7)),
-        ("{name: [a, b], position: [1, '{x}']}", JointState, JointState(name=["a", "b"], position=[1.0, 7.0])),
+        ("{position: [1, '{x}']}", JointState, JointState(position=[1.0, 7.0])),
         ("{}", Odometry, Odometry()),
     ],
-)  # fmt: skip
+)
 def test_values_become_fields(text: str, kind: Any, expected: Any) -> None:
     assert message(text, kind, x=7) == expected
 
@@ -139,7 +139,7 @@ def test_plain_data_becomes_a_message() -> None:
     plain = {"start": {"x": 1}, "max_velocity": 2}
     request = convert_message(plain, PlanTrajectory.Request, "request")
     assert (request.start.x, request.max_velocity) == (1.0, 2.0)
-    with pytest.raises(MessageError, match="request.goal.z takes a number"):
+    with pytest.raises(MessageError, match=r"request\.goal\.z takes a number"):
         convert_message({"goal": {"z": "up"}}, PlanTrajectory.Request, "request")
 
 
