@@ -84,6 +84,8 @@ def ros_domain_id() -> Iterator[int]:
     with pytest.MonkeyPatch.context() as environment, lock:
         environment.setenv("ROS_DOMAIN_ID", str(domain_id))
         environment.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        # Shared memory outlives killed processes: the next ones stumble over it, and say so.
+        environment.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
         if "AMENT_PREFIX_PATH" not in os.environ:  # the wheels do not set it, a sourced ROS does
             environment.setenv("AMENT_PREFIX_PATH", sys.prefix)
         yield domain_id

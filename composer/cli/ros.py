@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.failure import Failure
+from composer.cli.terminal import keep_stdout_for_data
 
 if TYPE_CHECKING:
     from composer.runtime.session import Deadline, Session
@@ -32,6 +33,7 @@ def require_ros(command: str) -> None:
             f"'{command}' needs ROS 2, and rclpy is not installed in this Python",
             hint='pip install "ros2-composer[ros]"   or: source /opt/ros/jazzy/setup.bash',
         )
+    keep_stdout_for_data()
     from composer.runtime.environment import StartRefused, prepare_environment
 
     try:

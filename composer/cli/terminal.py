@@ -61,6 +61,19 @@ def use_color(stream: TextIO) -> bool:
     return stream.isatty() and os.environ.get("TERM") != "dumb"
 
 
+def keep_stdout_for_data() -> None:
+    """Lead what libraries print to file descriptor 1 to stderr; stdout stays ours alone.
+
+    Fast DDS prints its errors there, where another program may be reading what we write.
+    """
+    if sys.stdout is not sys.__stdout__:  # done already, or somebody captures it
+        return
+    sys.stdout.flush()
+    ours = os.dup(sys.stdout.fileno())
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    sys.stdout = os.fdopen(ours, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)
+
+
 def drop_stdout() -> None:
     """Let stdout lead nowhere, so that nothing fails on a closed pipe any more."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
