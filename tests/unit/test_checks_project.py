@@ -1,0 +1,55 @@
+"""What is told of files only when they are looked at together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.diagnostics import Diagnostic
+from composer.loading import load, project_findings
+
+FILES = {
+    "nodes/planner.yaml": "node: planner\non_activate: {log: ready}\n",
+    "nodes/old_planner.yaml": "node: old_planner\non_activate: {log: ready}\n",
+    "systems/pipeline.yaml": "system: pipeline\nnodes: {planner: {type: planner}}\n",
+}
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for name, text in FILES.items():
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def together(*names: str) -> list[Diagnostic]:
+    return project_findings([load(Path(name)) for name in names])
+
+
+def test_a_node_type_that_no_system_uses_is_told(project: Path) -> None:
+    [finding] = together(*FILES)
+    assert finding.rule.name == "unused-node-type"
+    assert str(finding.primary) == "nodes/old_planner.yaml:1:7"
+
+
+def test_node_types_without_a_system_are_not_judged(project: Path) -> None:
+    assert together("nodes/planner.yaml", "nodes/old_planner.yaml") == []
+
+
+def test_a_type_of_the_same_name_elsewhere_does_not_count(project: Path) -> None:
+    other = project / "other" / "nodes"
+    other.mkdir(parents=True)
+    (other / "planner.yaml").write_text(FILES["nodes/planner.yaml"], encoding="utf-8")
+    [finding] = together("other/nodes/planner.yaml", "systems/pipeline.yaml")
+    assert str(finding.primary) == "other/nodes/planner.yaml:1:7"
+
+
+def test_it_can_be_silenced(project: Path) -> None:
+    path = project / "nodes" / "old_planner.yaml"
+    comment = "# compose: ignore[unused-node-type] for other projects\n"
+    path.write_text(comment + FILES["nodes/old_planner.yaml"], encoding="utf-8")
+    assert together(*FILES) == []
