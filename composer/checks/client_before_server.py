@@ -49,7 +49,7 @@ nodes:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Hold the order of the bring-up against services and actions."""
     system = context.system
-    if dependency_cycles(system):
+    if dependency_cycles(system) or not system.implied_dependencies:
         return
     order = in_dependency_order(system, dependency_edges(system))
     rank = {name: place for place, name in enumerate(order)}

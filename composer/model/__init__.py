@@ -20,6 +20,13 @@ from composer.model.ports import (
     Send,
     Timer,
 )
+from composer.model.supervision import (
+    DEFAULT_SUPERVISION,
+    OnFailure,
+    RestartBudget,
+    Supervision,
+    Watch,
+)
 from composer.model.system import (
     BehaviorReference,
     Chain,
@@ -41,6 +48,7 @@ from composer.model.system import (
 )
 
 __all__ = [
+    "DEFAULT_SUPERVISION",
     "BehaviorReference",
     "Chain",
     "Channel",
@@ -55,6 +63,7 @@ __all__ = [
     "LogLevel",
     "NamedQos",
     "Node",
+    "OnFailure",
     "Parameter",
     "ParameterType",
     "Period",
@@ -67,9 +76,12 @@ __all__ = [
     "QosReference",
     "Reaction",
     "Remapping",
+    "RestartBudget",
     "Send",
+    "Supervision",
     "System",
     "Timer",
     "UnknownKey",
+    "Watch",
     "channels",
 ]

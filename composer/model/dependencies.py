@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 
 from composer.model.ports import ChannelKind
-from composer.model.system import System, channels
+from composer.model.system import PrimaryState, System, channels
 
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """``node`` waits for ``on``. Both are keys of ``System.nodes``.
+    """``node`` waits until ``on`` is in ``state``. Both are keys of ``System.nodes``.
 
     ``serves`` is the name of the service or action that ``on`` serves to ``node``; it is empty
     where the system itself says ``depends_on``.
@@ -21,6 +21,7 @@ class Edge:
     node: str
     on: str
     serves: str = ""
+    state: PrimaryState = PrimaryState.ACTIVE
 
     @property
     def implied(self) -> bool:
@@ -33,14 +34,17 @@ def declared_edges(system: System) -> Iterator[Edge]:
     for node in system.nodes:
         for dependency in node.depends_on:
             if system.node(dependency.node.value) is not None:
-                yield Edge(node.name.value, dependency.node.value)
+                yield Edge(node.name.value, dependency.node.value, state=dependency.state)
 
 
 def implied_edges(system: System) -> Iterator[Edge]:
     """Yield an edge from every client of a service or action to the node that serves it.
 
-    That is the first one, if there are several: checks refuse a second.
+    That is the first one, if there are several: checks refuse a second. There are none where the
+    system does not want them.
     """
+    if not system.implied_dependencies:
+        return
     for channel in channels(system.nodes):
         if channel.kind is ChannelKind.TOPIC or not channel.sources:
             continue

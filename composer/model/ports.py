@@ -153,6 +153,7 @@ class Port:
     result: Template | None = None  # action servers
     budget_ms: Located[float] | None = None  # how long its callback may take
     reentrant: bool = False
+    always_on: bool = False  # it lives while its node is inactive, too
     external: bool = False  # the other end is outside this system
     required: bool | None = None  # whether an other end must be there; None: nobody said
     description: str = ""
@@ -192,6 +193,7 @@ class Timer:
     reaction: Reaction | None = None
     budget_ms: Located[float] | None = None  # how long its callback may take
     reentrant: bool = False
+    always_on: bool = False  # it runs while its node is inactive, too
     description: str = ""
 
 

@@ -18,6 +18,7 @@ from composer.model.ports import (
     Reaction,
     Timer,
 )
+from composer.model.supervision import DEFAULT_SUPERVISION, Supervision
 from composer.source import Located, SourceFile, Span
 from composer.tree import Plain
 
@@ -109,6 +110,7 @@ class Node:
     executor: Located[str] | None = None
     depends_on: tuple[Dependency, ...] = ()
     autostart: Located[PrimaryState] | None = None
+    supervision: Supervision = DEFAULT_SUPERVISION
     unknown: tuple[UnknownKey, ...] = ()
     complete: bool = True  # False: its type is unknown or unreadable, so what it has is not known
     _ports: dict[str, Port] = field(init=False, repr=False, compare=False)
@@ -218,13 +220,15 @@ class System:
     """Everything one file declares.
 
     A node type validated alone is a system of that one node, with ``node_type`` true: nothing
-    outside it is known then.
+    outside it is known then. ``supervision`` holds for nodes that say nothing else;
+    ``implied_dependencies`` is whether clients wait for their servers without being told to.
     """
 
     name: Located[str]
     source: SourceFile
     nodes: tuple[Node, ...]
     span: Span = field(compare=False)
+    namespace: str = "/"  # absolute; of every node that names none itself
     description: str = ""
     connections: tuple[Connection, ...] = ()
     chains: tuple[Chain, ...] = ()
@@ -232,6 +236,8 @@ class System:
     qos_references: tuple[QosReference, ...] = ()
     executors: tuple[Executor, ...] = ()
     autostart: PrimaryState = PrimaryState.ACTIVE
+    supervision: Supervision = DEFAULT_SUPERVISION
+    implied_dependencies: bool = True
     node_type: bool = False
     unknown: tuple[UnknownKey, ...] = ()  # what the command line names and the system lacks
     _nodes: dict[str, Node] = field(init=False, repr=False, compare=False)

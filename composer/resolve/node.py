@@ -13,6 +13,7 @@ from composer.model import (
     Port,
     PrimaryState,
     Remapping,
+    Supervision,
     UnknownKey,
 )
 from composer.names import expand_name, join
@@ -22,6 +23,7 @@ from composer.resolve.overrides import Overrides
 from composer.resolve.parameters import with_values
 from composer.resolve.qos import QosTable
 from composer.resolve.reading import entries, is_opaque, key, plain_text, text, text_or_opaque
+from composer.resolve.supervision import supervision
 from composer.resolve.types import NodeTypes
 from composer.source import Located
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
@@ -37,6 +39,7 @@ class Surroundings:
     qos: QosTable
     joints: Joints
     overrides: Overrides
+    supervision: Supervision
     findings: list[Diagnostic]
 
 
@@ -84,6 +87,7 @@ def node(entry: Entry, around: Surroundings) -> Node:
         executor=text(tree.get("executor")),
         depends_on=_dependencies(lifecycle.get("depends_on")),
         autostart=state(lifecycle.get("autostart")),
+        supervision=supervision(lifecycle, around.supervision),
         unknown=(*made.unknown, *unknown),
         complete=made.complete,
     )

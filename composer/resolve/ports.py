@@ -86,6 +86,7 @@ def _port(kind: PortKind, entry: Entry, qos: QosTable, findings: list[Diagnostic
         result=template(tree.get("result"), findings),
         budget_ms=number(tree.get("budget_ms")),
         reentrant=flag(tree.get("reentrant"), default=False),
+        always_on=flag(tree.get("always_on"), default=False),
         external=flag(tree.get("external"), default=False),
         required=_required(tree.get("required")),
         description=plain_text(tree.get("description")),
@@ -135,6 +136,7 @@ def _timer(entry: Entry, findings: list[Diagnostic]) -> Timer:
         reaction=reaction(tree, span, findings),
         budget_ms=number(tree.get("budget_ms")),
         reentrant=flag(tree.get("reentrant"), default=False),
+        always_on=flag(tree.get("always_on"), default=False),
         description=plain_text(tree.get("description")),
     )
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from composer.catalog import Catalog
 from composer.diagnostics import Diagnostic
 from composer.model import (
+    DEFAULT_SUPERVISION,
     Executor,
     ExecutorKind,
     Node,
@@ -24,6 +25,7 @@ from composer.resolve.parameters import with_values
 from composer.resolve.qos import qos_table
 from composer.resolve.reading import (
     entries,
+    flag,
     integer,
     is_opaque,
     key,
@@ -31,6 +33,7 @@ from composer.resolve.reading import (
     text,
     text_or_opaque,
 )
+from composer.resolve.supervision import supervision
 from composer.resolve.types import NodeTypes
 from composer.source import Located, SourceFile, Span
 from composer.tree import Entry, Mapping, Tree
@@ -48,15 +51,18 @@ def resolve_system(
     namespace = _system_namespace(tree, overrides)
     joined, joints = connections(tree.get("connections"), namespace.value, qos)
     types = NodeTypes(catalog, qos, findings)
-    around = Surroundings(folder, namespace, types, qos, joints, overrides, findings)
+    written = tree.get("lifecycle")
+    lifecycle = written if isinstance(written, Mapping) else Mapping((), tree.span)
+    upkeep = supervision(lifecycle, DEFAULT_SUPERVISION)
+    around = Surroundings(folder, namespace, types, qos, joints, overrides, upkeep, findings)
     nodes = tuple(node(entry, around) for entry in entries(tree.get("nodes")))
-    lifecycle = tree.get("lifecycle")
-    autostart = state(lifecycle.get("autostart")) if isinstance(lifecycle, Mapping) else None
+    autostart = state(lifecycle.get("autostart"))
     system = System(
         name=_name(tree, "system"),
         source=source,
         nodes=nodes,
         span=_name_span(tree, "system"),
+        namespace=namespace.value,
         description=plain_text(tree.get("description")),
         connections=joined,
         chains=chains(tree.get("chains")),
@@ -64,6 +70,8 @@ def resolve_system(
         qos_references=tuple(qos.references),
         executors=tuple(_executor(entry) for entry in entries(tree.get("executors"))),
         autostart=autostart.value if autostart is not None else PrimaryState.ACTIVE,
+        supervision=upkeep,
+        implied_dependencies=flag(lifecycle.get("implied_dependencies"), default=True),
         unknown=_unknown_nodes(nodes, overrides),
     )
     return system, findings

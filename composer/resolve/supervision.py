@@ -1,0 +1,66 @@
+"""How nodes are kept up: what a node says itself, over what its system says for all."""
+
+from __future__ import annotations
+
+from composer.model import OnFailure, RestartBudget, Supervision, Watch
+from composer.resolve.reading import entries, integer, key, number, text
+from composer.source import Located
+from composer.tree import Entry, Mapping, Tree
+
+
+def supervision(lifecycle: Tree | None, default: Supervision) -> Supervision:
+    """Return what the ``lifecycle`` of a node or a system says, and ``default`` for the rest."""
+    if not isinstance(lifecycle, Mapping):
+        return default
+    timeout_ms = number(lifecycle.get("timeout_ms"))
+    return Supervision(
+        timeout_ms=default.timeout_ms if timeout_ms is None else timeout_ms.value,
+        on_failure=_on_failure(lifecycle.get("on_failure")) or default.on_failure,
+        restart=_restart(lifecycle.entry("restart"), default.restart),
+        watch=_watch(lifecycle.get("watch"), default.watch),
+    )
+
+
+def _on_failure(tree: Tree | None) -> Located[OnFailure] | None:
+    written = text(tree)
+    if written is None or written.value not in {item.value for item in OnFailure}:
+        return None
+    return written.map(OnFailure)
+
+
+def _restart(entry: Entry | None, default: RestartBudget) -> RestartBudget:
+    if entry is None or not isinstance(entry.value, Mapping):
+        return default
+    tree = entry.value
+    attempts = integer(tree.get("max_attempts"))
+
+    def milliseconds(name: str, otherwise: float) -> float:
+        found = number(tree.get(name))
+        return otherwise if found is None else found.value
+
+    return RestartBudget(
+        max_attempts=default.max_attempts if attempts is None else attempts.value,
+        window_ms=milliseconds("window_ms", default.window_ms),
+        backoff_ms=milliseconds("backoff_ms", default.backoff_ms),
+        backoff_max_ms=milliseconds("backoff_max_ms", default.backoff_max_ms),
+        span=entry.key.span,
+    )
+
+
+def _watch(tree: Tree | None, default: Watch) -> Watch:
+    if not isinstance(tree, Mapping):
+        return default
+    silence = tree.get("topic_silence_ms")
+    whole = number(silence)
+    topics = tuple(
+        (key(entry), limit)
+        for entry in entries(silence)
+        if (limit := number(entry.value)) is not None
+    )
+    said = silence is not None
+    return Watch(
+        silence_ms=whole if said else default.silence_ms,
+        topics=topics if said else default.topics,
+        callback_ms=number(tree.get("callback_ms")) or default.callback_ms,
+        max_errors=integer(tree.get("max_errors")) or default.max_errors,
+    )
