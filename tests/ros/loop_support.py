@@ -106,6 +106,12 @@ def peer(*arguments: object) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
+def wait_for_line(process: subprocess.Popen[str], wanted: str) -> None:
+    """Wait until a peer prints a line; Fast DDS may print others."""
+    assert process.stdout is not None
+    assert any(line.strip() == wanted for line in process.stdout), f"never printed: {wanted}"
+
+
 def last_line(process: subprocess.Popen[str]) -> str:
     """Wait for the end of a peer and return the last line it printed."""
     output, _ = process.communicate(timeout=PATIENCE_S)

@@ -14,7 +14,7 @@ from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 
 from composer.runtime.tasks import sleep
-from tests.ros.loop_support import KINDS, Bench, bench, last_line, peer, wait_until
+from tests.ros.loop_support import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
 
 ERRORS = [ValueError, SystemExit, KeyboardInterrupt]
 
@@ -183,8 +183,7 @@ class TestClient:
     @pytest.fixture
     def client(self, on: Bench) -> Iterator[ActionClient]:
         with peer("navigate", "navigate") as process:
-            assert process.stdout is not None
-            assert process.stdout.readline() == "serving\n"
+            wait_for_line(process, "serving")
             client = own_client(on)
             yield client
             on.loop.remove(client)

@@ -14,7 +14,7 @@ from rcl_interfaces.srv import GetLoggerLevels, SetParameters
 from std_srvs.srv import Trigger
 
 from composer.runtime.tasks import Future, sleep, within, wrap_rclpy_future
-from tests.ros.loop_support import KINDS, Bench, bench, last_line, peer, wait_until
+from tests.ros.loop_support import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
 
 ERRORS = [ValueError, SystemExit, KeyboardInterrupt]
 
@@ -95,8 +95,7 @@ def test_when_the_callback_raises_the_caller_gets_an_answer(
 def test_a_client_gets_the_answer_of_another_process(on: Bench) -> None:
     client = on.client(Trigger, "ask")
     with peer("serve", "ask") as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "serving\n"
+        wait_for_line(process, "serving")
         assert call(on, client, Trigger.Request()).message == "from the peer"
 
 

@@ -12,7 +12,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from std_msgs.msg import Int64, String
 
-from tests.ros.loop_support import KINDS, Bench, bench, last_line, peer, wait_until
+from tests.ros.loop_support import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
 
 
 @pytest.fixture(params=KINDS)
@@ -47,8 +47,7 @@ def test_messages_reach_another_process(on: Bench) -> None:
 
 def test_a_late_joiner_gets_what_was_latched(on: Bench) -> None:
     with peer("latched", "state", "kept") as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "published\n"
+        wait_for_line(process, "published")
         seen: list[str] = []
         on.subscribe(
             String,
