@@ -7,6 +7,7 @@ epoll itself counts in milliseconds.
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import select
 import time
@@ -67,7 +68,7 @@ class Poller:
 
     def wait(self, until_s: float | None) -> list[tuple[int, int]]:
         """Wait until something is written or ``time.monotonic()`` reaches ``until_s``."""
-        if until_s is None:
+        if until_s is None or until_s == math.inf:
             return self._epoll.poll(None, _AT_ONCE)
         if until_s <= time.monotonic():
             return self.ready()

@@ -12,7 +12,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Coroutine
 from functools import partial
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any, TypeVar
 
 from composer.runtime.handover import Handover
@@ -27,6 +27,7 @@ T = TypeVar("T")
 
 _ROUND = 64  # calls, then items of entities, before readiness is looked at again
 _PATIENCE = 256  # turns that go by before what may have more is served among what was announced
+_PAUSE_AFTER_FAULT_S = 0.01
 
 
 class Scheduler:
@@ -140,8 +141,9 @@ class Scheduler:
         while not self._stopping:
             try:
                 self._take_turns()
-            except BaseException as error:  # an asynchronous one, between two callbacks
+            except BaseException as error:  # between two callbacks: an asynchronous one, or ours
                 self._report(f"executor '{self._name}'", error)
+                sleep(_PAUSE_AFTER_FAULT_S)  # a lasting fault must not fill the log in a second
         self._wind_up()
 
     def _take_turns(self) -> None:

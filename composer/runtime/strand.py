@@ -13,7 +13,7 @@ from functools import partial
 from types import coroutine as awaitable_generator
 from typing import Any, Protocol, TypeVar
 
-from composer.runtime.tasks import Future
+from composer.runtime.tasks import Future, awaited_rclpy_future, wrap_rclpy_future
 
 T = TypeVar("T")
 
@@ -113,8 +113,10 @@ def _steps(turns: Turns, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, An
             finally:
                 turns.leave()
             raised = None
+            # rclpy's futures yield nothing and want to be polled: wait for them instead.
+            foreign = awaited_rclpy_future(coroutine) if yielded is None else None
             try:
-                yield yielded
+                yield yielded if foreign is None else wrap_rclpy_future(foreign)
             except GeneratorExit:
                 raise
             except BaseException as error:

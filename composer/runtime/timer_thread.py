@@ -55,8 +55,9 @@ class TimerThread:
                 if self._stopping:
                     return
                 due_s = self._timers.next_due_s()
-                if due_s is None or due_s > monotonic():
-                    self._changed.wait(None if due_s is None else due_s - monotonic())
+                remaining_s = threading.TIMEOUT_MAX if due_s is None else due_s - monotonic()
+                if remaining_s > 0.0:
+                    self._changed.wait(min(remaining_s, threading.TIMEOUT_MAX))
                     continue
                 due = self._timers.take_due()
             for call in due:

@@ -19,7 +19,9 @@ class ScheduledCall:
     def __init__(
         self, due_s: float, period_s: float | None, callback: Callable[[], object]
     ) -> None:
-        """Raise ValueError for a period that is not positive."""
+        """Raise ValueError for a period that is not positive and a time that is no number."""
+        if math.isnan(due_s):
+            raise ValueError("a delay must be a number")
         if period_s is not None and not period_s > 0:
             raise ValueError(f"a period must be positive, not {period_s:g} s")
         self.due_s = due_s

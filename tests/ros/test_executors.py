@@ -55,6 +55,16 @@ def test_a_cancelled_call_does_not_come(on: Bench) -> None:
     assert seen == ["after"]
 
 
+@pytest.mark.parametrize("delay_s", [1e12, float("inf")])
+def test_a_delay_may_be_longer_than_anybody_waits(on: Bench, delay_s: float) -> None:
+    on.loop.call_later(delay_s, lambda: None)
+    called: list[int] = []
+    on.loop.call_later(0.01, lambda: called.append(1))
+    wait_until(lambda: called)
+    assert on.loop.run(lambda: "alive", 5.0) == "alive"
+    assert on.reports == []
+
+
 def test_a_timer_keeps_its_rate(on: Bench) -> None:
     at: list[float] = []
     timer = on.loop.call_every(0.01, lambda: at.append(time.monotonic()))

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from rclpy.task import Future as RclpyFuture
 
+from composer.runtime.strand import Strand, Turns
 from composer.runtime.tasks import Future, Task, wrap_rclpy_future
 
 
@@ -23,7 +24,7 @@ class Calls:
             self.waiting.popleft()()
 
 
-def start(calls: Calls, awaited: Any) -> Future[Any]:
+def start(calls: Calls, awaited: Any, strand: Strand | None = None) -> Future[Any]:
     async def inner() -> Any:
         return await awaited
 
@@ -33,7 +34,8 @@ def start(calls: Calls, awaited: Any) -> Future[Any]:
     def report(what: str, error: BaseException) -> None:
         raise error
 
-    future = Task(outer(), calls.waiting.append, report, lambda _: None).start()
+    work = outer() if strand is None else strand.wrap(outer())
+    future = Task(work, calls.waiting.append, report, lambda _: None).start()
     calls.run()
     return future
 
@@ -47,6 +49,18 @@ def test_an_rclpy_future_is_not_polled() -> None:
     calls.run()
     assert outcome.result() == "answer"
     assert calls.called == 2
+
+
+def test_an_rclpy_future_is_not_polled_in_turns_either() -> None:
+    calls = Calls()
+    foreign = RclpyFuture()
+    outcome = start(calls, foreign, Turns(calls.waiting.append))
+    called = calls.called
+    calls.run()
+    assert calls.called == called
+    foreign.set_result("answer")
+    calls.run()
+    assert outcome.result() == "answer"
 
 
 def test_an_rclpy_future_that_failed_raises_where_it_is_awaited() -> None:

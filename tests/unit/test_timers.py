@@ -1,0 +1,102 @@
+"""The heap of scheduled calls, on the steady clock."""
+
+from __future__ import annotations
+
+import math
+from time import monotonic
+
+import pytest
+
+from composer.runtime.timers import ScheduledCall, TimerHeap
+
+
+def call(due_s: float, period_s: float | None = None) -> ScheduledCall:
+    return ScheduledCall(due_s, period_s, lambda: None)
+
+
+def test_gives_what_is_due_in_order_and_keeps_the_rest() -> None:
+    heap = TimerHeap()
+    now_s = monotonic()
+    late, soon, later = call(now_s - 2.0), call(now_s - 1.0), call(now_s + 60.0)
+    for item in (later, soon, late):
+        heap.add(item)
+    assert heap.next_s == late.due_s
+    assert heap.take_due() == [late, soon]
+    assert heap.take_due() == []
+    assert heap.next_due_s() == heap.next_s == later.due_s
+
+
+def test_calls_due_at_the_same_time_keep_their_order() -> None:
+    heap = TimerHeap()
+    due_s = monotonic() - 1.0
+    calls = [call(due_s) for _ in range(10)]
+    for item in calls:
+        heap.add(item)
+    assert heap.take_due() == calls
+
+
+def test_an_empty_heap_is_never_due() -> None:
+    heap = TimerHeap()
+    assert heap.next_due_s() is None
+    assert heap.next_s == math.inf
+    assert heap.take_due() == []
+
+
+def test_a_cancelled_call_is_not_given_and_not_waited_for() -> None:
+    heap = TimerHeap()
+    now_s = monotonic()
+    due, next_one, last = call(now_s - 1.0), call(now_s + 30.0), call(now_s + 60.0)
+    for item in (due, next_one, last):
+        heap.add(item)
+    due.cancel()
+    next_one.cancel()
+    next_one.cancel()
+    assert heap.take_due() == []
+    assert heap.next_due_s() == last.due_s
+
+
+def test_cancelled_calls_do_not_pile_up() -> None:
+    heap = TimerHeap()
+    for _ in range(10_000):
+        item = call(monotonic() + 60.0)
+        heap.add(item)
+        item.cancel()
+    assert len(heap._heap) < 200
+
+
+def test_a_periodic_call_keeps_its_beat_and_skips_what_it_missed() -> None:
+    heap = TimerHeap()
+    begin_s = monotonic() - 3.5
+    item = call(begin_s, period_s=1.0)
+    heap.repeat(item)  # called 3.5 periods late
+    assert item.due_s == pytest.approx(begin_s + 4.0)
+    assert heap.next_s == item.due_s
+
+
+def test_a_periodic_call_in_time_comes_a_period_later() -> None:
+    heap = TimerHeap()
+    due_s = monotonic()
+    item = call(due_s, period_s=5.0)
+    heap.repeat(item)
+    assert item.due_s == pytest.approx(due_s + 5.0)
+
+
+@pytest.mark.parametrize("period_s", [None, 1.0])
+def test_what_is_cancelled_or_once_only_is_not_repeated(period_s: float | None) -> None:
+    heap = TimerHeap()
+    item = call(monotonic(), period_s)
+    if period_s is not None:
+        item.cancel()
+    heap.repeat(item)
+    assert heap.next_due_s() is None
+
+
+@pytest.mark.parametrize("period_s", [0.0, -1.0, math.nan])
+def test_a_period_must_be_positive(period_s: float) -> None:
+    with pytest.raises(ValueError, match="a period must be positive"):
+        call(0.0, period_s)
+
+
+def test_a_time_must_be_a_number() -> None:
+    with pytest.raises(ValueError, match="must be a number"):
+        call(math.nan)
