@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Annotated, Any
 
 import typer
@@ -85,7 +89,7 @@ def send_goal(
     """
     type_name, goal = split_values(values or [])
     with ros_session("compose action", timeout) as (session, deadline):
-        from composer.runtime.inspect_calls import sent_goal
+        from composer.runtime.inspect_calls import Sending, sent_goal
         from composer.runtime.inspect_names import Names
         from composer.runtime.inspect_values import to_plain
 
@@ -96,16 +100,35 @@ def send_goal(
             if feedback:
                 _print("feedback", to_plain(message), json)
 
-        with sent_goal(session, deadline, (name, found), goal, show) as sent:
+        with (
+            _interrupts() as interrupted,
+            sent_goal(session, deadline, Sending(name, found, goal, show, interrupted)) as sent,
+        ):
             say("goal accepted, Ctrl-C cancels it")
-            try:
-                outcome = sent.result()
-            except KeyboardInterrupt:
+            outcome = sent.result(interrupted)
+            if outcome is None:
                 say("canceling")
                 outcome = sent.cancel()
         _print("result", to_plain(outcome.result), json, outcome.status)
     if outcome.status != "succeeded":
         raise typer.Exit(FINDINGS)
+
+
+@contextmanager
+def _interrupts() -> Iterator[Callable[[], bool]]:
+    """Take the first Ctrl-C as a wish, which what is yielded tells; the second ends all."""
+    asked = threading.Event()
+
+    def take(*_: object) -> None:
+        if asked.is_set():
+            raise KeyboardInterrupt
+        asked.set()
+
+    before = signal.signal(signal.SIGINT, take)
+    try:
+        yield asked.is_set
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _print(kind: str, content: Any, json: bool, status: str | None = None) -> None:

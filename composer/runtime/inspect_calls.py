@@ -21,6 +21,9 @@ _STATUS = {
 }
 _CANCEL_PATIENCE_S = 2.0
 
+#: Says whether somebody wants the end.
+Stop = Callable[[], bool]
+
 
 class Rejected(RosError):
     """The action server did not take the goal."""
@@ -51,45 +54,58 @@ class Goal:
         self._handle = handle
         self._result: Future = handle.get_result_async()
 
-    def result(self, deadline: Deadline | None = None) -> Outcome:
-        """Wait for the end of the goal. Raises NoAnswer at the deadline."""
-        if not self._wait(self._result, deadline):
-            raise NoAnswer("the goal has not ended in time")
-        response = self._result.result()
-        return Outcome(_STATUS.get(response.status, "unknown"), response.result)
+    def result(self, stop: Stop) -> Outcome | None:
+        """Wait for the end of the goal; None when ``stop`` comes first."""
+        while not self._result.done() and not stop():
+            self._session.spin_once(Deadline(1.0))
+        return self._outcome() if self._result.done() else None
 
     def cancel(self) -> Outcome:
         """Ask for the end of the goal and wait for it. Raises NoAnswer when it does not end."""
         patience = Deadline(_CANCEL_PATIENCE_S)
-        self._wait(self._handle.cancel_goal_async(), patience)
-        return self.result(patience)
+        self._handle.cancel_goal_async()
+        if self._session.wait_for(lambda: self._result.done() or None, patience) is None:
+            raise NoAnswer("the goal was to be canceled and goes on")
+        return self._outcome()
 
-    def _wait(self, future: Future, deadline: Deadline | None) -> bool:
-        while not future.done() and (deadline is None or not deadline.passed):
-            self._session.spin_once(deadline or Deadline(1.0))
-        return bool(future.done())
+    def _outcome(self) -> Outcome:
+        response = self._result.result()
+        return Outcome(_STATUS.get(response.status, "unknown"), response.result)
+
+
+@dataclass(frozen=True, slots=True)
+class Sending:
+    """A goal, which is YAML, for the action ``name`` of a type, and who follows it."""
+
+    name: str
+    type_name: str
+    goal: str
+    on_feedback: Callable[[Any], None]
+    stop: Stop
 
 
 @contextmanager
-def sent_goal(
-    session: Session,
-    deadline: Deadline,
-    target: tuple[str, str],
-    goal: str,
-    on_feedback: Callable[[Any], None],
-) -> Iterator[Goal]:
-    """Send a goal, which is YAML, to ``target`` (name and type); it is taken in the block.
+def sent_goal(session: Session, deadline: Deadline, sending: Sending) -> Iterator[Goal]:
+    """Send a goal; the block begins once it is taken.
 
-    Raises BadValue, NoAnswer, Rejected.
+    Raises BadValue, NoAnswer, Rejected, and KeyboardInterrupt when ``stop`` comes before the goal
+    is sent; a goal that is sent is waited for, so that it can be canceled.
     """
-    name, type_name = target
-    action = class_of(type_name)
-    message = compile_content(goal, action.Goal, "the goal")({})
+    name = sending.name
+    action = class_of(sending.type_name)
+    message = compile_content(sending.goal, action.Goal, "the goal")({})
     client = ActionClient(session.node, action, name)
     try:
-        if not session.wait_for(lambda: client.server_is_ready() or None, deadline):
+        ready = session.wait_for(
+            lambda: client.server_is_ready() or sending.stop() or None, deadline
+        )
+        if sending.stop():
+            raise KeyboardInterrupt
+        if not ready:
             raise NoAnswer(f"no server of '{name}' was there within {deadline.timeout_s:g} s")
-        answer: Future = client.send_goal_async(message, lambda item: on_feedback(item.feedback))
+        answer: Future = client.send_goal_async(
+            message, lambda item: sending.on_feedback(item.feedback)
+        )
         if not session.wait_for(lambda: answer.done() or None, deadline):
             raise NoAnswer(f"'{name}' did not say within {deadline.timeout_s:g} s if it takes it")
         if not answer.result().accepted:

@@ -21,7 +21,8 @@ PEER = Path(__file__).with_name("hand_written.py")
 def peer() -> Iterator[subprocess.Popen[str]]:
     process = subprocess.Popen([sys.executable, str(PEER)], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
-    assert process.stdout.readline() == "ready\n"
+    # Fast DDS may print there first, about what a killed process left behind.
+    assert "ready\n" in process.stdout
     yield process
     process.kill()
     process.wait()
