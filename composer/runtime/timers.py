@@ -20,10 +20,10 @@ class ScheduledCall:
         self, due_s: float, period_s: float | None, callback: Callable[[], object]
     ) -> None:
         """Raise ValueError for a period that is not positive and a time that is no number."""
-        if math.isnan(due_s):
-            raise ValueError("a delay must be a number")
         if period_s is not None and not period_s > 0:
             raise ValueError(f"a period must be positive, not {period_s:g} s")
+        if math.isnan(due_s):
+            raise ValueError("a delay must be a number")
         self.due_s = due_s
         self.period_s = period_s
         self.callback = callback
