@@ -95,7 +95,7 @@ def _handler(
 
 
 def _blocks(call: Call) -> bool:
-    if call.awaited:
+    if call.awaited or call.deferred:
         return False
     return bool(_BLOCKING.fullmatch(call.name) or _SYNCHRONOUS_CALL.fullmatch(call.name))
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from composer.behavior_source import BehaviorSource
 from composer.checks.behaviors import GENERAL_HANDLERS, behaviors, handlers
 from composer.checks.context import Context
-from composer.checks.python_calls import calls_of
+from composer.checks.python_calls import Call, calls_of
 from composer.model import Node, Port, PortKind, Reaction, Timer
 
 _PUBLISH = re.compile(r"self\.publishers\.(?P<port>\w+)\.publish")
@@ -92,26 +92,27 @@ def _published(reactions: list[Reaction]) -> frozenset[str]:
 def _published_by_method(source: BehaviorSource) -> Mapping[str, frozenset[str]]:
     """Return the publishers that the methods of a behaviour use.
 
-    A method that handlers lead to is not listed on its own.
+    A method that handlers lead to is not listed on its own. What a function within a method
+    publishes is listed under no name: it may run at any time.
     """
-    calls = {
-        method.name: frozenset(call.name for call in calls_of(source, method))
-        for method in source.methods
-    }
+    calls = {method.name: tuple(calls_of(source, method)) for method in source.methods}
     handled = {
-        called.removeprefix("self.")
+        call.name.removeprefix("self.")
         for name, found in calls.items()
         if name.startswith(_ENTRIES)
-        for called in found
+        for call in found
+        if not call.deferred
     }
-    return {
-        name: ports
+    direct = {
+        name: _ports_in(call for call in found if not call.deferred)
         for name, found in calls.items()
-        if (name.startswith(_ENTRIES) or name not in handled) and (ports := _ports_in(found))
+        if name.startswith(_ENTRIES) or name not in handled
     }
+    deferred = _ports_in(call for found in calls.values() for call in found if call.deferred)
+    return {name: ports for name, ports in {**direct, "": deferred}.items() if ports}
 
 
-def _ports_in(calls: frozenset[str]) -> frozenset[str]:
+def _ports_in(calls: Iterable[Call]) -> frozenset[str]:
     """Return the ports of calls such as ``self.publishers.status.publish``."""
-    matches = (_PUBLISH.fullmatch(call) for call in calls)
+    matches = (_PUBLISH.fullmatch(call.name) for call in calls)
     return frozenset(found["port"] for found in matches if found is not None)

@@ -15,11 +15,15 @@ _Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A call: the dotted name of what is called, imports followed, and whether it is awaited."""
+    """A call: the dotted name of what is called, imports followed, and whether it is awaited.
+
+    ``deferred`` is true in a function within the method: it may run later, or in a thread.
+    """
 
     name: str
     span: Span
     awaited: bool
+    deferred: bool = False
 
 
 def calls_of(source: BehaviorSource, method: Method) -> Iterator[Call]:
@@ -30,7 +34,8 @@ def calls_of(source: BehaviorSource, method: Method) -> Iterator[Call]:
         for call in _calls(current.span):
             yield call
             name = call.name.removeprefix("self.")
-            following = source.method(name) if call.name.startswith("self.") else None
+            is_own = call.name.startswith("self.") and not call.deferred
+            following = source.method(name) if is_own else None
             if following is not None and name not in seen:
                 seen.add(name)
                 pending.append(following)
@@ -71,20 +76,19 @@ def _imports(tree: ast.Module) -> dict[str, str]:
 def _calls_in(
     function: _Function, imports: Mapping[str, str], source: SourceFile
 ) -> Iterator[Call]:
-    """Yield the calls in a function; functions within it may run elsewhere and are left out."""
+    """Yield the calls in a function, in the order of the text."""
     awaited: set[int] = set()
-    pending: list[ast.AST] = list(reversed(function.body))
+    pending: list[tuple[ast.AST, bool]] = [(node, False) for node in reversed(function.body)]
     while pending:
-        node = pending.pop()
-        if isinstance(node, _Function | ast.Lambda | ast.ClassDef):
-            continue
+        node, deferred = pending.pop()
         if isinstance(node, ast.Await):
             awaited.add(id(node.value))
         if isinstance(node, ast.Call):
             name = _dotted(node.func, imports)
             if name:
-                yield Call(name, _place(node.func, source), id(node) in awaited)
-        pending.extend(reversed(list(ast.iter_child_nodes(node))))
+                yield Call(name, _place(node.func, source), id(node) in awaited, deferred)
+        within = deferred or isinstance(node, _Function | ast.Lambda | ast.ClassDef)
+        pending.extend((child, within) for child in reversed(list(ast.iter_child_nodes(node))))
 
 
 def _dotted(node: ast.expr, imports: Mapping[str, str]) -> str:
