@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
@@ -18,6 +19,7 @@ class Severity(Enum):
     INFO = "info"
 
 
+_CODE_OR_BAND = re.compile(r"RC\d{1,3}")
 _YAML_WORDS = {None: "null", True: "true", False: "false"}
 
 #: How much of a value from a file is repeated in a message, in characters.
@@ -40,6 +42,12 @@ class Rule:
     why: str
     bad: str
     good: str
+
+    def is_meant_by(self, text: str) -> bool:
+        """Say whether ``text`` is the rule's name, its code, or the beginning of it (``RC3``)."""
+        if text == self.name:
+            return True
+        return _CODE_OR_BAND.fullmatch(text) is not None and self.code.startswith(text)
 
 
 @dataclass(frozen=True, slots=True)

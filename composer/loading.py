@@ -6,18 +6,21 @@ it, so that one run shows every finding (DESIGN: The way data flows).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from composer.catalog import Catalog, interface_folders
-from composer.checks import Context, run_checks
+from composer.checks import Context, all_checks, run_checks
 from composer.checks.ignores import without_ignored
-from composer.diagnostics import Diagnostic, Severity, has_errors, in_order
+from composer.checks.unused_node_type import unused_node_types
+from composer.diagnostics import Diagnostic, Severity, has_errors, in_order, registered_rules
 from composer.document import parse_bytes, read_document
 from composer.expand import expand
 from composer.interfaces import Interfaces
 from composer.model import System
+from composer.project import Project, Settings
+from composer.project.choices import told, wrong_choices
 from composer.resolve import Overrides, check_kind, read_overrides, resolve
 from composer.schema import check_schema, kind_of
 from composer.source import SourceFile
@@ -28,12 +31,14 @@ from composer.tree import Mapping
 class Loading:
     """What came of a file. ``system`` is None when too little of it could be read.
 
-    ``catalog`` and ``interfaces`` are what the checks knew; ``source`` is the text.
+    ``source`` is the text, ``project`` what it belongs to; ``catalog`` and ``interfaces`` are what
+    the checks knew.
     """
 
     system: System | None
     diagnostics: list[Diagnostic]
     source: SourceFile
+    project: Project
     catalog: Catalog
     interfaces: Interfaces
 
@@ -63,7 +68,7 @@ def load(
     """
     tree, source, findings = read_document(path, shown)
     overrides, found = read_overrides(parameter_overrides, namespace)
-    known = _Known.of(path, interfaces)
+    known = _Known.of(_real_folder(path), interfaces)
     return _load(tree, source, [*findings, *found], known, overrides)
 
 
@@ -72,7 +77,22 @@ def load_bytes(
 ) -> Loading:
     """Do the same for what came from elsewhere, as if it were a file in ``folder``."""
     tree, source, findings = parse_bytes(content, shown)
-    return _load(tree, source, findings, _Known.of(folder / shown, interfaces), Overrides())
+    return _load(
+        tree, source, findings, _Known.of(_real_folder(folder / shown), interfaces), Overrides()
+    )
+
+
+def project_findings(loadings: Collection[Loading]) -> list[Diagnostic]:
+    """Return what is to be said of files only when they are looked at together."""
+    loaded = [
+        (loading.system, loading.catalog) for loading in loadings if loading.system is not None
+    ]
+    settings = {loading.source.path: loading.project.settings for loading in loadings}
+    findings: list[Diagnostic] = []
+    for finding in unused_node_types(loaded):
+        kept = without_ignored([finding], finding.primary.file, complete=False)
+        findings += told(kept, settings[finding.primary.file.path])
+    return in_order(findings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,17 +100,17 @@ class _Known:
     """What a file may refer to."""
 
     folder: Path
+    project: Project
     catalog: Catalog
     interfaces: Interfaces
 
     @classmethod
-    def of(cls, path: Path, interfaces: Interfaces | None) -> _Known:
-        known = (
-            interfaces
-            if interfaces is not None
-            else Interfaces.load(interface_folders(path.parent))
-        )
-        return cls(path.parent.resolve(), Catalog.for_file(path), known)
+    def of(cls, folder: Path, interfaces: Interfaces | None) -> _Known:
+        project = Project.at(folder)
+        known = interfaces
+        if known is None:
+            known = Interfaces.load(interface_folders(project))
+        return cls(folder, project, Catalog.of(project), known)
 
 
 def _load(
@@ -109,7 +129,22 @@ def _load(
     # In a node type alone much goes unsaid that its comments may be about.
     judged = system is not None and not system.node_type
     kept = without_ignored(findings, source, complete=judged)
-    return Loading(system, in_order(kept), source, known.catalog, known.interfaces)
+    settings = known.project.settings
+    chosen = [*told(kept, settings), *known.project.findings, *_wrong_choices(settings)]
+    return Loading(system, in_order(chosen), source, known.project, known.catalog, known.interfaces)
+
+
+def _wrong_choices(settings: Settings) -> Iterator[Diagnostic]:
+    all_checks()  # their rules are known once they are imported
+    return wrong_choices(settings, tuple(registered_rules()))
+
+
+def _real_folder(path: Path) -> Path:
+    """Return the folder that a file is in; of a link, the one of what it leads to."""
+    try:
+        return path.resolve().parent
+    except (OSError, RuntimeError, ValueError):  # told when it is read
+        return Path.cwd()
 
 
 def _resolved(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Generic, TypeVar
 
 T = TypeVar("T")
@@ -62,3 +63,11 @@ class Located(Generic[T]):
 
     def __str__(self) -> str:
         return str(self.value)
+
+
+def shown_path(path: Path) -> str:
+    """Return ``path`` as people know it: relative to the current folder where it is below it."""
+    try:
+        return str((path.parent.resolve() / path.name).relative_to(Path.cwd()))
+    except (OSError, RuntimeError, ValueError):
+        return str(path)

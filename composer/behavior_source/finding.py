@@ -13,9 +13,9 @@ from composer.behavior_source.modules import (
     relative_module_file,
 )
 from composer.behavior_source.syntax import Class, Import, Method, Module, read_module
-from composer.catalog import shown_path
 from composer.model import BehaviorReference
-from composer.source import Span
+from composer.project import Project
+from composer.source import Span, shown_path
 
 #: A behaviour that reaches into more files than this is not followed further.
 MAXIMUM_MODULES = 32
@@ -57,15 +57,15 @@ class BehaviorSource:
 
 def find_behavior(reference: BehaviorReference) -> BehaviorSource:
     """Read what ``reference`` names as far as syntax tells. Never raises, never imports."""
-    path = module_file(reference.module, reference.folder)
-    if path is None:
+    reader = _Reader(reference.folder, Project.at(reference.folder))
+    try:
+        path = module_file(reference.module, reference.folder)
+        module = reader.module(path) if path is not None else None
+    except Unreadable as error:
+        return BehaviorSource(reference, module_found=True, problem=str(error))
+    if module is None:
         compiled = is_compiled(reference.module)
         return BehaviorSource(reference, module_found=compiled, class_found=compiled)
-    reader = _Reader(reference.folder)
-    try:
-        module = reader.module(path)
-    except Unreadable as error:
-        return BehaviorSource(reference, module_found=True, path=path, problem=str(error))
     names = tuple(module.classes)
     start = reader.lookup(module, reference.class_name)
     if start is None:
@@ -102,6 +102,7 @@ class _Reader:
     """Follows names from module to module."""
 
     folder: Path
+    project: Project
     modules: dict[Path, Module] = field(default_factory=dict)
 
     def module(self, path: Path) -> Module:
@@ -146,15 +147,20 @@ class _Reader:
         return None
 
     def _imported_module(self, module: Module, imported: Import) -> Module | None:
-        if imported.level:
-            path = relative_module_file(imported.module, imported.level, module.path)
-        else:
-            beside = module_file(imported.module, module.path.parent)
-            path = beside or module_file(imported.module, self.folder)
         try:
+            path = self._imported_file(module, imported)
             return self.module(path) if path is not None else None
         except Unreadable:
             return None
+
+    def _imported_file(self, module: Module, imported: Import) -> Path | None:
+        if not imported.level:
+            beside = module_file(imported.module, module.path.parent)
+            return beside or module_file(imported.module, self.folder)
+        path = relative_module_file(imported.module, imported.level, module.path)
+        if path is None or (self.project.holds(module.path) and not self.project.holds(path)):
+            return None
+        return path
 
     def _is_plain(self, module: Module, base: str) -> bool:
         if base == "object":

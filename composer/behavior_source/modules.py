@@ -10,7 +10,7 @@ import tokenize
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from composer.catalog import project_nodes
+from composer.project import Project
 
 MAXIMUM_BYTES = 250_000
 
@@ -25,17 +25,17 @@ class Unreadable(Exception):
 def module_file(module: str, folder: Path) -> Path | None:
     """Return the file of ``module``, a dotted name, or None.
 
-    It is looked for beside the YAML file (``folder``), in the project's ``nodes`` folder, and where
-    Python would find it.
+    It is looked for beside the YAML file (``folder``), in the project's folders of node types, and
+    where Python would find it. Raises Unreadable for a link that leads out of the project.
     """
     parts = module.split(".")
     if not all(part.isidentifier() for part in parts):
         return None
-    project = project_nodes(folder)
-    for base in dict.fromkeys((folder, project) if project is not None else (folder,)):
+    project = Project.at(folder)
+    for base in dict.fromkeys((folder, *project.node_folders)):
         found = _below(base, parts)
         if found is not None:
-            return found
+            return _held(found, project)
     return _installed(parts)
 
 
@@ -87,6 +87,12 @@ def _below(base: Path, parts: Sequence[str]) -> Path | None:
     if parts:
         candidates.append(path.with_name(f"{path.name}.py"))
     return next((file for file in candidates if _exists(file)), None)
+
+
+def _held(path: Path, project: Project) -> Path:
+    if not project.holds(path):
+        raise Unreadable("is a link that leads out of the project")
+    return path
 
 
 def _exists(path: Path) -> bool:

@@ -40,6 +40,10 @@ def check(context: Context) -> Iterator[Diagnostic]:
             continue
         if context.catalog.find(name.value) is not None:
             continue  # the file is there but broken, and that has been said
+        if context.catalog.stray(name.value) is not None:
+            message = f"the file of node type '{name}' is a link that leads out of the project"
+            yield Diagnostic(RULE, message, name.span, hint="copy the file it leads to")
+            continue
         yield Diagnostic(
             RULE,
             f"node '{node.name}' is of type '{name}', which does not exist",

@@ -67,8 +67,9 @@ def show(
 def _interfaces() -> Interfaces:
     from composer.catalog import interface_folders
     from composer.interfaces import Interfaces
+    from composer.project import Project
 
-    return Interfaces.load(interface_folders(Path.cwd()))
+    return Interfaces.load(interface_folders(Project.at(Path.cwd())))
 
 
 def _parts(found: Any) -> list[Message]:

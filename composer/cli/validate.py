@@ -29,6 +29,7 @@ EPILOG = examples(
 
 
 _STDIN = Path("-")
+_NAMED = 3  # of many files
 
 
 class Format(StrEnum):
@@ -55,6 +56,7 @@ def validate(
             show_default=False,
         ),
     ],
+    *,
     output_format: Annotated[
         Format | None,
         typer.Option(
@@ -64,20 +66,39 @@ def validate(
             show_default=False,
         ),
     ] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Warnings count as errors do.")] = False,
+    strict: Annotated[
+        bool | None,
+        typer.Option(
+            "--strict/--no-strict",
+            help="Warnings count as errors do. Default: as the project says, else not.",
+            show_default=False,
+        ),
+    ] = None,
     select: Rules = None,
     ignore: Rules = None,
+    stdin_name: Annotated[
+        str,
+        typer.Option(
+            metavar="PATH", help="What stdin is called; its node types are looked for there."
+        ),
+    ] = "<stdin>",
 ) -> None:
     """Check systems and node types without starting anything. Needs no ROS.
 
+    What holds for a whole project can be said in its composer.yaml, or in the table [tool.composer]
+    of its pyproject.toml: strict, select, ignore, severity, nodes, interfaces.
+
     Exit code 1 when there is an error (with --strict: or a warning).
     """
-    checked = _check(paths)
+    checked = _check(paths, stdin_name)
     findings = _chosen(checked.findings, select or [], ignore or [])
     _print(findings, output_format or _default_format())
     closing = "" if findings else ": clean"
     say(f"{checked.files} file{'' if checked.files == 1 else 's'} checked{closing}")
-    if any(_weighs(finding, strict) for finding in findings):
+    if checked.foreign:
+        say(f"left alone, no 'system:' or 'node:' in it: {_first(checked.foreign)}")
+    weighs_warnings = checked.strict if strict is None else strict
+    if any(_weighs(finding, weighs_warnings) for finding in findings):
         raise typer.Exit(FINDINGS)
 
 
@@ -85,28 +106,44 @@ def validate(
 class _Checked:
     files: int
     findings: list[Diagnostic]
+    strict: bool
+    foreign: tuple[Path, ...]
 
 
-def _check(paths: Sequence[Path]) -> _Checked:
-    from composer.catalog import find_files
-    from composer.loading import load, load_bytes
+def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
+    from composer.document.limits import MAX_BYTES
+    from composer.files import find_files
+    from composer.loading import load, load_bytes, project_findings
 
     for path in paths:
         if path != _STDIN and not path.exists():
             raise UsageFailure(f"there is no file or folder '{path}'")
     found = find_files(path for path in paths if path != _STDIN)
-    findings: list[Diagnostic] = []
+    loadings = [load(path, shown=str(path)) for path in found.files]
     if _STDIN in paths:
-        content = sys.stdin.buffer.read()
-        findings += load_bytes(content, Path.cwd(), shown="<stdin>").diagnostics
-    for path in found:
-        findings += load(path, shown=str(path)).diagnostics
-    files = len(found) + (_STDIN in paths)
-    if not files:
+        content = sys.stdin.buffer.read(MAX_BYTES + 1)
+        loadings.insert(0, load_bytes(content, Path.cwd(), shown=stdin_name))
+    findings = list(found.findings)
+    findings += (finding for loading in loadings for finding in loading.diagnostics)
+    findings += project_findings(loadings)
+    if not loadings and not findings:
         raise UsageFailure("there is no system and no node type in " + ", ".join(map(str, paths)))
     # A node type is read with each system that uses it: its findings are told once.
     once = {(str(finding.primary), finding): finding for finding in findings}
-    return _Checked(files, list(once.values()))
+    return _Checked(
+        files=len(loadings),
+        findings=list(once.values()),
+        strict=any(loading.project.settings.strict for loading in loadings),
+        foreign=found.foreign,
+    )
+
+
+def _first(paths: Sequence[Path]) -> str:
+    """Return some of many paths."""
+    from composer.report.display import visible
+
+    named = ", ".join(visible(str(path)) for path in paths[:_NAMED])
+    return named if len(paths) <= _NAMED else f"{named} and {len(paths) - _NAMED} more"
 
 
 def _chosen(findings: list[Diagnostic], select: list[str], ignore: list[str]) -> list[Diagnostic]:

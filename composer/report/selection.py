@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable
 
 from composer.diagnostics import Diagnostic, Rule, nearest
-
-_CODE_OR_BAND = re.compile(r"RC\d{1,3}")
 
 
 class UnknownRule(Exception):
@@ -31,20 +28,14 @@ def chosen(
     """
     wanted, unwanted = list(select), list(ignore)
     for text in [*wanted, *unwanted]:
-        if not any(_is_meant(rule, text) for rule in rules):
+        if not any(rule.is_meant_by(text) for rule in rules):
             raise UnknownRule(text, _close(text, rules))
     return [
         diagnostic
         for diagnostic in diagnostics
-        if (not wanted or any(_is_meant(diagnostic.rule, text) for text in wanted))
-        and not any(_is_meant(diagnostic.rule, text) for text in unwanted)
+        if (not wanted or any(diagnostic.rule.is_meant_by(text) for text in wanted))
+        and not any(diagnostic.rule.is_meant_by(text) for text in unwanted)
     ]
-
-
-def _is_meant(rule: Rule, text: str) -> bool:
-    if rule.name == text:
-        return True
-    return _CODE_OR_BAND.fullmatch(text) is not None and rule.code.startswith(text)
 
 
 def _close(text: str, rules: Iterable[Rule]) -> str | None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from composer.catalog import Catalog, shown_path
+from composer.catalog import Catalog
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, has_errors, register, shown
 from composer.document import read_document
 from composer.expand import expand, missing_variables
@@ -15,7 +15,7 @@ from composer.resolve.kinds import NODE, check_kind
 from composer.resolve.qos import QosTable
 from composer.resolve.reading import entries
 from composer.schema import check_schema
-from composer.source import Span
+from composer.source import Span, shown_path
 from composer.tree import Mapping, Plain, Tree, plain
 
 RULE = register(

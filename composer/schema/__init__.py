@@ -19,17 +19,18 @@ from composer.tree import Mapping, plain
 if TYPE_CHECKING:
     from jsonschema import Draft7Validator
 
-__all__ = ["SCHEMAS", "check_schema", "kind_of", "schema"]
+__all__ = ["KINDS", "SCHEMAS", "check_schema", "kind_of", "schema"]
 
-#: The kinds of file, each with a schema of that name; also the key that marks one.
-SCHEMAS = ("system", "node")
+#: The kinds of file about nodes, each with a schema of that name; also the key that marks one.
+KINDS = ("system", "node")
+SCHEMAS = (*KINDS, "project")
 
 _DEFINITIONS = "#/definitions/"
 
 
 def kind_of(tree: Mapping) -> str | None:
     """Return ``system`` or ``node``, by the first key of the two; None when there is neither."""
-    return next((entry.name for entry in tree if entry.name in SCHEMAS), None)
+    return next((entry.name for entry in tree if entry.name in KINDS), None)
 
 
 def check_schema(tree: Mapping, kind: str) -> list[Diagnostic]:

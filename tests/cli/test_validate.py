@@ -53,12 +53,15 @@ def test_a_finding_has_its_place_a_caret_and_a_hint(folder: Path) -> None:
 def test_a_folder_is_searched_for_systems_and_node_types_only(folder: Path) -> None:
     Path("nodes").mkdir()
     Path("nodes/relay.yaml").write_text("node: relay\n")
+    Path("fine.yaml").write_text("system: fine\nnodes:\n  one: {type: relay}\n")
     Path(".github").mkdir()
     Path(".github/workflow.yaml").write_text("on: push\n")
     Path("compose.yaml").write_text("services: {}\n")
     done = compose("validate", ".")
     assert done.code == 0
-    assert done.err == "2 files checked: clean\n"
+    assert done.err == (
+        "2 files checked: clean\nleft alone, no 'system:' or 'node:' in it: compose.yaml\n"
+    )
 
 
 def test_what_is_in_a_node_type_is_told_once_for_all_systems_that_use_it(folder: Path) -> None:
@@ -83,6 +86,42 @@ def test_stdin_is_a_dash(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     done = compose("validate", "-")
     assert done.code == 1
     assert "<stdin>:3:36" in done.out
+
+
+def test_stdin_may_be_called_what_it_is(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("robot/nodes").mkdir(parents=True)
+    Path("robot/nodes/wheel.yaml").write_text("node: wheel\n")
+    text = "system: robot\nnodes:\n  left: {type: wheel}\n  right: {type: whel}\n"
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
+    done = compose("validate", "-", "--stdin-name", "robot/unsaved.yaml")
+    assert "robot/unsaved.yaml:4:17" in done.out
+    assert "'whel'" in done.out
+    assert "'wheel', which" not in done.out
+
+
+def test_what_a_project_has_chosen_holds(folder: Path) -> None:
+    Path("composer.yaml").write_text("strict: true\nignore: [RC5]\nseverity: {RC231: info}\n")
+    Path("deep.yaml").write_text("system: deep\nnodes:\n  one: {namespace: a/b/c/d/e}\n")
+    done = compose("validate", "deep.yaml")
+    assert done.code == 0
+    assert done.out.startswith("info[RC231 deep-namespace]")
+    Path("composer.yaml").write_text("strict: true\n")
+    assert compose("validate", "deep.yaml").code == 1
+    assert compose("validate", "deep.yaml", "--no-strict").code == 0
+
+
+def test_wrong_settings_are_told_once(folder: Path) -> None:
+    Path("other.yaml").write_text(FINE)
+    Path("composer.yaml").write_text("ignore: [qos-implict]\nstrickt: true\n")
+    done = compose("validate", "fine.yaml", "other.yaml", "--format", "json")
+    found = [
+        (item["rule"], item["location"]["file"], item["location"]["line"], item["hint"])
+        for item in json.loads(done.out)["findings"]
+    ]
+    assert found == [
+        ("bad-setting", "composer.yaml", 1, "did you mean 'qos-implicit'?"),
+        ("unknown-key", "composer.yaml", 2, "did you mean 'strict'?"),
+    ]
 
 
 def test_a_path_that_does_not_exist_is_a_usage_error(folder: Path) -> None:

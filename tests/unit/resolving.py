@@ -11,6 +11,7 @@ from composer.diagnostics import Diagnostic
 from composer.document import parse_document
 from composer.expand import expand
 from composer.model import System
+from composer.project import Project
 from composer.resolve import read_overrides, resolve
 from composer.source import SourceFile, Span
 
@@ -29,7 +30,13 @@ def resolve_text(
     assert tree is not None, [finding.message for finding in findings]
     expanded, _ = expand(tree, {})
     overrides, found = read_overrides(settings, namespace)
-    system, more = resolve(expanded, source, Catalog((folder,)), folder=folder, overrides=overrides)
+    system, more = resolve(
+        expanded,
+        source,
+        Catalog((folder,), Project(folder, folder)),
+        folder=folder,
+        overrides=overrides,
+    )
     assert system is not None
     return system, [*found, *more]
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.catalog import find_files
 from composer.diagnostics import Severity
+from composer.files import find_files
 from composer.interfaces import Interfaces
 from composer.loading import Loading, load, load_bytes
 from composer.resources import nodes_folder, systems_folder
@@ -52,7 +52,7 @@ def test_a_good_system_can_run(tmp_path: Path, interfaces: Interfaces) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", find_files([systems_folder(), nodes_folder()]), ids=lambda path: path.stem
+    "path", find_files([systems_folder(), nodes_folder()]).files, ids=lambda path: path.stem
 )
 def test_everything_that_comes_with_the_composer_is_without_errors(path: Path) -> None:
     loading = load(path)

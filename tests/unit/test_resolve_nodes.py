@@ -282,11 +282,11 @@ def test_a_variable_without_value_makes_nothing_wrong() -> None:
     assert len(relay.timers) == 1
 
 
-def test_a_file_that_is_neither_has_a_finding() -> None:
+def test_a_file_that_is_neither_has_a_finding(tmp_path: Path) -> None:
     source = SourceFile("compose.yaml", "nodes: {}\n")
     tree, _ = parse_document(source)
     assert tree is not None
-    system, (finding,) = resolve(tree, source, Catalog(()))
+    system, (finding,) = resolve(tree, source, Catalog.for_file(tmp_path / "compose.yaml"))
     assert system is None
     assert finding.message == "'compose.yaml' is neither a system nor a node type"
     assert quoted(finding.primary) == "nodes"

@@ -1,0 +1,86 @@
+"""What belongs together: a folder with its systems, node types and settings.
+
+A project's root is the nearest folder with a ``composer.yaml``, or with a ``pyproject.toml`` that
+has a table ``[tool.composer]``; without either the folder above the nearest ``nodes``, else the
+folder itself. Nothing that a file refers to is read from outside of it, not through links either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from composer.diagnostics import Diagnostic
+from composer.project.settings import Settings, read_settings
+from composer.project.sources import SETTINGS_FILE, find_settings
+
+__all__ = ["INTERFACES", "NODES", "SETTINGS_FILE", "Project", "Settings"]
+
+NODES = "nodes"
+INTERFACES = "interfaces"
+
+
+@dataclass(frozen=True, slots=True)
+class Project:
+    """A project as seen from ``folder``, a folder in it. ``findings`` are about its settings."""
+
+    root: Path
+    folder: Path
+    settings: Settings = field(default_factory=Settings)
+    findings: tuple[Diagnostic, ...] = ()
+
+    @classmethod
+    def at(cls, folder: Path) -> Project:
+        """Return the project that ``folder`` belongs to."""
+        start = folder.resolve()
+        found = find_settings(start)
+        if found is None:
+            nodes = _nearest(NODES, (start, *start.parents))
+            return cls(start if nodes is None else nodes.parent, start)
+        settings, findings = read_settings(found)
+        return cls(found.root, start, settings, (*found.findings, *findings))
+
+    @property
+    def node_folders(self) -> tuple[Path, ...]:
+        """Where the project's node types are."""
+        return self._folders(self.settings.nodes, NODES)
+
+    @property
+    def interface_folders(self) -> tuple[Path, ...]:
+        """Where the sources of the project's interface packages are."""
+        return self._folders(self.settings.interfaces, INTERFACES)
+
+    def holds(self, path: Path) -> bool:
+        """Say whether ``path`` is in the project, whatever links it leads through."""
+        try:
+            return path.resolve().is_relative_to(self.root)
+        except (OSError, RuntimeError, ValueError):  # a link to itself, or no path at all
+            return False
+
+    def _folders(self, chosen: tuple[Path, ...] | None, usual: str) -> tuple[Path, ...]:
+        if chosen is not None:
+            return chosen
+        nearest = _nearest(usual, self._ancestors())
+        if nearest is None or (nearest.is_symlink() and not self.holds(nearest)):
+            return ()
+        return (nearest,)
+
+    def _ancestors(self) -> Iterator[Path]:
+        """Yield the folders from ``folder`` up to the root; to the top where there is no such."""
+        for ancestor in (self.folder, *self.folder.parents):
+            yield ancestor
+            if ancestor == self.root and self.settings.source is not None:
+                return
+
+
+def _nearest(name: str, ancestors: Iterator[Path] | tuple[Path, ...]) -> Path | None:
+    candidates = (ancestor / name for ancestor in ancestors)
+    return next((path for path in candidates if _is_folder(path)), None)
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):  # too long, or not a path at all
+        return False

@@ -1,0 +1,76 @@
+"""The findings that a project wants to hear of, and how much they weigh there."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import replace
+
+from composer.diagnostics import Diagnostic, Rule, Severity, nearest, shown
+from composer.project.rules import BAD_SETTING
+from composer.project.settings import Settings
+from composer.source import Located
+
+
+def told(findings: Iterable[Diagnostic], settings: Settings) -> list[Diagnostic]:
+    """Return what is left of ``findings``, each with the severity that it has in the project.
+
+    Errors stay as they are: no system runs that has one.
+    """
+    if settings.source is None:
+        return list(findings)
+    kept = (finding for finding in findings if _is_told(finding.rule, settings))
+    return [_weighed(finding, settings) for finding in kept]
+
+
+def wrong_choices(settings: Settings, rules: Collection[Rule]) -> Iterator[Diagnostic]:
+    """Yield what is wrong with the names of rules in ``settings``."""
+    for text in (*settings.select, *settings.ignore):
+        if not any(rule.is_meant_by(text.value) for rule in rules):
+            yield _unknown(text, rules)
+    for text in settings.ignore:
+        if any(_is_exactly(rule, text) and rule.severity is Severity.ERROR for rule in rules):
+            yield _about_error(text, "ignored")
+    for text, severity in settings.severity:
+        rule = next((rule for rule in rules if _is_exactly(rule, text)), None)
+        if rule is None:
+            yield _unknown(text, rules)
+        elif rule.severity is Severity.ERROR and severity is not Severity.ERROR:
+            yield _about_error(text, f"made {_WORDS[severity]}")
+
+
+_WORDS = {Severity.WARNING: "a warning", Severity.INFO: "an info"}
+
+
+def _is_told(rule: Rule, settings: Settings) -> bool:
+    if rule.severity is Severity.ERROR:
+        return True
+    if any(rule.is_meant_by(text.value) for text in settings.ignore):
+        return False
+    return not settings.select or any(rule.is_meant_by(text.value) for text in settings.select)
+
+
+def _weighed(finding: Diagnostic, settings: Settings) -> Diagnostic:
+    rule = finding.rule
+    if rule.severity is Severity.ERROR:
+        return finding
+    for text, severity in settings.severity:
+        if _is_exactly(rule, text) and severity is not rule.severity:
+            return replace(finding, rule=replace(rule, severity=severity))
+    return finding
+
+
+def _is_exactly(rule: Rule, text: Located[str]) -> bool:
+    return text.value in {rule.code, rule.name}
+
+
+def _unknown(text: Located[str], rules: Iterable[Rule]) -> Diagnostic:
+    names = [name for rule in rules for name in (rule.code, rule.name)]
+    message = f"no rule is called '{shown(text.value)}'"
+    close = nearest(text.value, names)
+    hint = f"did you mean '{close}'?" if close is not None else "'compose rule' lists the rules"
+    return Diagnostic(BAD_SETTING, message, text.span, hint=hint)
+
+
+def _about_error(text: Located[str], what: str) -> Diagnostic:
+    message = f"'{text}' is an error, which cannot be {what} for a whole project"
+    return Diagnostic(BAD_SETTING, message, text.span, hint="mend what it finds")

@@ -1,0 +1,95 @@
+"""What a project has chosen: settings from a tree, and what is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from composer.diagnostics import Diagnostic, Severity, shown
+from composer.project.rules import BAD_SETTING
+from composer.project.sources import Written
+from composer.schema import check_schema
+from composer.source import Located, SourceFile
+from composer.tree import Mapping, Scalar, Sequence
+
+_SCHEMA = "project"
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The choices of a project. ``source`` is where they were read; None where there are none.
+
+    ``nodes`` and ``interfaces`` are folders; None stands for the usual ones. The others are about
+    rules, by name, code or beginning of codes as they are written.
+    """
+
+    source: SourceFile | None = None
+    nodes: tuple[Path, ...] | None = None
+    interfaces: tuple[Path, ...] | None = None
+    strict: bool = False
+    select: tuple[Located[str], ...] = ()
+    ignore: tuple[Located[str], ...] = ()
+    severity: tuple[tuple[Located[str], Severity], ...] = ()
+
+
+def read_settings(written: Written) -> tuple[Settings, list[Diagnostic]]:
+    """Return the settings, those that are wrong left out, and what is wrong."""
+    tree = written.tree
+    if tree is None:
+        return Settings(written.source), []
+    findings = check_schema(tree, _SCHEMA)
+    strict = tree.get("strict")
+    settings = Settings(
+        written.source,
+        nodes=_folders(tree, "nodes", written.root, findings),
+        interfaces=_folders(tree, "interfaces", written.root, findings),
+        strict=isinstance(strict, Scalar) and strict.value is True,
+        select=tuple(_texts(tree, "select")),
+        ignore=tuple(_texts(tree, "ignore")),
+        severity=tuple(_severities(tree)),
+    )
+    return settings, findings
+
+
+def _folders(
+    tree: Mapping, name: str, root: Path, findings: list[Diagnostic]
+) -> tuple[Path, ...] | None:
+    if not isinstance(tree.get(name), Sequence):
+        return None
+    found = []
+    for text in _texts(tree, name):
+        folder = root / text.value
+        problem = _problem(folder, root)
+        if problem is None:
+            found.append(folder.resolve())
+        else:
+            message = f"'{shown(text.value)}' {problem}"
+            hint = "name a folder below the one that these settings are in"
+            findings.append(Diagnostic(BAD_SETTING, message, text.span, hint=hint))
+    return tuple(found)
+
+
+def _problem(folder: Path, root: Path) -> str | None:
+    try:
+        if not folder.resolve().is_relative_to(root):
+            return "leads out of the project"
+        return None if folder.is_dir() else "is not a folder"
+    except (OSError, RuntimeError, ValueError):  # too long, a link to itself, or no path at all
+        return "is not a folder"
+
+
+def _texts(tree: Mapping, name: str) -> Iterator[Located[str]]:
+    items = tree.get(name)
+    for item in items.items if isinstance(items, Sequence) else ():
+        if isinstance(item, Scalar) and isinstance(item.value, str):
+            yield Located(item.value, item.span)
+
+
+def _severities(tree: Mapping) -> Iterator[tuple[Located[str], Severity]]:
+    known = {severity.value: severity for severity in Severity}
+    chosen = tree.get("severity")
+    for entry in chosen if isinstance(chosen, Mapping) else ():
+        if isinstance(entry.value, Scalar) and entry.value.value in known:
+            severity = known[str(entry.value.value)]
+            yield Located(entry.name, entry.key.span), severity

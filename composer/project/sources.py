@@ -1,0 +1,104 @@
+"""Where a project keeps its settings, read as a located tree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from composer.diagnostics import Diagnostic, Label
+from composer.document import read_document
+from composer.document.files import decode, read_bytes
+from composer.document.rules import NOT_A_MAP, UNREADABLE_FILE
+from composer.project.rules import BAD_SETTING
+from composer.project.toml import TABLE, read_table
+from composer.source import SourceFile, Span, shown_path
+from composer.tree import Mapping
+
+SETTINGS_FILE = "composer.yaml"
+PYPROJECT_FILE = "pyproject.toml"
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """Settings as they are written. ``tree`` is None where too little of them can be read."""
+
+    root: Path
+    source: SourceFile
+    tree: Mapping | None
+    findings: tuple[Diagnostic, ...]
+
+
+def find_settings(folder: Path) -> Written | None:
+    """Return the settings of the nearest of ``folder`` and the folders above that has any."""
+    for root in (folder, *folder.parents):
+        table = _table(root)
+        own = _own_file(root)
+        if own is not None:
+            return own if table is None else _both(own, table)
+        if table is not None:
+            return table
+    return None
+
+
+def _own_file(root: Path) -> Written | None:
+    path = root / SETTINGS_FILE
+    if not _is_there(path):
+        return None
+    name = shown_path(path)
+    if not _is_inside(path, root):
+        source = SourceFile(name)
+        message = "this is a link that leads out of the project"
+        return Written(root, source, None, (Diagnostic(UNREADABLE_FILE, message, _start(source)),))
+    tree, source, findings = read_document(path, name)
+    if [finding.rule for finding in findings] == [NOT_A_MAP] and _says_nothing(source):
+        return Written(root, source, Mapping((), _start(source)), ())
+    return Written(root, source, tree, tuple(findings))
+
+
+def _table(root: Path) -> Written | None:
+    path = root / PYPROJECT_FILE
+    if not _is_there(path) or not _is_inside(path, root):
+        return None
+    name = shown_path(path)
+    data, unread = read_bytes(path, SourceFile(name))
+    source, undecoded = decode(data, name)
+    read = None if unread or undecoded else read_table(source)
+    if read is None:
+        return None
+    tree, findings = read
+    return Written(root, source, tree, tuple(findings))
+
+
+def _both(own: Written, table: Written) -> Written:
+    """Keep the file, and say that the table is not read."""
+    span = table.tree.span if table.tree is not None else _start(table.source)
+    finding = Diagnostic(
+        BAD_SETTING,
+        f"the table {TABLE} is not read: there is a {SETTINGS_FILE} beside it",
+        span,
+        (Label(_start(own.source), "these are the settings"),),
+        "keep one of the two",
+    )
+    return replace(own, findings=(*own.findings, finding))
+
+
+def _is_there(path: Path) -> bool:
+    try:
+        return path.is_symlink() or path.exists()
+    except OSError:  # a folder that may not be looked into
+        return False
+
+
+def _is_inside(path: Path, root: Path) -> bool:
+    try:
+        return path.resolve().is_relative_to(root)
+    except (OSError, RuntimeError):  # a link to itself
+        return False
+
+
+def _says_nothing(source: SourceFile) -> bool:
+    return all(not line.strip() or line.lstrip().startswith("#") for line in source.lines)
+
+
+def _start(source: SourceFile) -> Span:
+    return Span(source, 1, 1)

@@ -1,0 +1,190 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.diagnostics import Diagnostic, Severity
+from composer.loading import load
+from composer.project import Project
+
+PYPROJECT = """\
+[project]
+name = "robot"
+dependencies = ["ros2-composer"]
+
+[tool.composer]
+nodes = ["parts", 'more "parts"']  # two
+strict = true
+ignore = [
+  "qos-implicit",
+  "RC9",
+]
+
+[tool.composer.severity]
+unheard-publisher = "warning"
+RC412 = "eror"
+
+[tool.ruff]
+ignore = ["RC9"]
+"""
+TALKER = "system: talker\nnodes:\n  one: {publishers: {chatter: {type: std_msgs/msg/String}}}\n"
+
+
+def told(findings: tuple[Diagnostic, ...] | list[Diagnostic]) -> list[tuple[int, int, str]]:
+    return [(item.primary.line, item.primary.column, item.message) for item in findings]
+
+
+def test_the_root_is_where_the_nearest_settings_are(tmp_path: Path) -> None:
+    (tmp_path / "composer.yaml").write_text("strict: true\n")
+    deep = tmp_path / "a" / "b"
+    deep.mkdir(parents=True)
+    (tmp_path / "a" / "pyproject.toml").write_text("[project]\nname = 'no table of ours'\n")
+    project = Project.at(deep)
+    assert (project.root, project.settings.strict) == (tmp_path, True)
+    (tmp_path / "a" / "pyproject.toml").write_text("[tool.composer]\n")
+    project = Project.at(deep)
+    assert (project.root, project.settings.strict) == (tmp_path / "a", False)
+
+
+def test_without_settings_it_is_the_folder_above_nodes(tmp_path: Path) -> None:
+    (tmp_path / "nodes").mkdir()
+    (tmp_path / "systems").mkdir()
+    assert Project.at(tmp_path / "systems").root == tmp_path
+    assert Project.at(tmp_path / "systems").node_folders == (tmp_path / "nodes",)
+
+
+def test_without_anything_it_is_the_folder_itself(tmp_path: Path) -> None:
+    assert Project.at(tmp_path).root == tmp_path
+    assert Project.at(tmp_path).node_folders == ()
+
+
+def test_what_is_chosen_goes_before_what_is_usual(tmp_path: Path) -> None:
+    for name in ("nodes", "types", "messages", "interfaces"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "composer.yaml").write_text("nodes: [types, nodes]\ninterfaces: [messages]\n")
+    project = Project.at(tmp_path)
+    assert project.findings == ()
+    assert project.node_folders == (tmp_path / "types", tmp_path / "nodes")
+    assert project.interface_folders == (tmp_path / "messages",)
+
+
+def test_a_table_in_pyproject_says_the_same_with_places(tmp_path: Path) -> None:
+    (tmp_path / "pyproject.toml").write_text(PYPROJECT)
+    for name in ("parts", 'more "parts"'):
+        (tmp_path / name).mkdir()
+    project = Project.at(tmp_path)
+    settings = project.settings
+    assert settings.nodes == (tmp_path / "parts", tmp_path / 'more "parts"')
+    assert settings.strict
+    assert [(text.value, str(text.span).rpartition(".toml:")[2]) for text in settings.ignore] == [
+        ("qos-implicit", "9:3"),
+        ("RC9", "10:3"),
+    ]
+    assert [(text.value, severity) for text, severity in settings.severity] == [
+        ("unheard-publisher", Severity.WARNING)
+    ]
+    ((line, column, message),) = told(project.findings)
+    assert (line, column) == (15, 9)
+    assert message.endswith("for 'RC412', found text 'eror'")
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("nodes: [../elsewhere]", (1, 9, "'../elsewhere' leads out of the project")),
+        ("nodes: [link]", (1, 9, "'link' leads out of the project")),
+        ("nodes:\n  - missing", (2, 5, "'missing' is not a folder")),
+        ("nodes: [a.yaml]", (1, 9, "'a.yaml' is not a folder")),
+        ('nodes: ["\\t"]', (1, 9, "'\\t' is not a folder")),
+        ("nodes: nodes", (1, 8, "expected a list for 'nodes', found text 'nodes'")),
+        ("select: [1]", (1, 10, "expected text in 'select', found the number 1")),
+        ("ignore: [no-rule-at-all]", (1, 10, "no rule is called 'no-rule-at-all'")),
+        (
+            "ignore: [unknown-node]",
+            (1, 10, "'unknown-node' is an error, which cannot be ignored for a whole project"),
+        ),
+        (
+            "severity: {RC202: info}",
+            (1, 12, "'RC202' is an error, which cannot be made an info for a whole project"),
+        ),
+        ("severity: {RC2: info}", (1, 12, "no rule is called 'RC2'")),
+        ("[", (1, 1, "this '[' is not closed")),
+    ],
+)
+def test_a_wrong_setting_is_a_finding_at_its_place(
+    tmp_path: Path, text: str, place: tuple[int, int, str]
+) -> None:
+    root = tmp_path / "project"
+    root.mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    (root / "link").symlink_to(tmp_path / "elsewhere")
+    (root / "composer.yaml").write_text(text)
+    (root / "a.yaml").write_text("system: a\nnodes: {one: {}}\n")
+    found = load(root / "a.yaml").diagnostics
+    assert told(found) == [place]
+    assert str(found[0].primary).endswith(f"composer.yaml:{place[0]}:{place[1]}")
+
+
+def test_a_table_beside_a_file_is_not_read(tmp_path: Path) -> None:
+    (tmp_path / "composer.yaml").write_text("# nothing yet\n")
+    (tmp_path / "pyproject.toml").write_text("[tool.composer]\nstrict = true\n")
+    project = Project.at(tmp_path)
+    assert not project.settings.strict
+    assert [finding.message for finding in project.findings] == [
+        "the table [tool.composer] is not read: there is a composer.yaml beside it"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "line"), [("[tool.composer]\nstrict = yes\n", 2), ("[tool.composer]\n[[[\n", 2)]
+)
+def test_broken_toml_is_a_finding(tmp_path: Path, text: str, line: int) -> None:
+    (tmp_path / "pyproject.toml").write_text(text)
+    (finding,) = Project.at(tmp_path).findings
+    assert finding.message.startswith("this is not TOML: ")
+    assert finding.primary.line == line
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a = '''\n[tool.composer]\n'''\n",
+        "[tool.composers]\nstrict = true\n",
+        "[project]\ndependencies = ['ros2-composer']\n",
+        "# [tool.composer]\n",
+        "[tool.ruff]\nbroken = [[[\n",
+        "\x00\x01",
+    ],
+)
+def test_other_tables_are_none_of_ours(tmp_path: Path, text: str) -> None:
+    (tmp_path / "pyproject.toml").write_text(text)
+    assert Project.at(tmp_path).settings.source is None
+
+
+def test_settings_are_not_read_from_elsewhere(
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    secret = tmp_path_factory.mktemp("elsewhere") / "secret"
+    secret.write_text("password: secret\n")
+    (tmp_path / "composer.yaml").symlink_to(secret)
+    (finding,) = Project.at(tmp_path).findings
+    assert finding.message == "this is a link that leads out of the project"
+    assert finding.primary.file.text == ""
+
+
+def test_rules_are_ignored_selected_and_weighed_but_errors_stay(tmp_path: Path) -> None:
+    path = tmp_path / "talker.yaml"
+
+    def found(settings: str, text: str = TALKER) -> list[tuple[str, str]]:
+        (tmp_path / "composer.yaml").write_text(settings)
+        path.write_text(text)
+        return [(item.rule.name, item.severity.value) for item in load(path).diagnostics]
+
+    everything = [("unheard-publisher", "info"), ("qos-implicit", "info")]
+    assert sorted(found("")) == sorted(everything)
+    assert found("ignore: [RC5]") == [("unheard-publisher", "info")]
+    assert found("select: [qos-implicit]") == [("qos-implicit", "info")]
+    assert found("severity: {qos-implicit: error}\nignore: [RC3]") == [("qos-implicit", "error")]
+    broken = TALKER.replace("String", "Strin")
+    assert ("unknown-interface", "error") in found("select: [RC5]\nignore: [RC3]", broken)
