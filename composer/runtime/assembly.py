@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from composer.model import Event, Node, Port, PortKind, Reaction
+from composer.model import Event, Node, Port, PortKind, Reaction, Timer
 from composer.runtime.behaviors import method
 from composer.runtime.core import Core
 from composer.runtime.messages import interface_class
@@ -23,9 +23,13 @@ from composer.runtime.reactions import Caller, RunningReaction
 
 @dataclass(slots=True)
 class Assembly:
-    """The entities of a configured node, by name, and its reactions to transitions."""
+    """The entities of a configured node, by name, and its reactions to transitions.
+
+    ``standby`` is the core of what is always on; it differs from ``core`` in its gate.
+    """
 
     core: Core
+    standby: Core
     publishers: dict[str, PublisherPort] = field(default_factory=dict)
     clients: dict[str, ClientPort] = field(default_factory=dict)
     action_clients: dict[str, ActionClientPort] = field(default_factory=dict)
@@ -34,6 +38,7 @@ class Assembly:
     services: dict[str, ServicePort] = field(default_factory=dict)
     timers: dict[str, TimerPort] = field(default_factory=dict)
     transitions: dict[Event, RunningReaction] = field(default_factory=dict)
+    always_on: list[RunningPort] = field(default_factory=list)
 
     @property
     def ports(self) -> Iterator[RunningPort]:
@@ -46,17 +51,22 @@ class Assembly:
         yield from self.action_servers.values()
         yield from self.timers.values()
 
+    @property
+    def gated(self) -> Iterator[RunningPort]:
+        """What is to stand still unless the node is active."""
+        return (port for port in self.ports if port not in self.always_on)
+
     def build(self, model: Node, behavior: object | None) -> None:
         """Create the entities of ``model``. What was created is kept when one of them cannot be.
 
         Raises MessageError, PeriodError, and what rclpy raises.
         """
         for port in model.ports_of(PortKind.PUBLISHER):
-            self.publishers[port.name.value] = PublisherPort(self.core, port)
+            self.publishers[port.name.value] = PublisherPort(self._core_of(port), port)
         for port in model.ports_of(PortKind.CLIENT):
-            self.clients[port.name.value] = ClientPort(self.core, port)
+            self.clients[port.name.value] = ClientPort(self._core_of(port), port)
         for port in model.ports_of(PortKind.ACTION_CLIENT):
-            self.action_clients[port.name.value] = ActionClientPort(self.core, port)
+            self.action_clients[port.name.value] = ActionClientPort(self._core_of(port), port)
         self._bind_answers(model)
         for port in model.ports_of(PortKind.SUBSCRIPTION, PortKind.SERVICE, PortKind.ACTION_SERVER):
             self._add_receiver(port, behavior)
@@ -64,9 +74,29 @@ class Assembly:
             name = timer.name.value
             reaction = self._reaction(timer.reaction)
             handler = method(behavior, f"on_{name}")
-            self.timers[name] = TimerPort(self.core, timer, reaction, handler)
+            self.timers[name] = TimerPort(self._core_of(timer), timer, reaction, handler)
         for event, declared in model.reactions:
             self.transitions[event] = self._compile(declared)
+        self.always_on.extend(self._always_on(model))
+
+    def _core_of(self, declared: Port | Timer) -> Core:
+        return self.standby if declared.always_on else self.core
+
+    def _always_on(self, model: Node) -> Iterator[RunningPort]:
+        sections: dict[PortKind, Mapping[str, RunningPort]] = {
+            PortKind.PUBLISHER: self.publishers,
+            PortKind.CLIENT: self.clients,
+            PortKind.ACTION_CLIENT: self.action_clients,
+            PortKind.SUBSCRIPTION: self.subscriptions,
+            PortKind.SERVICE: self.services,
+            PortKind.ACTION_SERVER: self.action_servers,
+        }
+        for port in model.ports:
+            if port.always_on:
+                yield sections[port.kind][port.name.value]
+        for timer in model.timers:
+            if timer.always_on:
+                yield self.timers[timer.name.value]
 
     def _bind_answers(self, model: Node) -> None:
         for port in model.ports_of(PortKind.CLIENT):
@@ -78,19 +108,20 @@ class Assembly:
 
     def _add_receiver(self, port: Port, behavior: object | None) -> None:
         name = port.name.value
+        core = self._core_of(port)
         handler = method(behavior, f"on_{name}")
         match port.kind:
             case PortKind.SUBSCRIPTION:
                 reaction = self._reaction(port.reaction(Event.MESSAGE))
-                self.subscriptions[name] = SubscriptionPort(self.core, port, reaction, handler)
+                self.subscriptions[name] = SubscriptionPort(core, port, reaction, handler)
             case PortKind.SERVICE:
                 response_type = interface_class(port.interface.value).Response
                 reaction = self._reaction(port.reaction(Event.REQUEST), response_type)
-                self.services[name] = ServicePort(self.core, port, reaction, handler)
+                self.services[name] = ServicePort(core, port, reaction, handler)
             case PortKind.ACTION_SERVER:
                 reaction = self._reaction(port.reaction(Event.GOAL))
                 handlers = Handlers(handler, method(behavior, f"accept_{name}"))
-                self.action_servers[name] = ActionServerPort(self.core, port, reaction, handlers)
+                self.action_servers[name] = ActionServerPort(core, port, reaction, handlers)
 
     def _reaction(
         self, declared: Reaction | None, response_type: Any = None

@@ -100,8 +100,9 @@ class Named:
 class NodeClock:
     """A behaviour's ``clock``; see :class:`composer.behavior.Clock`."""
 
-    def __init__(self, core: Core) -> None:
+    def __init__(self, core: Core, standby: Core) -> None:
         self._core = core
+        self._standby = standby
 
     def now(self) -> float:
         """Return the time in seconds."""
@@ -112,10 +113,13 @@ class NodeClock:
         return self._core.node.get_clock().now().to_msg()
 
     def sleep(self, seconds: float) -> Future[None]:
-        """Let other callbacks run for so long. Raises CallCancelled when the node leaves active."""
-        gate = self._core.gate
-        if gate.waiting:
-            return gate.hold(sleep(self._core.loop, max(0.0, seconds)))
+        """Let other callbacks run for so long. Raises CallCancelled when the node leaves active.
+
+        While the node is inactive it is for handlers of ports that are always on.
+        """
+        for gate in (self._core.gate, self._standby.gate):
+            if gate.waiting:
+                return gate.hold(sleep(self._core.loop, max(0.0, seconds)))
         ended: Future[None] = Future()
-        ended.set_exception(CallCancelled(gate.refusal))
+        ended.set_exception(CallCancelled(self._core.gate.refusal))
         return ended

@@ -144,8 +144,9 @@ class NodeSummary:
 class Outcome:
     """How a run ended. ``exit_code`` is 0 after a clean stop and 1 when a node failed.
 
-    ``hung`` is true when a callback never returned: its thread still exists, and only
-    ``os._exit`` ends the process.
+    ``hung`` is true when something remains that would hold up the end of the process: a callback
+    that never returned, or nodes there was no time to take out of the ROS graph. ``os._exit``
+    ends it at once.
     """
 
     exit_code: int

@@ -6,9 +6,9 @@ back when it is cleaned up, shut down or has failed (DESIGN: The runtime, Lifecy
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -24,6 +24,7 @@ from composer.runtime.lifecycle import Lifecycle, Result
 from composer.runtime.log import Faults, Log, Write, describe
 from composer.runtime.loop import Loop
 from composer.runtime.parameters import Parameters
+from composer.runtime.ports.port import RunningPort
 from composer.runtime.ports.timer import PeriodError, period_s
 from composer.runtime.statistics import Statistics
 from composer.runtime.strand import Direct, Turns
@@ -98,8 +99,10 @@ class RunningNode:
             self._ros, model.parameters, objection=self._objection, changed=self._changed
         )
         self._core.names["parameters"] = parameters.values
+        # What is always on has a gate of its own and shares the rest.
+        self._standby = replace(self._core, gate=Gate(model.full_name))
         self._behavior: Any = None
-        self._assembly = Assembly(self._core)
+        self._assembly = Assembly(self._core, self._standby)
         loop.add_node(self._ros)
         self._lifecycle = Lifecycle(self._core, self, timeout_s=options.transition_timeout_s)
 
@@ -134,34 +137,31 @@ class RunningNode:
     async def on_transition(self, transition: str, start: str) -> None:
         """Do the work of ``transition``; raise what goes wrong."""
         gate = self._core.gate
-        gate.state = self.state
+        gate.state = self._standby.gate.state = self.state
         gate.waiting = True
         if transition == "configure":
             self._configure()
+            self._standby.gate.outgoing = True
         elif transition == "activate":
             gate.outgoing = True
         elif start == "active":
-            await self._leave_active()
+            await self._leave(self._core, self._assembly.gated)
+        if transition in ("cleanup", "shutdown"):
+            await self._leave(self._standby, self._assembly.always_on)
         await self._tell(transition)
 
     async def on_error(self, cause: BaseException) -> None:
         """Let the behaviour know why the node failed."""
-        await self._leave_active()
+        await self._leave(self._core, self._assembly.gated)
+        await self._leave(self._standby, self._assembly.always_on)
         self._core.gate.waiting = True
         await self._tell("error", cause)
 
     def on_rest(self, state: str, transition: str) -> None:
         """Open or shut everything as ``state`` wants it."""
-        gate = self._core.gate
-        gate.state = state
-        if state == "active":
-            gate.open()
-            for port in self._assembly.ports:
-                port.activate()
-        else:
-            for port in self._assembly.ports:
-                port.deactivate()
-            gate.close()
+        _rest(self._core.gate, state, state == "active", self._assembly.gated)
+        living = state in ("inactive", "active")
+        _rest(self._standby.gate, state, living, self._assembly.always_on)
         if state in ("unconfigured", "finalized"):
             self._release()
         self._listener.on_rest(transition, state)
@@ -176,8 +176,8 @@ class RunningNode:
         if self.model.behavior is not None:
             self._behavior = behavior_class(self.model.behavior)()
         # A callback group never forgets what was in it, so an old one is not used again.
-        self._core.group = MutuallyExclusiveCallbackGroup()
-        self._assembly = Assembly(self._core)
+        self._core.group = self._standby.group = MutuallyExclusiveCallbackGroup()
+        self._assembly = Assembly(self._core, self._standby)
         self._assembly.build(self.model, self._behavior)
         if self._behavior is not None:
             self._equip(self._behavior)
@@ -186,20 +186,22 @@ class RunningNode:
         assembly = self._assembly
         behavior.name = self.full_name
         behavior.log = self._core.log
-        behavior.clock = NodeClock(self._core)
+        behavior.clock = NodeClock(self._core, self._standby)
         behavior.parameters = Named("parameter", self._core.names["parameters"])
         behavior.publishers = Named("publisher", assembly.publishers)
         behavior.clients = Named("client", assembly.clients)
         behavior.action_clients = Named("action client", assembly.action_clients)
 
-    async def _leave_active(self) -> None:
+    async def _leave(self, core: Core, ports: Iterable[RunningPort]) -> None:
         """Take nothing more in, end what is under way. Publishers stay open for a last word."""
-        self._core.gate.incoming = False
-        for port in self._assembly.ports:
+        core.gate.incoming = False
+        left = tuple(ports)
+        for port in left:
             port.deactivate()
-        self._core.gate.end_pending()
+        core.gate.end_pending()
         for server in self._assembly.action_servers.values():
-            await server.drain()
+            if server in left:
+                await server.drain()
 
     async def _tell(self, transition: str, *arguments: Any) -> None:
         event = _EVENTS.get(transition)
@@ -226,7 +228,7 @@ class RunningNode:
                 port.destroy()
             except Exception as error:
                 self._core.log.error(f"cannot destroy {type(port).__name__}: {describe(error)}")
-        self._assembly = Assembly(self._core)
+        self._assembly = Assembly(self._core, self._standby)
         self._behavior = None
 
     # --- parameters
@@ -251,3 +253,16 @@ class RunningNode:
             rest = self._core.call("on_parameters", handler, changes)
             if rest is not None:
                 self._core.spawn(self._core.strand.wrap(rest))
+
+
+def _rest(gate: Gate, state: str, is_open: bool, ports: Iterable[RunningPort]) -> None:
+    """Let a gate, and the ports behind it, rest in ``state``."""
+    gate.state = state
+    if is_open:
+        gate.open()
+        for port in ports:
+            port.activate()
+        return
+    for port in ports:
+        port.deactivate()
+    gate.close()

@@ -27,7 +27,9 @@ nodes:
         feedback:
           count: 4
           period_ms: 5
-          message: {progress_percent: "{(count + 1) * 25.0}", current_position: {x: "{goal.target.x}"}}
+          message:
+            progress_percent: "{(count + 1) * 25.0}"
+            current_position: {x: "{goal.target.x}"}
         result: {success: true, message: "arrived at {goal.target.x}"}
 """
 KINDS = ["events", "single_threaded", "multi_threaded"]
@@ -192,7 +194,7 @@ def test_a_handler_that_does_not_end_its_goal_is_ended(tmp_path: Path, peer: Pee
 
 
 @pytest.mark.parametrize(
-    ("body", "status", "fault"),
+    "way_out",
     [
         ("raise ValueError('no way')", GoalStatus.STATUS_ABORTED, "ValueError: no way"),
         ("raise SystemExit(1)", GoalStatus.STATUS_ABORTED, "SystemExit: 1"),
@@ -206,8 +208,9 @@ def test_a_handler_that_does_not_end_its_goal_is_ended(tmp_path: Path, peer: Pee
 )
 @pytest.mark.parametrize("prefix", ["", "async "])
 def test_every_way_out_of_a_handler_ends_the_goal(
-    tmp_path: Path, peer: Peer, prefix: str, body: str, status: int, fault: str
+    tmp_path: Path, peer: Peer, prefix: str, way_out: tuple[str, int, str]
 ) -> None:
+    body, status, fault = way_out
     module = f"""
     from composer.behavior import Behavior
 

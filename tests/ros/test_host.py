@@ -1,0 +1,239 @@
+"""A system comes up as a whole or not at all, and goes down in order and in time."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from std_srvs.srv import Trigger
+
+from composer.model import PrimaryState
+from composer.runtime.events import (
+    BroughtUp,
+    Fault,
+    RollingBack,
+    StateChanged,
+    Stopping,
+    Stuck,
+    TransitionRefused,
+)
+from composer.runtime.host import HostOptions
+from tests.ros.system_bench import Peer, RunningSystem, running, system_of, wait_until
+
+CHAIN = """
+system: chain
+nodes:
+  motor: {namespace: control, lifecycle: {depends_on: [planner]}}
+  planner: {namespace: planning, lifecycle: {depends_on: [sensor]}, behavior: planner:Planner}
+  sensor: {}
+"""
+WELL = """
+from composer.behavior import Behavior
+
+class Planner(Behavior):
+    pass
+"""
+
+
+def test_up_in_dependency_order_and_down_in_reverse(tmp_path: Path, peer: Peer) -> None:
+    with running(CHAIN, tmp_path, planner=WELL) as system:
+        assert peer.state("/control/motor") == "active"
+        outcome = system.stop()
+    nodes = ["/sensor", "/planning/planner", "/control/motor"]
+    up = [f"{node} {state}" for state in ("inactive", "active") for node in nodes]
+    down = [
+        f"{node} {state}"
+        for state in ("inactive", "unconfigured", "finalized")
+        for node in reversed(nodes)
+    ]
+    assert system.states() == up + down
+    assert (outcome.exit_code, outcome.reason, outcome.hung) == (0, "the test is over", False)
+    assert [node.state for node in outcome.nodes] == ["finalized"] * 3
+
+
+def test_nothing_of_a_system_is_left_in_the_graph(tmp_path: Path, peer: Peer) -> None:
+    with running(CHAIN, tmp_path, planner=WELL):
+        wait_until(lambda: "sensor" in peer.node.get_node_names(), "the node in the graph")
+    wait_until(lambda: "sensor" not in peer.node.get_node_names(), "the node out of the graph")
+
+
+@pytest.mark.parametrize(
+    ("autostart", "state"), [(PrimaryState.INACTIVE, "inactive"), (None, "active")]
+)
+def test_as_far_as_the_plan_says(
+    tmp_path: Path, peer: Peer, autostart: PrimaryState | None, state: str
+) -> None:
+    with running(CHAIN, tmp_path, autostart=autostart, planner=WELL) as system:
+        assert peer.state("/planning/planner") == state
+        assert system.told(BroughtUp)[0].active == (3 if state == "active" else 0)
+
+
+@pytest.mark.parametrize(
+    ("handler", "body", "reason"),
+    [
+        ("on_configure", "raise ValueError('no map')", "ValueError: no map"),
+        ("on_activate", "raise TransitionFailed('no odometry')", "TransitionFailed: no odometry"),
+        ("on_activate", "return False", "TransitionFailed: on_activate returned False"),
+        ("__init__", "raise ValueError('no licence')", "ValueError: no licence"),
+    ],
+)
+def test_a_failing_bring_up_is_rolled_back_in_reverse(
+    tmp_path: Path, handler: str, body: str, reason: str
+) -> None:
+    module = f"""
+    from composer.behavior import Behavior, TransitionFailed
+
+    class Planner(Behavior):
+        def {handler}(self):
+            {body}
+    """
+    system = RunningSystem(system_of(CHAIN, tmp_path, planner=module), HostOptions(), None)
+    outcome = system.end()
+    transition = "configure" if handler == "__init__" else handler.removeprefix("on_")
+    assert outcome.exit_code == 1
+    assert outcome.reason == "/planning/planner failed"
+    assert [(event.node, event.reason) for event in system.told(RollingBack)] == [
+        ("/planning/planner", f"it did not {transition}: {reason}")
+    ]
+    assert not system.told(BroughtUp)
+    rolled_back = system.states()[system.states().index("/sensor finalized") - 2 :]
+    assert rolled_back == [
+        f"{n} finalized" for n in ("/control/motor", "/planning/planner", "/sensor")
+    ]
+    if transition == "activate":
+        assert "/control/motor active" not in system.states()
+        assert "/sensor active" in system.states()
+
+
+def test_a_module_that_cannot_be_imported_is_a_failure_like_any_other(tmp_path: Path) -> None:
+    module = "import not_to_be_found_anywhere"
+    system = RunningSystem(system_of(CHAIN, tmp_path, planner=module), HostOptions(), None)
+    assert system.end().exit_code == 1
+    assert "ModuleNotFoundError" in system.told(RollingBack)[0].reason
+
+
+def test_the_time_a_system_is_to_run(tmp_path: Path) -> None:
+    options = HostOptions(run_for_s=0.3)
+    system = RunningSystem(system_of(CHAIN, tmp_path, planner=WELL), options, None)
+    outcome = system.end()
+    assert (outcome.exit_code, outcome.reason) == (0, "0.3 s are over")
+    up, stopping = system.told(BroughtUp)[0], system.told(Stopping)[0]
+    assert 0.3 <= stopping.elapsed_s - up.elapsed_s < 0.6
+
+
+HANG = """
+from time import sleep
+from composer.behavior import Behavior
+
+class Planner(Behavior):
+    def {handler}(self):
+        self.log.info("hanging")
+        sleep(6.0)
+"""
+HANGING = """
+system: hanging
+executors: {own: {kind: KIND}}
+nodes:
+  planner: {executor: own, behavior: planner:Planner, timers: {tick: {period_ms: 10}}}
+  sensor: {services: {trigger: {type: std_srvs/srv/Trigger, external: true}}}
+"""
+
+
+@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+def test_a_callback_that_hangs_does_not_hold_up_the_end(
+    tmp_path: Path, peer: Peer, kind: str
+) -> None:
+    text = HANGING.replace("KIND", kind)
+    with running(text, tmp_path, planner=HANG.format(handler="on_tick")) as system:
+        system.wait_for_log("hanging")
+        peer.call(Trigger, "/trigger")  # the other executor goes on
+        began_s = time.monotonic()
+        outcome = system.stop()
+        took_s = time.monotonic() - began_s
+    assert took_s < 2.0
+    assert (outcome.exit_code, outcome.hung) == (1, True)
+    stuck = system.told(Stuck)[0]
+    assert (stuck.node, stuck.transition) == ("/planner", "deactivate")
+    assert "in on_tick" in stuck.stack
+    assert "sleep(6.0)" in stuck.stack
+    assert {node.node: node.state for node in outcome.nodes}["/sensor"] == "finalized"
+
+
+def test_a_transition_that_hangs_fails_the_bring_up(tmp_path: Path) -> None:
+    text = HANGING.replace("KIND", "events")
+    module = HANG.format(handler="on_configure")
+    options = HostOptions(transition_timeout_s=0.1)
+    system = RunningSystem(system_of(text, tmp_path, planner=module), options, None)
+    outcome = system.end()
+    assert (outcome.exit_code, outcome.hung) == (1, True)
+    assert "in on_configure" in system.told(Stuck)[0].stack
+    assert system.told(RollingBack)[0].reason == "it did not configure: it is stuck"
+    assert "/sensor finalized" in system.states()
+
+
+@pytest.mark.parametrize("hurry", [False, True])
+def test_a_handler_that_awaits_for_long_is_given_up(tmp_path: Path, hurry: bool) -> None:
+    module = """
+    from composer.behavior import Behavior
+
+    class Planner(Behavior):
+        async def on_deactivate(self):
+            self.log.info("slow")
+            await self.clock.sleep(60.0)
+    """
+    with running(CHAIN, tmp_path, planner=module) as system:
+        began_s = time.monotonic()
+        system.host.stop("first")
+        system.wait_for_log("slow")
+        if hurry:
+            system.host.stop("second")
+        outcome = system.end()
+        took_s = time.monotonic() - began_s
+    assert took_s < (0.8 if hurry else 2.2)
+    assert outcome.exit_code == 1
+    assert not outcome.hung
+    assert system.told(Stuck)[0].node == "/planning/planner"
+    assert "/control/motor inactive" in system.states()
+
+
+def test_a_refused_deactivation_is_told_and_ends_in_shutdown(tmp_path: Path) -> None:
+    module = """
+    from composer.behavior import Behavior, TransitionFailed
+
+    class Planner(Behavior):
+        def on_deactivate(self):
+            raise TransitionFailed("not now")
+    """
+    with running(CHAIN, tmp_path, planner=module) as system:
+        outcome = system.stop()
+    refused = system.told(TransitionRefused)[0]
+    assert (refused.state, refused.reason) == ("active", "TransitionFailed: not now")
+    assert [node.state for node in outcome.nodes] == ["finalized"] * 3
+
+
+def test_a_node_that_fails_at_run_time_is_told_of(tmp_path: Path, peer: Peer) -> None:
+    module = """
+    from composer.behavior import Behavior
+
+    class Planner(Behavior):
+        def on_deactivate(self):
+            raise ValueError("broken")
+    """
+    with running(CHAIN, tmp_path, planner=module) as system:
+        assert not peer.change("/planning/planner", "deactivate")
+        assert peer.state("/planning/planner") == "unconfigured"
+        assert system.stop().exit_code == 1
+    assert system.told(StateChanged)
+
+
+def test_who_listens_badly_does_not_disturb(tmp_path: Path) -> None:
+    system = RunningSystem(system_of(CHAIN, tmp_path, planner=WELL), HostOptions(), None)
+    wait_until(lambda: system.told(BroughtUp))
+
+    def fail(_: object) -> None:
+        raise BrokenPipeError
+
+    system.host._listener = fail
+    assert system.stop().exit_code == 0
+    assert not system.told(Fault)
