@@ -25,7 +25,6 @@ from composer.runtime.log import Faults, Log, Write, describe
 from composer.runtime.loop import Loop
 from composer.runtime.parameters import Parameters
 from composer.runtime.ports.port import RunningPort
-from composer.runtime.ports.port import RunningPort
 from composer.runtime.ports.timer import PeriodError, period_s
 from composer.runtime.statistics import Statistics
 from composer.runtime.strand import Direct, Turns
@@ -254,19 +253,6 @@ class RunningNode:
             rest = self._core.call("on_parameters", handler, changes)
             if rest is not None:
                 self._core.spawn(self._core.strand.wrap(rest))
-
-
-def _rest(gate: Gate, state: str, is_open: bool, ports: Iterable[RunningPort]) -> None:
-    """Let a gate, and the ports behind it, rest in ``state``."""
-    gate.state = state
-    if is_open:
-        gate.open()
-        for port in ports:
-            port.activate()
-        return
-    for port in ports:
-        port.deactivate()
-    gate.close()
 
 
 def _rest(gate: Gate, state: str, is_open: bool, ports: Iterable[RunningPort]) -> None:
