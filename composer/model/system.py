@@ -239,6 +239,7 @@ class System:
     supervision: Supervision = DEFAULT_SUPERVISION
     implied_dependencies: bool = True
     node_type: bool = False
+    unmatched_parameters: tuple[Located[str], ...] = ()  # nodes that only parameter files name
     unknown: tuple[UnknownKey, ...] = ()  # what the command line names and the system lacks
     _nodes: dict[str, Node] = field(init=False, repr=False, compare=False)
 

@@ -20,6 +20,7 @@ from composer.names import expand_name, join
 from composer.resolve.connections import Joint, Joints, joint_of
 from composer.resolve.declaration import Declaration, declare, refined, refines, unknown_keys
 from composer.resolve.overrides import Overrides
+from composer.resolve.parameter_files import ParameterFiles
 from composer.resolve.parameters import with_values
 from composer.resolve.qos import QosTable
 from composer.resolve.reading import entries, is_opaque, key, plain_text, text, text_or_opaque
@@ -40,6 +41,7 @@ class Surroundings:
     joints: Joints
     overrides: Overrides
     supervision: Supervision
+    parameter_files: ParameterFiles
     findings: list[Diagnostic]
 
 
@@ -63,9 +65,11 @@ def node(entry: Entry, around: Surroundings) -> Node:
     made = _inline(tree, around) if type_entry is None else _typed(type_entry, tree, around)
     declared = made.declaration
     namespace = node_namespace(tree.get("namespace"), around.namespace)
-    given = dict(around.overrides.by_node.get(entry.name, {}))
+    known = frozenset(parameter.name.value for parameter in declared.parameters)
+    given = around.parameter_files.given(join(namespace.value, entry.name), known)
     if type_entry is not None:
-        given = {item.name: item for item in entries(tree.get("parameters"))} | given
+        given |= {item.name: item for item in entries(tree.get("parameters"))}
+    given |= around.overrides.by_node.get(entry.name, {})
     parameters, unknown = with_values(declared.parameters, given, complete=made.complete)
     remappings = _remappings(tree.get("remappings"))
     lifecycle = tree.get("lifecycle")

@@ -21,6 +21,7 @@ from composer.resolve.connections import connections
 from composer.resolve.declaration import declare
 from composer.resolve.node import Surroundings, node, placed, state
 from composer.resolve.overrides import Overrides
+from composer.resolve.parameter_files import read_parameter_files
 from composer.resolve.parameters import with_values
 from composer.resolve.qos import qos_table
 from composer.resolve.reading import (
@@ -54,7 +55,9 @@ def resolve_system(
     written = tree.get("lifecycle")
     lifecycle = written if isinstance(written, Mapping) else Mapping((), tree.span)
     upkeep = supervision(lifecycle, DEFAULT_SUPERVISION)
-    around = Surroundings(folder, namespace, types, qos, joints, overrides, upkeep, findings)
+    written = tree.get("parameter_files")
+    files = read_parameter_files(written, folder, catalog.project, findings)
+    around = Surroundings(folder, namespace, types, qos, joints, overrides, upkeep, files, findings)
     nodes = tuple(node(entry, around) for entry in entries(tree.get("nodes")))
     autostart = state(lifecycle.get("autostart"))
     system = System(
@@ -73,6 +76,7 @@ def resolve_system(
         supervision=upkeep,
         implied_dependencies=flag(lifecycle.get("implied_dependencies"), default=True),
         unknown=_unknown_nodes(nodes, overrides),
+        unmatched_parameters=files.unmatched(frozenset(node.full_name for node in nodes)),
     )
     return system, findings
 

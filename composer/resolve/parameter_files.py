@@ -1,0 +1,204 @@
+"""ROS parameter files: values for the parameters of nodes, by the names the nodes have in ROS.
+
+The form is that of ``rcl_yaml_param_parser``: a map of node names, each with ``ros__parameters``.
+``*`` in a name stands for one part, ``**`` for any number of parts. Namespaces may be nested maps,
+and so may parameters with dots in their names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from collections.abc import Mapping as Map
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from composer.diagnostics import Diagnostic, Rule, Severity, register, shown
+from composer.document import read_document
+from composer.names import join
+from composer.project import Project
+from composer.resolve.reading import is_opaque, texts
+from composer.source import Located, shown_path
+from composer.tree import Entry, Mapping, Scalar, Tree
+
+RULE = register(
+    Rule(
+        code="RC043",
+        name="parameter-file",
+        severity=Severity.ERROR,
+        summary="A ROS parameter file is out of reach, or not of the form that ROS reads.",
+        why=(
+            "A parameter file is a map of node names, each with 'ros__parameters'. It must be in "
+            "the project: what is outside is not there on another computer."
+        ),
+        bad="""\
+# file: system.yaml
+system: parameters
+parameter_files: [robot.yaml]
+nodes:
+  motor: {parameters: {speed: {type: double, default: 1.0}}}
+# file: robot.yaml
+/motor: {speed: 2.0}
+""",
+        good="""\
+# file: system.yaml
+system: parameters
+parameter_files: [robot.yaml]
+nodes:
+  motor: {parameters: {speed: {type: double, default: 1.0}}}
+# file: robot.yaml
+/motor: {ros__parameters: {speed: 2.0}}
+""",
+    )
+)
+
+PARAMETERS = "ros__parameters"
+#: What every ROS node declares without being asked to.
+_EVERY_NODE = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..*")
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """The values under one name, and the place of the section among all."""
+
+    name: Located[str]
+    values: Map[str, Entry]
+    number: int
+
+    @property
+    def is_pattern(self) -> bool:
+        """Whether the name stands for many."""
+        return "*" in self.name.value
+
+
+@dataclass(slots=True)
+class ParameterFiles:
+    """The sections of all files. Of two values for a parameter the later one counts."""
+
+    _named: dict[str, list[Section]] = field(default_factory=dict)
+    _patterns: list[Section] = field(default_factory=list)
+    _count: int = 0
+
+    def add(self, name: Located[str], values: Map[str, Entry]) -> None:
+        """Add a section behind the others."""
+        section = Section(name, values, self._count)
+        self._count += 1
+        if section.is_pattern:
+            self._patterns.append(section)
+        else:
+            self._named.setdefault(name.value, []).append(section)
+
+    def given(self, full_name: str, declared: frozenset[str]) -> dict[str, Entry]:
+        """Return the values for the node that ROS calls ``full_name``, by parameter.
+
+        Under a name with wildcards it finds what it declares; the rest is for other nodes.
+        """
+        found = [*self._named.get(full_name, ()), *self._matching(full_name)]
+        given: dict[str, Entry] = {}
+        for section in sorted(found, key=lambda item: item.number):
+            given.update(
+                (name, entry)
+                for name, entry in section.values.items()
+                if not section.is_pattern or name in declared
+            )
+        return given
+
+    def unmatched(self, full_names: frozenset[str]) -> tuple[Located[str], ...]:
+        """Return the names of sections that are for none of the nodes."""
+        return tuple(
+            section.name
+            for name, sections in self._named.items()
+            for section in sections
+            if name not in full_names
+        )
+
+    def _matching(self, full_name: str) -> Iterator[Section]:
+        parts = _parts(full_name)
+        for section in self._patterns:
+            if _is_match(_parts(section.name.value), parts):
+                yield section
+
+
+def read_parameter_files(
+    tree: Tree | None, folder: Path, project: Project, findings: list[Diagnostic]
+) -> ParameterFiles:
+    """Read the files that ``parameter_files`` names, relative to the system's folder."""
+    files = ParameterFiles()
+    for name in texts(tree):
+        if is_opaque(name.value):
+            continue
+        path = folder / name.value
+        if not project.holds(path):
+            message = f"parameter file '{shown(name.value)}' is outside the project"
+            findings.append(Diagnostic(RULE, message, name.span))
+        elif not path.exists():
+            message = f"there is no parameter file '{shown(name.value)}'"
+            findings.append(Diagnostic(RULE, message, name.span))
+        else:
+            content, _, found = read_document(path, shown_path(path))
+            findings.extend(found)
+            if content is not None:
+                _read(content, "/", files, findings)
+    return files
+
+
+def _read(tree: Mapping, namespace: str, files: ParameterFiles, findings: list[Diagnostic]) -> None:
+    for entry in tree:
+        name = join(namespace, entry.name)
+        if not isinstance(entry.value, Mapping):
+            message = f"'{shown(entry.name)}' has no '{PARAMETERS}'"
+            findings.append(Diagnostic(RULE, message, entry.key.span))
+            continue
+        parameters = entry.value.entry(PARAMETERS)
+        if parameters is None:
+            _read(entry.value, name, files, findings)
+        elif not isinstance(parameters.value, Mapping):
+            message = f"'{PARAMETERS}' is a map of parameters"
+            findings.append(Diagnostic(RULE, message, parameters.key.span))
+        else:
+            values = {item.name: item for item in _flat(parameters.value, "")}
+            files.add(Located(name, entry.key.span), values)
+
+
+def _flat(tree: Mapping, prefix: str) -> Iterator[Entry]:
+    """Yield the parameters of nested maps, with dots in their names."""
+    for entry in tree:
+        name = f"{prefix}{entry.name}"
+        if isinstance(entry.value, Mapping):
+            yield from _flat(entry.value, f"{name}.")
+        elif not _EVERY_NODE.fullmatch(name):
+            yield Entry(Scalar(name, entry.key.span, verbatim=False), entry.value)
+
+
+def _parts(name: str) -> tuple[str, ...]:
+    return tuple(name.strip("/").split("/"))
+
+
+def _is_match(pattern: Sequence[str], parts: Sequence[str]) -> bool:
+    """Say whether the parts of a name are those of a pattern, in time that grows with both only."""
+    ends = {0}  # how many parts the pattern so far may have matched
+    for piece in pattern:
+        if piece == "**":
+            ends = set(range(min(ends), len(parts) + 1)) if ends else set()
+        else:
+            ends = {
+                end + 1 for end in ends if end < len(parts) and _is_part_match(piece, parts[end])
+            }
+    return len(parts) in ends
+
+
+def _is_part_match(pattern: str, part: str) -> bool:
+    """Say whether ``pattern``, in which ``*`` is any text, is ``part``."""
+    pieces = pattern.split("*")
+    if len(pieces) == 1:
+        return pattern == part
+    first, *middle, last = pieces
+    if len(part) < len(first) + len(last) or not part.startswith(first):
+        return False
+    rest = part[len(first) : len(part) - len(last)]
+    for piece in middle:
+        found = rest.find(piece)
+        if found < 0:
+            return False
+        rest = rest[found + len(piece) :]
+    return part.endswith(last)
