@@ -7,22 +7,17 @@ old. What is missing is said in one sentence on stderr, with exit code 1, before
 """
 
 import importlib.util
-import os
 import platform
-import re
 import shutil
 import subprocess
 import sys
 import sysconfig
 import tempfile
-import urllib.parse
-import urllib.request
 import venv
 from pathlib import Path
 
 OLDEST_PYTHON = (3, 11)
 NEWEST_PYTHON = (3, 14)  # the newest that ROS 2 Jazzy's wheels on PyPI are built for
-TIMEOUT_S = 60
 
 
 def _version_text(version):
@@ -86,39 +81,31 @@ def find_problem():
     )
 
 
-def newest_wheel(page):
-    """Return the link to the newest finished wheel of pip on a page of a package index (PEP 503).
+def _unpack_package(package, folder):
+    """Unpack a package of Debian or Ubuntu into ``folder``, without installing it.
 
-    Raises ValueError when there is none.
+    Raises OSError or CalledProcessError.
     """
-    links = re.findall(r'href="([^"]*/pip-([\d.]+)-py3-none-any\.whl)[#"]', page)
-    if not links:
-        raise ValueError("the package index names no wheel of pip")
-    return max(links, key=lambda link: [int(number) for number in link[1].split(".")])[0]
-
-
-def _download_pip(folder):
-    """Fetch pip's newest wheel from the package index and return where it lies."""
-    index = os.environ.get("PIP_INDEX_URL", "https://pypi.org/simple").rstrip("/") + "/pip/"
-    with urllib.request.urlopen(index, timeout=TIMEOUT_S) as answer:
-        link = urllib.parse.urljoin(index, newest_wheel(answer.read().decode()))
-    target = folder / link.rpartition("/")[2]
-    with urllib.request.urlopen(link, timeout=TIMEOUT_S) as answer:
-        target.write_bytes(answer.read())
-    return target
+    folder.mkdir(exist_ok=True)
+    download = ["apt-get", "download", "-qq", package]
+    subprocess.run(download, cwd=folder, check=True, stderr=subprocess.DEVNULL)
+    (archive,) = folder.glob("*.deb")
+    subprocess.run(["dpkg-deb", "--extract", archive.name, "."], cwd=folder, check=True)
+    archive.unlink()
 
 
 def _install_pip(python):
     """Put pip into an environment that was made without, as Debian's Python makes them."""
     with tempfile.TemporaryDirectory() as folder:
-        wheel = _download_pip(Path(folder))
+        _unpack_package("python3-pip-whl", Path(folder))
+        wheel = next(Path(folder).glob("usr/share/python-wheels/pip-*.whl"))
         # A wheel of pip is a zip file that Python can run.
         command = [str(python), str(wheel / "pip"), "install", "--quiet", str(wheel)]
         subprocess.run(command, check=True)
 
 
 def create(folder):
-    """Create the environment with pip in it. Raises OSError, ValueError or CalledProcessError."""
+    """Create the environment with pip in it. Raises OSError or CalledProcessError."""
     has_ensurepip = importlib.util.find_spec("ensurepip") is not None
     venv.create(folder, clear=True, symlinks=True, with_pip=has_ensurepip)
     if not has_ensurepip:
@@ -130,20 +117,14 @@ def fetch_headers(folder):
 
     Raises OSError or CalledProcessError.
     """
-    folder.mkdir()
-    package = f"libpython{_version_text(sys.version_info)}-dev"
-    download = ["apt-get", "download", "-qq", package]
-    subprocess.run(download, cwd=folder, check=True, stderr=subprocess.DEVNULL)
-    (archive,) = folder.glob("*.deb")
-    subprocess.run(["dpkg-deb", "--extract", archive.name, "."], cwd=folder, check=True)
-    archive.unlink()
+    _unpack_package(f"libpython{_version_text(sys.version_info)}-dev", folder)
 
 
 def _attempt(step, folder, purpose, package):
     """Take a step; return why it failed and which package of the system makes up for it."""
     try:
         step(folder)
-    except (OSError, ValueError, subprocess.CalledProcessError) as error:
+    except (OSError, subprocess.CalledProcessError) as error:
         return f"{purpose} failed ({error}); run: sudo apt install {package}"
     return None
 

@@ -39,20 +39,3 @@ def test_a_platform_without_ros_wheels_is_told() -> None:
 def test_a_missing_compiler_is_told_with_the_command_that_brings_it() -> None:
     assert tool.compiler_problem(True) is None
     assert tool.compiler_problem(False).endswith("sudo apt install g++")
-
-
-def test_the_newest_finished_wheel_of_pip_is_taken_by_number() -> None:
-    page = """
-        <a href="../../p/pip-9.0.3-py2.py3-none-any.whl#sha256=1">pip-9.0.3</a>
-        <a href="../../p/pip-24.10-py3-none-any.whl#sha256=2">pip-24.10</a>
-        <a href="../../p/pip-24.9-py3-none-any.whl#sha256=3">pip-24.9</a>
-        <a href="../../p/pip-25.0b1-py3-none-any.whl#sha256=4">pip-25.0b1</a>
-        <a href="../../p/pip-26.0.tar.gz">pip-26.0</a>
-    """
-
-    assert tool.newest_wheel(page) == "../../p/pip-24.10-py3-none-any.whl"
-
-
-def test_an_index_without_pip_is_an_error() -> None:
-    with pytest.raises(ValueError, match="no wheel of pip"):
-        tool.newest_wheel("<html></html>")
