@@ -125,8 +125,12 @@ class Scheduler:
         slot = Slot()
         self._slots[slot.signal.fd] = slot
         self._poller.watch(slot.signal.fd)
-        for source in sources:
-            slot.add(source)
+        try:
+            for source in sources:
+                slot.add(source)
+        except BaseException:
+            self.close_slot(slot)
+            raise
         return slot
 
     def close_slot(self, slot: Slot) -> None:

@@ -8,10 +8,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+import rclpy
+from builtin_interfaces.msg import Time
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetLoggerLevels, SetParameters
+from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
+from type_description_interfaces.srv import GetTypeDescription
 
 from composer.runtime.tasks import Future, sleep, within, wrap_rclpy_future
 from tests.ros.loop_support import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
@@ -194,6 +198,18 @@ class TestWhatEveryNodeBringsAlong:
         client = on.client(GetLoggerLevels, "bench/get_logger_levels")
         answer = call(on, client, GetLoggerLevels.Request(names=["bench"]))
         assert [level.name for level in answer.levels] == ["bench"]
+
+    def test_types_can_be_asked_for(self, on: Bench) -> None:
+        client = on.client(GetTypeDescription, "bench/get_type_description")
+        request = GetTypeDescription.Request(type_name="std_srvs/srv/Trigger", type_hash="wrong")
+        assert "parse type hash" in call(on, client, request).failure_reason
+
+    def test_the_clock_follows_simulated_time(self, on: Bench) -> None:
+        on.node.set_parameters([rclpy.parameter.Parameter("use_sim_time", value=True)])
+        publisher = on.node.create_publisher(Clock, "/clock", 10)
+        wait_until(publisher.get_subscription_count)
+        publisher.publish(Clock(clock=Time(sec=1234)))
+        wait_until(lambda: on.node.get_clock().now().nanoseconds == 1234 * 10**9)
 
     @pytest.mark.parametrize("kind", ["plain", "async"])
     def test_a_service_the_node_came_with_is_served_by_its_own_callback(
