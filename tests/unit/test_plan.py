@@ -36,12 +36,12 @@ def test_nodes_are_configured_then_activated_behind_what_they_depend_on() -> Non
     assert str(plan) == (
         "#1 configure /eye: system autostart is active\n"
         "#2 configure /power: base depends on it\n"
-        "#3 configure /base: arm depends on it\n"
-        "#4 configure /left/arm: system autostart is active\n"
+        "#3 configure /base after #2: arm depends on it\n"
+        "#4 configure /left/arm after #3: system autostart is active\n"
         "#5 activate /eye: system autostart is active\n"
         "#6 activate /power: base depends on it\n"
         "#7 activate /base: arm depends on it\n"
-        "#8 activate /left/arm: system autostart is active"
+        "#8 activate /left/arm after #7: system autostart is active"
     )
 
 
@@ -53,8 +53,27 @@ def test_tear_down_is_the_reverse_in_three_phases() -> None:
         for transition in ("deactivate", "cleanup", "shutdown")
         for node in ("eye", "arm", "base")
     ]
-    assert causes(plan)["base"] == "after arm"
+    assert set(causes(plan).values()) == {"system is going down"}
     assert [step.number for step in plan.steps] == list(range(1, 10))
+    assert [(step.node, step.number, step.after) for step in plan.steps if step.after] == [
+        ("base", 3, (2,)),
+        ("base", 6, (5,)),
+        ("base", 9, (8,)),
+    ]
+
+
+def test_steps_of_a_phase_wait_only_for_what_they_depend_on() -> None:
+    system = system_of(
+        system_with(
+            "low: {}",
+            "left: {lifecycle: {depends_on: [low]}}",
+            "right: {lifecycle: {depends_on: {low: inactive}}}",
+            "top: {lifecycle: {depends_on: [left, right]}}",
+        )
+    )
+    configure, activate = bring_up(system).phases
+    assert [step.after for step in configure] == [(), (1,), (1,), (2, 3)]
+    assert [step.after for step in activate] == [(), (5,), (), (6, 7)]
 
 
 def test_independent_nodes_keep_the_order_they_are_declared_in() -> None:
