@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -177,6 +178,15 @@ def test_results_nobody_fetched_expire(on: Bench) -> None:
     assert on.reports == []
 
 
+def answers(client: ActionClient) -> bool:
+    """Tell whether the server's answers get here: it may find the client later than that it."""
+    future = client.send_goal_async(Navigate.Goal(max_velocity=0.0))
+    until = time.monotonic() + 1.0
+    while not future.done() and time.monotonic() < until:
+        time.sleep(0.002)
+    return bool(future.done())
+
+
 class TestClient:
     """Against a server in another process."""
 
@@ -185,6 +195,7 @@ class TestClient:
         with peer("navigate", "navigate") as process:
             wait_for_line(process, "serving")
             client = own_client(on)
+            wait_until(lambda: answers(client), "the server knows of the client")
             yield client
             on.loop.remove(client)
             client.destroy()
