@@ -14,6 +14,7 @@ from composer.diagnostics import Diagnostic
 from composer.resources import schemas_folder
 from composer.schema.findings import findings_of
 from composer.schema.places import Places
+from composer.schema.shape import Test, shape
 from composer.tree import Mapping, plain
 
 if TYPE_CHECKING:
@@ -38,8 +39,10 @@ def check_schema(tree: Mapping, kind: str) -> list[Diagnostic]:
 
     The tree is the one after ``expand``. A load-time variable without value fits everywhere.
     """
-    errors = _validator(kind).iter_errors(plain(tree))
-    return findings_of(errors, Places(tree))
+    content = plain(tree)
+    if _shape(kind)(content):
+        return []
+    return findings_of(_validator(kind).iter_errors(content), Places(tree))
 
 
 def schema(name: str) -> dict[str, Any]:
@@ -52,8 +55,13 @@ def schema(name: str) -> dict[str, Any]:
 
 
 @cache
+def _shape(kind: str) -> Test:
+    return shape(schema(kind))
+
+
+@cache
 def _validator(kind: str) -> Draft7Validator:
-    # Imported here, for it takes a tenth of a second that most commands need not spend.
+    # Imported here, for it takes a tenth of a second, and most files are right.
     from jsonschema import Draft7Validator  # noqa: PLC0415
     from jsonschema.validators import extend  # noqa: PLC0415
     from referencing import Registry  # noqa: PLC0415

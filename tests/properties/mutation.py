@@ -1,0 +1,103 @@
+"""Right files with a few mistakes in them: keys and values lost, renamed, moved and replaced."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+from hypothesis import strategies as st
+
+#: What people and programs put where something else belongs.
+VALUES: st.SearchStrategy[Any] = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-(2**63), 2**64 - 1),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.sampled_from(
+        ["", "a", "/", "~", "a b", "../a", "${a}", "{", "{message.data}", "{1 // 0}", "a.b", "a:b"]
+    ),
+    st.text(st.characters(exclude_categories=["Cc", "Cs"]), max_size=20),
+    st.just([]),
+    st.just({}),
+    st.just([[]]),
+    st.just({"a": {}}),
+)
+
+
+@st.composite
+def mutated(draw: st.DrawFn, content: Any) -> Any:
+    """Return ``content`` with one to four mistakes."""
+    changed = copy.deepcopy(content)
+    for _ in range(draw(st.integers(1, 4))):
+        places = list(_containers(changed))
+        container = draw(st.sampled_from(places))
+        _CHANGES[draw(st.sampled_from(sorted(_CHANGES)))](draw, container, places)
+    return changed
+
+
+def _containers(part: Any) -> list[Any]:
+    """Return every map and list that has something in it; the whole if there is none."""
+    found = []
+    waiting = [part]
+    while waiting:
+        current = waiting.pop()
+        inner = list(current.values()) if isinstance(current, dict) else list(current)
+        if inner:
+            found.append(current)
+        waiting.extend(item for item in inner if isinstance(item, dict | list))
+    return found or [part]
+
+
+def _pick(draw: st.DrawFn, container: Any) -> Any:
+    """Return a key or an index of ``container``, or None when it is empty."""
+    keys = list(container) if isinstance(container, dict) else list(range(len(container)))
+    return draw(st.sampled_from(keys)) if keys else None
+
+
+def _lose(draw: st.DrawFn, container: Any, _: list[Any]) -> None:
+    key = _pick(draw, container)
+    if key is not None:
+        del container[key]
+
+
+def _replace(draw: st.DrawFn, container: Any, _: list[Any]) -> None:
+    key = _pick(draw, container)
+    if key is not None:
+        container[key] = copy.deepcopy(draw(VALUES))  # for it may be changed in its turn
+
+
+def _rename(draw: st.DrawFn, container: Any, places: list[Any]) -> None:
+    key = _pick(draw, container)
+    if not isinstance(key, str) or not isinstance(container, dict):
+        return
+    others = [name for place in places if isinstance(place, dict) for name in place]
+    misspelt = [key[1:], key + "s", key.upper(), key.replace("_", "-"), key[::-1]]
+    container[draw(st.sampled_from([*others, *misspelt]))] = container.pop(key)
+
+
+def _move(draw: st.DrawFn, container: Any, places: list[Any]) -> None:
+    """Put a copy of something from elsewhere there."""
+    other = draw(st.sampled_from(places))
+    key, source = _pick(draw, container), _pick(draw, other)
+    if key is not None and source is not None:
+        container[key] = copy.deepcopy(other[source])
+
+
+def _spoil(draw: st.DrawFn, container: Any, _: list[Any]) -> None:
+    """Change a few characters of a text."""
+    key = _pick(draw, container)
+    text = container[key] if key is not None else None
+    if isinstance(text, str):
+        start = draw(st.integers(0, len(text)))
+        end = draw(st.integers(start, min(len(text), start + 3)))
+        inserted = draw(st.text("abz019_./~{}()[]'\"+-*% :#$\u00e9\u4e00", max_size=4))
+        container[key] = text[:start] + inserted + text[end:]
+
+
+_CHANGES = {
+    "lose": _lose,
+    "move": _move,
+    "rename": _rename,
+    "replace": _replace,
+    "spoil": _spoil,
+}

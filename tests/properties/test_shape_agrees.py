@@ -1,0 +1,86 @@
+"""The quick look at a shape and jsonschema have the same opinion of everything."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from jsonschema import Draft7Validator
+from jsonschema.validators import extend
+
+from composer.document import read_document
+from composer.resources import nodes_folder, systems_folder
+from composer.schema import SCHEMAS, schema
+from composer.schema.shape import shape
+from composer.tree import plain
+from tests.properties.mutation import mutated
+
+STRICT = extend(
+    Draft7Validator,
+    type_checker=Draft7Validator.TYPE_CHECKER.redefine(
+        "integer", lambda _, value: isinstance(value, int) and not isinstance(value, bool)
+    ),
+)
+SHAPES = {name: shape(schema(name)) for name in SCHEMAS}
+VALIDATORS = {name: STRICT(schema(name)) for name in SCHEMAS}
+FILES = [
+    plain(tree)
+    for folder in (systems_folder(), nodes_folder())
+    for path in sorted(folder.glob("*.yaml"))
+    for tree, _, _ in [read_document(path)]
+    if tree is not None
+]
+
+
+@settings(max_examples=400, deadline=None)
+@given(st.sampled_from(FILES).flatmap(mutated))
+def test_on_files_with_mistakes(content: Any) -> None:
+    for name in SCHEMAS:
+        assert SHAPES[name](content) == VALIDATORS[name].is_valid(content)
+
+
+@pytest.mark.parametrize(
+    ("part", "right", "wrong"),
+    [
+        ({"type": "integer"}, [1, -1], [1.0, True, "1", None]),
+        ({"type": ["number", "null"]}, [1, 1.5, None], [True, "1", [], {}]),
+        ({"enum": ["a", 1]}, ["a", 1], ["b", True, 1.5, None, [], {}]),
+        ({"pattern": "^a"}, ["ab", 1, None], ["ba", ""]),
+        ({"minimum": 1}, [1, 2.5, "0", True], [0, 0.5]),
+        ({"exclusiveMinimum": 1}, [1.5, "0", True], [1, 0.5]),
+        ({"minItems": 1}, [[1], {}, ""], [[]]),
+        ({"minProperties": 1}, [{"a": 1}, [], ""], [{}]),
+        ({"required": ["a"]}, [{"a": None}, [], "a"], [{"b": 1}, {}]),
+        ({"properties": {"a": {"type": "string"}}}, [{"a": "b"}, {"b": 1}, []], [{"a": 1}]),
+        ({"additionalProperties": False}, [{}, []], [{"a": 1}]),
+        (
+            {"properties": {"a": {}}, "additionalProperties": {"type": "string"}},
+            [{"a": 1, "b": "c"}],
+            [{"a": 1, "b": 2}],
+        ),
+        ({"items": {"type": "string"}}, [[], ["a"], {}], [["a", 1]]),
+        ({"allOf": [{"minimum": 1}, {"type": "integer"}]}, [1], [0, 1.5]),
+        ({"anyOf": [{"minimum": 5}, {"type": "integer"}]}, [1, 5.5], [1.5]),
+        ({"not": {"type": "string"}}, [1, None], ["a"]),
+        (
+            {"if": {"type": "string"}, "then": {"pattern": "a"}, "else": {"minimum": 1}},
+            ["a", 1, None],
+            ["b", 0],
+        ),
+        ({"if": {"type": "string"}, "else": {"minimum": 1}}, ["a", 1], [0]),
+        ({}, [None, 1, "a", [], {}], []),
+    ],
+)
+def test_keyword(part: dict[str, Any], right: list[Any], wrong: list[Any]) -> None:
+    quick, thorough = shape(part), STRICT(part)
+    for values, is_right in ((right, True), (wrong, False)):
+        for value in values:
+            assert quick(value) is is_right, value
+            assert thorough.is_valid(value) is is_right, value
+
+
+def test_an_unknown_keyword_is_not_passed_over() -> None:
+    with pytest.raises(KeyError):
+        shape({"uniqueItems": True})
