@@ -8,15 +8,23 @@ waits for what is told by :mod:`composer.model.dependencies`.
 
 from composer.plan.reach import reach
 from composer.plan.steps import Plan, Step, TransitionName
+from composer.plan.upkeep import Fault, FaultKind, Upkeep, Verdict, judge, mend, wanted
 from composer.plan.whole import bring_up, start_causes, start_goals, tear_down
 
 __all__ = [
+    "Fault",
+    "FaultKind",
     "Plan",
     "Step",
     "TransitionName",
+    "Upkeep",
+    "Verdict",
     "bring_up",
+    "judge",
+    "mend",
     "reach",
     "start_causes",
     "start_goals",
     "tear_down",
+    "wanted",
 ]
