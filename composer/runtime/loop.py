@@ -34,14 +34,23 @@ class Timer(Protocol):
 
 
 class Loop(Protocol):
-    """Calls callbacks, one thread or several. Methods may be called from any thread."""
+    """Calls callbacks, one thread or several. Methods may be called from any thread.
+
+    What a callback raises, SystemExit and KeyboardInterrupt included, goes to the exception handler
+    with the callback's name, and the loop goes on. An entity is served once it was added: from then
+    on with all it received before, and until it is removed.
+    """
 
     @property
     def name(self) -> str:
         """The name of the executor in YAML."""
 
     def add_node(self, node: Node) -> None:
-        """Serve what every node brings along: parameter, lifecycle and logger services."""
+        """Serve what every node brings along: parameter, lifecycle and logger services.
+
+        Everything the node has by now is served by its own callback; of what it gets later, the
+        simulated clock and QoS events are. The rest is to be added.
+        """
 
     def remove_node(self, node: Node) -> None:
         """Stop serving the node and everything of it. To be called before it is destroyed."""
@@ -50,13 +59,20 @@ class Loop(Protocol):
         """Call ``callback(message)`` for each message."""
 
     def add_service(self, service: Service, callback: Callable[[Any, Reply], None]) -> None:
-        """Call ``callback(request, reply)``; ``reply(response)`` answers, now or later."""
+        """Call ``callback(request, reply)``; ``reply(response)`` answers, now or later.
+
+        When ``callback`` raises, the caller gets an empty answer. ``reply`` raises TypeError for
+        what is no response of the service, RuntimeError when it has answered already.
+        """
 
     def add_client(self, client: Client) -> None:
         """Complete the futures of ``client.call_async``."""
 
     def add_action_server(self, server: ActionServer) -> None:
-        """Run the server's goal, cancel and result requests."""
+        """Run the server's goal, cancel and result requests.
+
+        When a callback of it raises, the goal is rejected or aborted, the cancellation refused.
+        """
 
     def add_action_client(self, client: ActionClient) -> None:
         """Complete the futures of the client and deliver its feedback."""
@@ -74,19 +90,28 @@ class Loop(Protocol):
         """Call ``callback`` each ``period_s`` seconds; a late call does not shift the next."""
 
     def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
-        """Run a coroutine; the future is its outcome. Cancelling the future closes it."""
+        """Run a coroutine; the future is its outcome.
+
+        Cancelling the future throws ``Cancelled`` into the coroutine where it awaits. An exception
+        is reported when nobody asks the future for it.
+        """
 
     def run(self, function: Callable[[], T], timeout_s: float | None = None) -> T:
         """Call ``function`` on the loop and wait for it (at once when already there).
 
-        Raises what ``function`` raises, and TimeoutError when it takes longer.
+        Raises what ``function`` raises, TimeoutError with the loop's stack when it takes longer (it
+        is not begun after that), and RuntimeError when the loop has stopped.
         """
 
     def start(self) -> None:
         """Begin to call, on threads of the loop's own."""
 
     def stop(self, timeout_s: float) -> bool:
-        """End the threads; false when a callback did not return in time."""
+        """End the threads; false when a callback did not return in time.
+
+        Tasks are cancelled and get a moment to clean up. Called on the loop itself, this asks for
+        the end and answers false.
+        """
 
     def where(self) -> str:
         """Return the Python stack of the callback that runs now; empty when none does."""

@@ -226,6 +226,20 @@ def test_idle_costs_nothing(on: Bench) -> None:
     assert time.process_time() - before < 0.3
 
 
+def test_waiting_for_a_busy_thread_costs_nothing(on: Bench) -> None:
+    release = threading.Event()
+    for _ in range(6):  # more than there are threads
+        on.loop.call_soon(release.wait)
+    wait_until(on.loop.where)
+    before = time.process_time()
+    begin = time.monotonic()
+    wait_until(lambda: time.monotonic() - begin > 0.5)
+    used_s = time.process_time() - before
+    release.set()
+    assert used_s < 0.2
+    assert on.loop.run(lambda: "alive", 5.0) == "alive"
+
+
 class TestStopping:
     @pytest.mark.parametrize("kind", KINDS)
     def test_a_loop_that_never_started_stops(self, kind: ExecutorKind) -> None:
