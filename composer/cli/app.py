@@ -9,6 +9,7 @@ import typer
 
 from composer.cli import (
     action,
+    doctor,
     graph,
     interface,
     lifecycle,
@@ -89,5 +90,6 @@ app.add_typer(service.app, name="service")
 app.add_typer(action.app, name="action")
 app.add_typer(param.app, name="param")
 app.add_typer(interface.app, name="interface")
+app.command("doctor", epilog=doctor.EPILOG)(doctor.doctor)
 app.command("rule", epilog=rule.EPILOG)(rule.rule)
 app.command("schema", epilog=schema.EPILOG)(schema.schema)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
 
 from composer.diagnostics import nearest
@@ -28,12 +28,19 @@ class StartRefused(Exception):
         self.hint = hint
 
 
-def check_environment(environment: MutableMapping[str, str]) -> None:
+def check_environment(environment: Mapping[str, str]) -> None:
     """Look at everything ROS will read. Raises StartRefused."""
-    _check_domain_id(environment.get("ROS_DOMAIN_ID", ""))
-    _check_discovery_range(environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", ""))
-    _check_security(environment)
-    _check_middleware(environment)
+    for refusal in refusals(environment):
+        raise refusal
+
+
+def refusals(environment: Mapping[str, str]) -> Iterator[StartRefused]:
+    """Yield every reason why the environment does not allow a start."""
+    for check in (_check_domain_id, _check_discovery_range, _check_security, _check_middleware):
+        try:
+            check(environment)
+        except StartRefused as refusal:
+            yield refusal
 
 
 def complete_environment(environment: MutableMapping[str, str]) -> None:
@@ -53,7 +60,8 @@ def prepare_environment() -> None:
     check_environment(os.environ)
 
 
-def _check_domain_id(text: str) -> None:
+def _check_domain_id(environment: Mapping[str, str]) -> None:
+    text = environment.get("ROS_DOMAIN_ID", "")
     if not text:
         return
     if not (text.isascii() and text.isdigit() and int(text) <= HIGHEST_DOMAIN_ID):
@@ -63,7 +71,8 @@ def _check_domain_id(text: str) -> None:
         )
 
 
-def _check_discovery_range(text: str) -> None:
+def _check_discovery_range(environment: Mapping[str, str]) -> None:
+    text = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "")
     if text and text not in DISCOVERY_RANGES:
         close = nearest(text, DISCOVERY_RANGES)
         meant = f"did you mean {close}? " if close else ""
@@ -73,7 +82,7 @@ def _check_discovery_range(text: str) -> None:
         )
 
 
-def _check_security(environment: MutableMapping[str, str]) -> None:
+def _check_security(environment: Mapping[str, str]) -> None:
     """Refuse to run unsecured when security is asked for.
 
     rcl asks for it when ROS_SECURITY_ENABLE is exactly ``true``; with the strategy Permissive it
@@ -94,7 +103,7 @@ def _check_security(environment: MutableMapping[str, str]) -> None:
         )
 
 
-def _check_middleware(environment: MutableMapping[str, str]) -> None:
+def _check_middleware(environment: Mapping[str, str]) -> None:
     """Refuse a middleware that no ROS prefix has; unset, rmw_implementation takes what is there."""
     wanted = environment.get("RMW_IMPLEMENTATION")
     prefixes = environment.get("AMENT_PREFIX_PATH", "").split(os.pathsep)

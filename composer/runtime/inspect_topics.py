@@ -68,7 +68,7 @@ class Topics:
         types = self._names.types("topic", name)
         full_name = name if name.startswith("/") else f"/{name}"
         return self._session.wait_until_still(
-            lambda: _info(self._session.node, full_name, types), self._deadline
+            lambda: topic_info(self._session.node, full_name, types), self._deadline
         )
 
     def type_of(self, name: str) -> str:
@@ -133,7 +133,8 @@ def strongest_for_all(offers: list[QosProfile], depth: int) -> QosProfile:
     )
 
 
-def _info(node: Node, name: str, types: tuple[str, ...]) -> TopicInfo:
+def topic_info(node: Node, name: str, types: tuple[str, ...]) -> TopicInfo:
+    """Return who is known now to publish and subscribe to a topic, by its full name."""
     return TopicInfo(
         name,
         types,

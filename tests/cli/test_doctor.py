@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from tests.cli.compose import compose
+
+#: Python without rclpy, as on a computer that has no ROS.
+WITHOUT_ROS = """
+import importlib.util as util, sys
+class NoRos:
+    def find_spec(self, name, *_):
+        if name == 'rclpy':
+            raise ModuleNotFoundError(name)
+found = util.find_spec
+util.find_spec = lambda name, *rest: None if name == 'rclpy' else found(name, *rest)
+sys.meta_path.insert(0, NoRos())
+from composer.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_without_rclpy_it_looks_at_the_rest_and_says_so() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_ROS, "doctor", "--json"],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 1, done.stderr
+    found = {(item["area"], item["level"]): item for item in json.loads(done.stdout)}
+    assert "rclpy is not installed" in found["versions", "error"]["message"]
+    assert "ros2-composer[ros]" in found["versions", "error"]["remedy"]
+    assert found["graph", "note"]["message"] == "not looked at: that needs rclpy"
+    assert {area for area, _ in found} >= {"environment", "versions", "graph"}
+    assert "Traceback" not in done.stderr
+
+
+def test_an_environment_that_hinders_a_start_is_told_with_a_remedy(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCLHOST")
+    done = compose("doctor")
+    assert done.code == 1
+    head, remedy = next(
+        pair
+        for pair in zip(done.out.splitlines(), done.out.splitlines()[1:], strict=False)
+        if pair[0].startswith("error    environment  ")
+    )
+    assert head.endswith("ROS_AUTOMATIC_DISCOVERY_RANGE is 'LOCLHOST', which is no discovery range")
+    assert remedy.strip().startswith("-> did you mean LOCALHOST?")
+    assert "not looked at: the environment does not let ROS start" in done.out
+
+
+def test_everything_is_counted_and_has_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "x")
+    monkeypatch.setenv("ROS_DISTRO", "humble")
+    assert compose("doctor").err.endswith(", 1 warning\n")
+    found = json.loads(compose("doctor", "--json").out)
+    assert all(item["remedy"] for item in found if item["level"] != "ok")
