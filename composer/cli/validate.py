@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -147,6 +148,8 @@ def _first(paths: Sequence[Path]) -> str:
 
 
 def _chosen(findings: list[Diagnostic], select: list[str], ignore: list[str]) -> list[Diagnostic]:
+    if not select and not ignore:
+        return findings
     from composer.report.catalogue import all_rules
     from composer.report.selection import UnknownRule, chosen
 
@@ -161,18 +164,15 @@ def _default_format() -> Format:
 
 
 def _print(findings: list[Diagnostic], output_format: Format) -> None:
-    from composer.report import github, json, sarif, text
+    if output_format is Format.TEXT:
+        if findings:
+            from composer.report.text import render as render_text
 
-    match output_format:
-        case Format.TEXT:
-            if findings:
-                write_raw(text.render(findings, color=use_color(sys.stdout)))
-        case Format.JSON:
-            write_raw(json.render(findings))
-        case Format.SARIF:
-            write_raw(sarif.render(findings))
-        case Format.GITHUB:
-            write_raw(github.render(findings))
+            write_raw(render_text(findings, color=use_color(sys.stdout)))
+        return
+    # The others are seldom wanted, and bring much with them.
+    render = import_module(f"composer.report.{output_format}").render
+    write_raw(render(findings))
 
 
 def _weighs(finding: Diagnostic, strict: bool) -> bool:
