@@ -20,10 +20,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns the exit code; nothing is raised.
     """
-    from composer.cli.app import app
+    from composer.cli.app import application
 
     try:
-        app(args=arguments, prog_name="compose")
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        application(given)(args=given, prog_name="compose")
     except SystemExit as end:
         return _exit_code(end)
     except Failure as failure:

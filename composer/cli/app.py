@@ -1,36 +1,69 @@
-"""The commands of ``compose``, put together. A new command is a file here and a line below."""
+"""The commands of ``compose``, put together. A new command is a file here and a word below."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
+from importlib import import_module
 from typing import Annotated
 
 import typer
 
-from composer.cli import (
-    action,
-    doctor,
-    graph,
-    interface,
-    lifecycle,
-    node,
-    param,
-    rule,
-    run,
-    schema,
-    service,
-    topic,
-    validate,
-)
 from composer.cli.help import examples
 from composer.cli.terminal import write
 
-app = typer.Typer(
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+#: Each is a module here: with a function of its name and an EPILOG, or with an ``app`` of its own.
+COMMANDS = (
+    "run",
+    "validate",
+    "graph",
+    "lifecycle",
+    "node",
+    "topic",
+    "service",
+    "action",
+    "param",
+    "interface",
+    "doctor",
+    "rule",
+    "schema",
 )
+
+
+EPILOG = examples(
+    "compose run pipeline                        run an example system",
+    "compose run systems/pipeline.yaml           validate, bring up, keep up, tear down",
+    "compose validate systems nodes              every finding in one run",
+    "compose lifecycle set planner deactivate    from another terminal",
+    "compose graph systems/pipeline.yaml         a diagram, as Mermaid text",
+)
+
+
+def application(arguments: Iterable[str] = ()) -> typer.Typer:
+    """Return the application for a command line.
+
+    Where ``arguments`` begin with a command it has that one only: to import and put together all
+    of them takes longer than most of them run.
+    """
+    app = typer.Typer(
+        no_args_is_help=True,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback(epilog=EPILOG)(compose)
+    wanted = next((text for text in arguments if not text.startswith("-")), None)
+    for name in (wanted,) if wanted in COMMANDS else COMMANDS:
+        _add(app, str(name))
+    return app
+
+
+def _add(app: typer.Typer, name: str) -> None:
+    module = import_module(f"composer.cli.{name}")
+    if hasattr(module, "app"):
+        app.add_typer(module.app, name=name)
+    else:
+        app.command(name, epilog=module.EPILOG)(getattr(module, name))
 
 
 def _show_version(asked: bool) -> None:
@@ -46,15 +79,6 @@ def _set_debug(asked: bool) -> None:
         os.environ["COMPOSE_DEBUG"] = "1"
 
 
-@app.callback(
-    epilog=examples(
-        "compose run pipeline                        run an example system",
-        "compose run systems/pipeline.yaml           validate, bring up, keep up, tear down",
-        "compose validate systems nodes              every finding in one run",
-        "compose lifecycle set planner deactivate    from another terminal",
-        "compose graph systems/pipeline.yaml         a diagram, as Mermaid text",
-    )
-)
 def compose(
     version: Annotated[
         bool,
@@ -78,18 +102,3 @@ def compose(
 
     Exit codes: 0 clean, 1 findings or a node failed, 2 usage, 3 internal error.
     """
-
-
-app.command("run", epilog=run.EPILOG)(run.run)
-app.command("validate", epilog=validate.EPILOG)(validate.validate)
-app.command("graph", epilog=graph.EPILOG)(graph.graph)
-app.add_typer(lifecycle.app, name="lifecycle")
-app.add_typer(node.app, name="node")
-app.add_typer(topic.app, name="topic")
-app.add_typer(service.app, name="service")
-app.add_typer(action.app, name="action")
-app.add_typer(param.app, name="param")
-app.add_typer(interface.app, name="interface")
-app.command("doctor", epilog=doctor.EPILOG)(doctor.doctor)
-app.command("rule", epilog=rule.EPILOG)(rule.rule)
-app.command("schema", epilog=schema.EPILOG)(schema.schema)

@@ -11,7 +11,7 @@ import pytest
 import typer
 
 from composer import cli
-from composer.cli.app import app
+from composer.cli.app import application
 from composer.cli.help import examples
 from tests.cli.compose import compose
 
@@ -26,7 +26,7 @@ def test_version() -> None:
 
 def commands() -> Iterator[list[str]]:
     """Yield the words of every command there is, groups and the whole program among them."""
-    waiting: list[tuple[list[str], Any]] = [([], typer.main.get_command(app))]
+    waiting: list[tuple[list[str], Any]] = [([], typer.main.get_command(application()))]
     while waiting:
         words, command = waiting.pop()
         yield words
