@@ -72,6 +72,18 @@ def load(
     return _load(tree, source, [*findings, *found], known, overrides)
 
 
+def load_files(paths: Iterable[Path]) -> list[Loading]:
+    """Load the files, each called as it is given; files of one project share its interfaces."""
+    shared: dict[tuple[Path, ...], Interfaces] = {}
+    loadings = []
+    for path in paths:
+        folders = interface_folders(Project.at(_real_folder(path)))
+        if folders not in shared:
+            shared[folders] = Interfaces.load(folders)
+        loadings.append(load(path, shown=str(path), interfaces=shared[folders]))
+    return loadings
+
+
 def load_bytes(
     content: bytes, folder: Path, *, shown: str, interfaces: Interfaces | None = None
 ) -> Loading:

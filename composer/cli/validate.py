@@ -114,13 +114,13 @@ class _Checked:
 def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
     from composer.document.limits import MAX_BYTES
     from composer.files import find_files
-    from composer.loading import load, load_bytes, project_findings
+    from composer.loading import load_bytes, load_files, project_findings
 
     for path in paths:
         if path != _STDIN and not path.exists():
             raise UsageFailure(f"there is no file or folder '{path}'")
     found = find_files(path for path in paths if path != _STDIN)
-    loadings = [load(path, shown=str(path)) for path in found.files]
+    loadings = load_files(found.files)
     if _STDIN in paths:
         content = sys.stdin.buffer.read(MAX_BYTES + 1)
         loadings.insert(0, load_bytes(content, Path.cwd(), shown=stdin_name))

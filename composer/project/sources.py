@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
+from typing import TypeAlias
 
 from composer.diagnostics import Diagnostic, Label
 from composer.document import read_document
@@ -31,19 +34,37 @@ class Written:
 def find_settings(folder: Path) -> Written | None:
     """Return the settings of the nearest of ``folder`` and the folders above that has any."""
     for root in (folder, *folder.parents):
-        table = _table(root)
-        own = _own_file(root)
-        if own is not None:
-            return own if table is None else _both(own, table)
-        if table is not None:
-            return table
+        own, table = _stamp(root / SETTINGS_FILE), _stamp(root / PYPROJECT_FILE)
+        written = _written(root, own, table) if own or table else None
+        if written is not None:
+            return written
     return None
 
 
-def _own_file(root: Path) -> Written | None:
-    path = root / SETTINGS_FILE
-    if not _is_there(path):
+_Stamp: TypeAlias = tuple[int, int]
+
+
+def _stamp(path: Path) -> _Stamp | None:
+    """Return what changes when a file does; None where there is none."""
+    try:
+        status = os.lstat(path)
+    except OSError:  # also for a folder that may not be looked into
         return None
+    return status.st_mtime_ns, status.st_size
+
+
+@lru_cache(maxsize=32)
+def _written(root: Path, own_stamp: _Stamp | None, table_stamp: _Stamp | None) -> Written | None:
+    """Read what is in ``root``: once while it stays as it is, for every file of a project asks."""
+    own = _own_file(root) if own_stamp is not None else None
+    table = _table(root) if table_stamp is not None else None
+    if own is None or table is None:
+        return own or table
+    return _both(own, table)
+
+
+def _own_file(root: Path) -> Written:
+    path = root / SETTINGS_FILE
     name = shown_path(path)
     if not _is_inside(path, root):
         source = SourceFile(name)
@@ -57,7 +78,7 @@ def _own_file(root: Path) -> Written | None:
 
 def _table(root: Path) -> Written | None:
     path = root / PYPROJECT_FILE
-    if not _is_there(path) or not _is_inside(path, root):
+    if not _is_inside(path, root):
         return None
     name = shown_path(path)
     data, unread = read_bytes(path, SourceFile(name))
@@ -80,13 +101,6 @@ def _both(own: Written, table: Written) -> Written:
         "keep one of the two",
     )
     return replace(own, findings=(*own.findings, finding))
-
-
-def _is_there(path: Path) -> bool:
-    try:
-        return path.is_symlink() or path.exists()
-    except OSError:  # a folder that may not be looked into
-        return False
 
 
 def _is_inside(path: Path, root: Path) -> bool:
