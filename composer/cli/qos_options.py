@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
@@ -48,6 +48,20 @@ QosDepth = Annotated[
     int | None,
     typer.Option("--qos-depth", min=1, metavar="N", help="Messages kept.", show_default=False),
 ]
+
+
+@dataclass(frozen=True, slots=True)
+class QosWish:
+    """What the options say of a profile; None where they say nothing."""
+
+    preset: Preset | None
+    reliability: Reliability | None
+    durability: Durability | None
+    depth: int | None
+
+    def applied_to(self, start: QosProfile) -> QosProfile:
+        """Return ``start``, or the preset, with the policies that are given."""
+        return chosen_profile(start, self.preset, self.reliability, self.durability, self.depth)
 
 
 def chosen_profile(

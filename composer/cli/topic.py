@@ -12,7 +12,7 @@ from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
 from composer.cli.terminal import write
 from composer.cli.topic_echo import echo
 from composer.cli.topic_pub import pub
-from composer.cli.topic_rates import bw, hz
+from composer.cli.topic_rates import bw, delay, hz
 from composer.cli.values import as_json
 
 if TYPE_CHECKING:
@@ -123,6 +123,7 @@ app.command(
     ),
 )(echo)
 app.command("hz", epilog=examples("compose topic hz /sensor_data --window 100"))(hz)
+app.command("delay", epilog=examples("compose topic delay /sensor_data --window 100"))(delay)
 app.command("bw", epilog=examples("compose topic bw /camera/image"))(bw)
 app.command(
     "pub",

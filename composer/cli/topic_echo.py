@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from composer.cli.failure import UsageFailure
+from composer.cli.message_filter import Filter, compiled_filter, is_wanted
 from composer.cli.qos_options import (
     QosDepth,
     QosDurability,
@@ -20,7 +20,6 @@ from composer.cli.terminal import write
 from composer.cli.values import as_json, as_yaml, cut
 
 if TYPE_CHECKING:
-    from composer.expressions import Expression
     from composer.runtime.inspect_topics import Listener
     from composer.runtime.session import Deadline
 
@@ -43,15 +42,7 @@ def echo(
         str | None,
         typer.Option(metavar="PATH", help="Only that part: pose.position.x", show_default=False),
     ] = None,
-    condition: Annotated[
-        str | None,
-        typer.Option(
-            "--filter",
-            metavar="EXPRESSION",
-            help="Only messages for which it is true; they are called message.",
-            show_default=False,
-        ),
-    ] = None,
+    condition: Filter = None,
     full_length: Annotated[
         bool, typer.Option("--full-length", "-f", help="Do not cut long lists and texts.")
     ] = False,
@@ -75,7 +66,7 @@ def echo(
     The subscription asks for no more than what every publisher offers, so that it gets something
     from all of them; --qos-... asks for more.
     """
-    wanted = _compiled(condition)
+    wanted = compiled_filter(condition)
     with ros_session("compose topic", timeout) as (session, deadline):
         from composer.runtime.inspect_topics import Listener, Topics
         from composer.runtime.inspect_values import part, to_plain
@@ -89,34 +80,13 @@ def echo(
         with Listener(session, name, found, profile) as listener:
             left = 1 if once else count
             for message in _messages(listener, name, silence):
-                if wanted is not None and not _is_wanted(wanted, message):
+                if not is_wanted(wanted, message):
                     continue
                 plain = to_plain(message if field is None else part(message, field))
                 _print(plain if full_length or json else cut(plain), json)
                 left = None if left is None else left - 1
                 if left == 0:
                     return
-
-
-def _compiled(condition: str | None) -> Expression | None:
-    if condition is None:
-        return None
-    from composer.expressions import ExpressionError, compile_expression
-
-    try:
-        return compile_expression(condition)
-    except ExpressionError as error:
-        raise UsageFailure(f"--filter: {error}") from error
-
-
-def _is_wanted(condition: Expression, message: Any) -> bool:
-    from composer.expressions import EvaluationError
-    from composer.runtime.session import RosError
-
-    try:
-        return bool(condition.evaluate({"message": message}))
-    except EvaluationError as error:
-        raise RosError(f"--filter: {error}") from error
 
 
 def _messages(listener: Listener, topic: str, silence: float | None) -> Iterator[Any]:

@@ -1,24 +1,29 @@
-"""``compose topic hz`` and ``compose topic bw``: how often and how much."""
+"""``compose topic hz``, ``bw`` and ``delay``: how often, how much and how late."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from composer.cli.listing import Json
-from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
-from composer.cli.terminal import say, write
+from composer.cli.message_filter import Filter, compiled_filter, is_wanted
+from composer.cli.qos_options import (
+    QosDepth,
+    QosDurability,
+    QosPreset,
+    QosReliability,
+    QosWish,
+)
+from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout
+from composer.cli.topic_measure import Measuring, measure
 from composer.cli.values import as_json
 
 if TYPE_CHECKING:
-    from composer.runtime.inspect_rates import Bandwidth, Rate
+    from composer.runtime.inspect_rates import Bandwidth, Delay, Rate
     from composer.runtime.inspect_topics import Received
 
-_REPORT_EVERY_S = 1.0
 _UNITS = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
 
 Topic = Annotated[str, typer.Argument(metavar="TOPIC")]
@@ -36,13 +41,19 @@ def hz(
     *,
     window: Window = 10_000,
     count: Count = None,
+    condition: Filter = None,
     json: Json = False,
+    qos_profile: QosPreset = None,
+    qos_reliability: QosReliability = None,
+    qos_durability: QosDurability = None,
+    qos_depth: QosDepth = None,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """Print how often messages come, once a second, until Ctrl-C."""
     from composer.runtime.inspect_rates import RateWindow
 
     rates = RateWindow(window)
+    wanted = compiled_filter(condition)
 
     def report(_: float) -> str | None:
         rate = rates.rate()
@@ -50,7 +61,14 @@ def hz(
             return None
         return as_json(asdict(rate)) if json else _rate_text(rate)
 
-    _measure(topic, timeout, count, lambda item: rates.add(item.at_s), report)
+    measuring = Measuring(
+        take=lambda item: rates.add(item.at_s),
+        report=report,
+        raw=wanted is None,
+        is_wanted=None if wanted is None else lambda message: is_wanted(wanted, message),
+    )
+    qos = QosWish(qos_profile, qos_reliability, qos_durability, qos_depth)
+    measure(topic, measuring, qos, count, timeout)
 
 
 def bw(
@@ -59,6 +77,10 @@ def bw(
     window: Window = 100,
     count: Count = None,
     json: Json = False,
+    qos_profile: QosPreset = None,
+    qos_reliability: QosReliability = None,
+    qos_durability: QosDurability = None,
+    qos_depth: QosDepth = None,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """Print how much comes, once a second, until Ctrl-C. Sizes are those of serialized messages."""
@@ -72,50 +94,67 @@ def bw(
             return None
         return as_json(asdict(bandwidth)) if json else _bandwidth_text(bandwidth)
 
-    _measure(topic, timeout, count, lambda item: sizes.add(item.at_s, len(item.content)), report)
+    measuring = Measuring(
+        take=lambda item: sizes.add(item.at_s, len(item.content)), report=report, raw=True
+    )
+    qos = QosWish(qos_profile, qos_reliability, qos_durability, qos_depth)
+    measure(topic, measuring, qos, count, timeout)
 
 
-def _measure(
-    topic: str,
-    timeout: float,
-    count: int | None,
-    take: Callable[[Received], None],
-    report: Callable[[float], str | None],
+def delay(
+    topic: Topic,
+    *,
+    window: Window = 10_000,
+    count: Count = None,
+    condition: Filter = None,
+    json: Json = False,
+    qos_profile: QosPreset = None,
+    qos_reliability: QosReliability = None,
+    qos_durability: QosDurability = None,
+    qos_depth: QosDepth = None,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Feed what comes to ``take`` and print what ``report`` says, every second and at the end."""
-    with ros_session("compose topic", timeout) as (session, deadline):
-        from composer.runtime.inspect_topics import Listener, Topics
-        from composer.runtime.session import Deadline
+    """Print how old messages are when they come, once a second, until Ctrl-C.
 
-        topics = Topics(session, deadline)
-        name = topic if topic.startswith("/") else f"/{topic}"
-        type_name = topics.type_of(name)
-        seen = 0
-        with Listener(session, name, type_name, topics.matching(name), raw=True) as listener:
-            tick = Deadline(_REPORT_EVERY_S)
-            before = 0
-            while count is None or seen < count:
-                for item in listener.take(tick)[: None if count is None else count - seen]:
-                    take(item)
-                    seen += 1
-                if tick.passed:
-                    _tell(report(time.monotonic()) if seen > before else None, name)
-                    before, tick = seen, Deadline(_REPORT_EVERY_S)
-        if seen > before:
-            _tell(report(time.monotonic()), name)
+    That is the time since header.stamp, by this computer's clock.
+    """
+    from composer.runtime.inspect_rates import DelayWindow
 
+    delays = DelayWindow(window)
+    wanted = compiled_filter(condition)
 
-def _tell(text: str | None, topic: str) -> None:
-    if text is None:
-        say(f"no new messages over '{topic}'")
-    else:
-        write(text)
+    def take(item: Received) -> None:
+        from composer.runtime.inspect_values import age_s  # imports rclpy: ROS is there by now
+
+        delays.add(age_s(item.content, item.at_s))
+
+    def report(_: float) -> str | None:
+        found = delays.delay()
+        if found is None:
+            return None
+        return as_json(asdict(found)) if json else _delay_text(found)
+
+    measuring = Measuring(
+        take=take,
+        report=report,
+        is_wanted=None if wanted is None else lambda message: is_wanted(wanted, message),
+    )
+    qos = QosWish(qos_profile, qos_reliability, qos_durability, qos_depth)
+    measure(topic, measuring, qos, count, timeout)
 
 
 def _rate_text(rate: Rate) -> str:
     return (
         f"average rate: {rate.average_hz:.3f} Hz  min: {rate.shortest_s:.4f} s"
         f"  max: {rate.longest_s:.4f} s  std dev: {rate.deviation_s:.5f} s  window: {rate.window}"
+    )
+
+
+def _delay_text(delay: Delay) -> str:
+    return (
+        f"average delay: {delay.average_s:.4f} s  min: {delay.shortest_s:.4f} s"
+        f"  max: {delay.longest_s:.4f} s  std dev: {delay.deviation_s:.5f} s"
+        f"  window: {delay.window}"
     )
 
 

@@ -1,4 +1,4 @@
-"""Rates and sizes of what comes over a topic, over a window of the last messages."""
+"""Rates, sizes and ages of what comes over a topic, over a window of the last messages."""
 
 from __future__ import annotations
 
@@ -30,6 +30,17 @@ class Bandwidth:
     window: int
 
 
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """How old messages were when they came, in seconds; ``window`` is the number of messages."""
+
+    average_s: float
+    shortest_s: float
+    longest_s: float
+    deviation_s: float
+    window: int
+
+
 class RateWindow:
     """The times of the last ``size`` messages."""
 
@@ -53,6 +64,29 @@ class RateWindow:
             longest_s=max(periods),
             deviation_s=statistics.pstdev(periods),
             window=len(periods),
+        )
+
+
+class DelayWindow:
+    """The ages of the last ``size`` messages."""
+
+    def __init__(self, size: int) -> None:
+        self._ages_s: deque[float] = deque(maxlen=size)
+
+    def add(self, age: float) -> None:
+        """Note how old a message was when it came, in seconds."""
+        self._ages_s.append(age)
+
+    def delay(self) -> Delay | None:
+        """Return the delay; None before the first message."""
+        if not self._ages_s:
+            return None
+        return Delay(
+            average_s=statistics.fmean(self._ages_s),
+            shortest_s=min(self._ages_s),
+            longest_s=max(self._ages_s),
+            deviation_s=statistics.pstdev(self._ages_s),
+            window=len(self._ages_s),
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from array import array
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -81,6 +82,21 @@ def part(value: Any, path: str) -> Any:
     for name in path.split("."):
         value = _step(value, name, path)
     return value
+
+
+def age_s(message: Any, came_at_s: float) -> float:
+    """Return how many seconds lay between a message's ``header.stamp`` and its coming.
+
+    ``came_at_s`` is by time.monotonic. Raises BadValue for a message without a header.
+    """
+    stamp = getattr(getattr(message, "header", None), "stamp", None)
+    if stamp is None:
+        raise BadValue(
+            f"{type(message).__name__} has no header.stamp, so its age is not known",
+            "compose topic hz tells how often it comes",
+        )
+    now_s = time.time() - (time.monotonic() - came_at_s)
+    return float(now_s - (stamp.sec + stamp.nanosec * 1e-9))
 
 
 def _step(value: Any, name: str, path: str) -> Any:

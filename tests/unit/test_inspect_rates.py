@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.runtime.inspect_rates import BandwidthWindow, RateWindow
+from composer.runtime.inspect_rates import BandwidthWindow, DelayWindow, RateWindow
 
 
 def test_the_rate_is_that_of_the_periods() -> None:
@@ -49,3 +49,15 @@ def test_bandwidth_goes_down_when_nothing_comes_any_more() -> None:
     later = window.bandwidth(4.0)
     assert later is not None
     assert later.bytes_per_s == 100.0
+
+
+def test_ages_are_those_of_the_last_messages() -> None:
+    delays = DelayWindow(2)
+    assert delays.delay() is None
+    for age_s in (9.0, 0.1, 0.3):
+        delays.add(age_s)
+    found = delays.delay()
+    assert found is not None
+    assert (found.shortest_s, found.longest_s, found.window) == (0.1, 0.3, 2)
+    assert found.average_s == pytest.approx(0.2)
+    assert found.deviation_s == pytest.approx(0.1)
