@@ -115,3 +115,6 @@ class Loop(Protocol):
 
     def where(self) -> str:
         """Return the Python stack of the callback that runs now; empty when none does."""
+
+    def threads(self) -> tuple[int, ...]:
+        """Return the identifiers of the threads that are in a callback now."""

@@ -72,11 +72,12 @@ class RunningNode:
         loop: Loop,
         options: NodeOptions,
         listener: Listener,
+        statistics: Statistics | None = None,
     ) -> None:
-        """Join the ROS graph, unconfigured. Raises ParameterError."""
+        """Join the ROS graph, unconfigured; count on from ``statistics``. Raises ParameterError."""
         self.model = model
         self.loop = loop
-        self.statistics = Statistics()
+        self.statistics = statistics or Statistics()
         self._listener = listener
         self._ros = RosNode(
             model.name.value,
@@ -115,6 +116,11 @@ class RunningNode:
     def state(self) -> str:
         """The label of the lifecycle state, as ROS tools see it."""
         return self._lifecycle.state
+
+    @property
+    def cores(self) -> tuple[Core, Core]:
+        """What its parts share: those that stand still unless it is active, and the others."""
+        return self._core, self._standby
 
     @property
     def legal(self) -> Mapping[str, int]:

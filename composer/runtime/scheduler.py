@@ -118,6 +118,11 @@ class Scheduler:
             return ""
         return "".join(traceback.format_stack(frame))
 
+    def threads(self) -> tuple[int, ...]:
+        """Return the identifiers of the threads that are in a callback now."""
+        ident = self._thread.ident
+        return () if ident is None or self._running is None else (ident,)
+
     # --- for those who serve entities
 
     def open_slot(self, *sources: Source) -> Slot:

@@ -184,6 +184,10 @@ class WaitSetLoop:
         ]
         return "\n".join(stacks)
 
+    def threads(self) -> tuple[int, ...]:
+        """Return the identifiers of the threads that are in a callback now."""
+        return tuple(self._running)
+
     def call(self, name: Callable[[], str], callback: Callable[[], object]) -> None:
         """Call ``callback`` on the current thread; what it raises is reported."""
         ident = threading.get_ident()
