@@ -23,7 +23,7 @@ FILE_TOO_LARGE = register(
     _error(
         code="RC002",
         name="file-too-large",
-        summary="A file is larger than a megabyte.",
+        summary="A file is larger than two megabytes.",
         why=(
             "Nobody writes that much YAML: it is a mistake or an attack, and reading it would take "
             "minutes and gigabytes."
@@ -107,7 +107,7 @@ TOO_MANY_VALUES = register(
     _error(
         code="RC007",
         name="too-many-values",
-        summary="A file says more than 150 000 things.",
+        summary="A file says more than 250 000 things.",
         why="Aliases let a few lines stand for more values than any program can go through.",
         bad="a: &a [x, x]\nb: &b [*a, *a]\nc: &c [*b, *b]  # and so on",
         good="a: [x, x]",

@@ -40,7 +40,10 @@ ATTACKS = {
     "indented maps": (nested_blocks(1300), "nested-too-deep"),
     "billion laughs": (laughs(), "too-many-values"),
     "small maps": ("- {a: 1}\n" * (FULL // 9), "too-many-values"),
-    "many keys": ("".join(f"k{number}: 1\n" for number in range(90_000)), "too-many-values"),
+    "many keys": (
+        "".join(f"k{number}: 1\n" for number in range(MAX_VALUES // 2)),
+        "too-many-values",
+    ),
     "alias of itself": ("a: &a [*a]", "bad-alias"),
     "one key again and again": ("a: 1\n" * 20_000, "duplicate-key"),
     "blanks": (" " * FULL, "not-a-map"),

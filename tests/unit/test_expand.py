@@ -230,7 +230,7 @@ def doubling(value: str, last: str) -> str:
         (doubling("['${NEXT}', '${NEXT}']", "laugh"), "variables-too-large", "f:"),
         (doubling("{a: '${NEXT}'}", "1"), "variables-too-large", "f:"),
         (
-            system("{a: [1, 2, 3, 4, 5, 6, 7, 8]}", "[" + "'${a}', " * 20_000 + "]"),
+            system("{a: [1, 2, 3, 4, 5, 6, 7, 8]}", "[" + "'${a}', " * 30_000 + "]"),
             "variables-too-large", "f:3:",
         ),
     ],
