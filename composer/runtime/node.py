@@ -117,6 +117,11 @@ class RunningNode:
         """The label of the lifecycle state, as ROS tools see it."""
         return self._lifecycle.state
 
+    def sent(self, publisher: str) -> int:
+        """Return how many messages went through a publisher since the node was configured."""
+        port = self._assembly.publishers.get(publisher)
+        return 0 if port is None else port.sent
+
     @property
     def cores(self) -> tuple[Core, Core]:
         """What its parts share: those that stand still unless it is active, and the others."""

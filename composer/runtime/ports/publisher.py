@@ -27,6 +27,7 @@ class PublisherPort:
         )
         self._send = self._publisher.publish
         self._warned = False
+        self.sent = 0
 
     def publish(self, message: Any) -> None:
         """Send ``message``. Raises TypeError when it is not of the topic's type."""
@@ -34,6 +35,7 @@ class PublisherPort:
             self._drop()
             return
         self._send(message)
+        self.sent += 1
         self._statistics.sent += 1
 
     def activate(self) -> None:
