@@ -5,13 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+import rclpy
+from rclpy.context import Context
 
 from tests.ros.systems.running import Outsider
 
 
+@pytest.fixture(scope="session")
+def outside(ros_domain_id: int) -> Iterator[Context]:
+    """One DDS participant for all tests: Fast DDS has crashed on deleting many in a row."""
+    context = Context()
+    rclpy.init(context=context)
+    yield context
+    rclpy.shutdown(context=context)
+
+
 @pytest.fixture
-def outsider() -> Iterator[Outsider]:
+def outsider(outside: Context) -> Iterator[Outsider]:
     """A node of an ordinary rclpy process."""
-    node = Outsider()
+    node = Outsider(outside)
     yield node
     node.close()

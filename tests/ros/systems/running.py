@@ -14,7 +14,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
-import rclpy
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -55,9 +54,7 @@ class RunningSystem:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.wait()
+        self._end()
         self._reader.join()
         if error is not None:
             error.add_note("the system printed:\n" + self.output)
@@ -88,6 +85,15 @@ class RunningSystem:
         self._reader.join()
         return code, took_s
 
+    def _end(self) -> None:
+        """Leave nothing running; what is killed would haunt the ROS graph until its lease ends."""
+        self.process.send_signal(signal.SIGINT)
+        try:
+            self.process.wait(timeout=5.0)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
     def _read(self) -> None:
         assert self.process.stdout is not None
         for line in self.process.stdout:
@@ -99,18 +105,15 @@ class RunningSystem:
 class Outsider:
     """An ordinary rclpy node in another process than the system."""
 
-    def __init__(self) -> None:
-        self.context = Context()
-        rclpy.init(context=self.context)
-        self.node = Node("outsider", context=self.context)
-        self.executor = SingleThreadedExecutor(context=self.context)
+    def __init__(self, context: Context) -> None:
+        self.node = Node("outsider", context=context)
+        self.executor = SingleThreadedExecutor(context=context)
         self.executor.add_node(self.node)
 
     def close(self) -> None:
         """Leave the ROS graph."""
         self.executor.shutdown(timeout_sec=1.0)
         self.node.destroy_node()
-        rclpy.shutdown(context=self.context)
 
     def spin_until(self, condition: Callable[[], bool], timeout_s: float = PATIENCE_S) -> None:
         """Serve callbacks until the condition holds."""
