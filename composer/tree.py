@@ -9,16 +9,18 @@ from typing import TypeAlias
 from composer.source import Span
 
 #: A YAML 1.2 core-schema scalar.
-ScalarValue: TypeAlias = "None | bool | int | float | str"
+ScalarValue: TypeAlias = "bool | int | float | str | None"
 #: Plain Python data: what JSON could say.
 Plain: TypeAlias = "ScalarValue | list[Plain] | dict[str, Plain]"
 
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """A single value. ``verbatim`` is true when the text in the file is the value, character by
-    character (no escapes, no folding), so that a part of the value has a place of its own.
-    ``content_offset`` is 1 for quoted scalars: the span includes the quote.
+    """A single value.
+
+    ``verbatim`` is true when the text in the file is the value, character by character (no
+    escapes, no folding), so that a part of the value has a place of its own. ``content_offset`` is
+    1 for quoted scalars: the span includes the quote.
     """
 
     value: ScalarValue

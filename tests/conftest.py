@@ -23,7 +23,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update-golden",
         action="store_true",
-        help="write what the golden tests get as what they expect; read the difference before commit",
+        help="write what the golden tests get as what they expect; read the difference then",
     )
 
 
