@@ -119,9 +119,11 @@ class ActionClient(Protocol):
 
 
 class Goal(Protocol):
-    """A goal being worked on, as an action server's handler gets it. A handler that returns
-    without naming the end has succeeded, or is canceled when that was asked for; one that raises
-    has aborted."""
+    """A goal being worked on, as an action server's handler gets it.
+
+    A handler that returns without naming the end has succeeded, or is canceled when that was asked
+    for; one that raises has aborted.
+    """
 
     @property
     def request(self) -> Any:
