@@ -66,12 +66,13 @@ def keep_stdout_for_data() -> None:
 
     Fast DDS prints its errors there, where another program may be reading what we write.
     """
-    if sys.stdout is not sys.__stdout__:  # done already, or somebody captures it
+    stdout = sys.__stdout__
+    if stdout is None or sys.stdout is not stdout:  # done already, or somebody captures it
         return
-    sys.stdout.flush()
-    ours = os.dup(sys.stdout.fileno())
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    sys.stdout = os.fdopen(ours, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)
+    stdout.flush()
+    ours = os.dup(stdout.fileno())
+    os.dup2(sys.stderr.fileno(), stdout.fileno())
+    sys.stdout = os.fdopen(ours, "w", encoding=stdout.encoding, errors=stdout.errors)
 
 
 def drop_stdout() -> None:
