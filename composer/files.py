@@ -65,9 +65,11 @@ class _Search:
     def look_below(self, folder: Path) -> None:
         project = Project.at(folder)
         for path in sorted(_yaml_files(folder)):
+            if path.name == SETTINGS_FILE:
+                continue  # not looked at, but kept to
             if path.is_symlink() and not project.holds(path):
                 self.findings.append(_stray(path))
-            elif path.name != SETTINGS_FILE and _is_regular(path):
+            elif _is_regular(path):
                 (self.files if _is_ours(path) else self.foreign)[path] = None
 
 

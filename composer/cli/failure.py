@@ -19,11 +19,13 @@ class Failure(Exception):
         self.exit_code = exit_code
 
     def text(self) -> str:
-        """Return the lines for stderr."""
+        """Return the lines for stderr, with nothing in them that could steer the terminal."""
+        from composer.report.display import visible
+
         lines = [f"compose: {self.message}"]
         if self.hint is not None:
             lines.extend(f"  {line}" for line in self.hint.splitlines())
-        return "\n".join(lines)
+        return "\n".join(map(visible, lines))
 
 
 class UsageFailure(Failure):

@@ -1,0 +1,47 @@
+"""Runs ``compose`` as ever, and then writes to a file descriptor what it took and did.
+
+Started as a script of its own, so that nothing but the command is measured. It may not use the
+network or start programs: that ends it with a traceback.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+FORBIDDEN = ("socket.", "subprocess.", "os.exec", "os.posix_spawn", "os.system", "os.fork")
+
+
+def watch(event: str, _: tuple[Any, ...]) -> None:
+    if event.startswith(FORBIDDEN):
+        raise AssertionError(f"{event} was called")
+
+
+def report() -> dict[str, Any]:
+    here = Path.cwd()
+    # Not ru_maxrss, which begins with what the process had that started this one.
+    peak = re.search(r"VmHWM:\s*(\d+)", Path("/proc/self/status").read_text())
+    assert peak is not None
+    files = [getattr(module, "__file__", None) for module in list(sys.modules.values())]
+    return {
+        "cpu_s": time.process_time(),
+        "peak_mb": int(peak[1]) / 1024,
+        "imported": [file for file in files if file and Path(file).is_relative_to(here)],
+    }
+
+
+if __name__ == "__main__":
+    from composer.cli import main
+
+    descriptor = int(sys.argv.pop(1))
+    sys.addaudithook(watch)
+    resource.setrlimit(resource.RLIMIT_CPU, (5, 5))
+    code = main(sys.argv[1:])
+    os.write(descriptor, json.dumps(report()).encode())
+    sys.exit(code)

@@ -1,0 +1,182 @@
+"""The whole of ``compose validate`` on files that mean harm: one finding, at once, and no more."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+LIMITED = Path(__file__).with_name("limited.py")
+LONGEST_S = 1.0
+LARGEST_MB = 200.0
+PLACE = re.compile(r"--> (.+:\d+:\d+)$", re.MULTILINE)
+SUBSCRIBER = """\
+system: a
+nodes:
+  one:
+    subscriptions:
+      chatter: {type: std_msgs/msg/String, qos: command, external: true, when: "%s", log: heard}
+"""
+LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n"
+    for before, name in zip("abcdefgh", "bcdefghi", strict=True)
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How the command ended."""
+
+    code: int
+    out: str
+    err: str
+    imported: list[str]
+
+    @property
+    def rules(self) -> list[str]:
+        return re.findall(r"^(?:error|warning|info)\[RC\d+ (\S+)\]", self.out, re.MULTILINE)
+
+
+def validate(folder: Path, *arguments: str) -> Ended:
+    """Run the command in ``folder``; it must keep within time and memory, and say nothing odd."""
+    read, write = os.pipe()
+    ended = subprocess.run(
+        [sys.executable, str(LIMITED), str(write), "validate", *arguments],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        pass_fds=(write,),
+        timeout=30,
+        check=False,
+    )
+    os.close(write)
+    with os.fdopen(read) as pipe:
+        text = pipe.read()
+    assert text, ended.stderr.decode()
+    took = json.loads(text)
+    assert took["cpu_s"] < LONGEST_S
+    assert took["peak_mb"] < LARGEST_MB
+    for stream in (ended.stdout, ended.stderr):
+        assert re.search(rb"[\x00-\x08\x0b-\x1f\x7f]", stream) is None
+        assert len(stream) < 20_000
+    return Ended(ended.returncode, ended.stdout.decode(), ended.stderr.decode(), took["imported"])
+
+
+ATTACKS = {
+    "brackets": ("[" * 200_000, "nested-too-deep", "1:33"),
+    "billion laughs": (LAUGHS, "too-many-values", "6:16"),
+    "10 MB of small maps": ("- {a: 1}\n" * 1_200_000, "file-too-large", "1:1"),
+    "2 MB of small maps": ("- {a: 1}\n" * 200_000, "too-many-values", "83334:3"),
+    "duplicate keys": ("system: a\nnodes: {one: {}, one: {}}\n", "duplicate-key", "2:18"),
+    "alias of itself": ("system: a\nnodes: &a {one: *a}\n", "bad-alias", "2:17"),
+    "digits": ("system: a\nnodes: {one: {state: {x: " + "9" * 5000 + "}}}\n",
+               "bad-number", "2:26"),
+    "not a number": ("system: a\nnodes: {one: {timers: {t: {rate_hz: .nan, log: x}}}}\n",
+                     "bad-number", "2:37"),
+    "infinity": ("system: a\nnodes: {one: {timers: {t: {rate_hz: .inf, log: x}}}}\n",
+                 "bad-number", "2:37"),
+    "no date": ("system: a\nnodes: {one: {timers: {t: {period_ms: 2024-13-01, log: x}}}}\n",
+                "wrong-type", "2:39"),
+    "no truth": ("system: a\nnodes: {one: {services: {s: {type: std_srvs/srv/Trigger, "
+                 "external: NO, respond: {}}}}}\n", "wrong-type", "2:68"),
+    "sixty minutes": ("system: a\nnodes: {one: {timers: {t: {period_ms: 22:22, log: x}}}}\n",
+                      "wrong-type", "2:39"),
+    "title of the terminal": ('system: a\ndescription: "\\e]0;pwn\\a"\nnodes: {one: {}}\n',
+                              "forbidden-character", "2:14"),
+    "control characters": ("system: a\ndescription: \x1b]0;pwn\x07\nnodes: {one: {}}\n",
+                           "forbidden-character", "2:14"),
+    "direction of text": ("system: a\ndescription: \u202edrow\nnodes: {one: {}}\n",
+                          "forbidden-character", "2:14"),
+    "reference to the network": ('system: a\n$ref: "http://127.0.0.1:9/x"\nnodes: {one: {}}\n',
+                                 "unknown-key", "2:1"),
+    "one typo": ("system: a\nnodes:\n  one: {publishers: {p: {typ: std_msgs/msg/String}}}\n",
+                 "unknown-key", "3:26"),
+    "a tag": ("system: a\nnodes: !!python/object/apply:os.system {one: {}}\n", "yaml-tag", "2:8"),
+    "a long format": (SUBSCRIBER % "'%1000000000d' % 1 == ''", "unfit-value", "5:81"),
+    "a long text": (SUBSCRIBER % "'a' * 1000000000 == ''", "unfit-value", "5:81"),
+    "a large power": (SUBSCRIBER % "9 ** 9 ** 9 > 1", "invalid-expression", "5:83"),
+    "a way out": (SUBSCRIBER % "().__class__.__bases__", "invalid-expression", "5:81"),
+    "a long expression": (SUBSCRIBER % ("1" + " + 1" * 5000), "invalid-expression", "5:81"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "rule", "place"), ATTACKS.values(), ids=ATTACKS)
+def test_attack(tmp_path: Path, text: str, rule: str, place: str) -> None:
+    (tmp_path / "attack.yaml").write_text(text, encoding="utf-8")
+    ended = validate(tmp_path, "attack.yaml")
+    assert (ended.code, ended.rules) == (1, [rule]), ended.out
+    assert PLACE.findall(ended.out)[0] == f"attack.yaml:{place}"
+
+
+def test_user_code_is_read_and_not_run(tmp_path: Path) -> None:
+    (tmp_path / "harm.py").write_text("open('harm', 'w')\nclass Harm:\n    pass\n")
+    (tmp_path / "a.yaml").write_text("system: a\nnodes: {one: {behavior: harm:Harm}}\n")
+    ended = validate(tmp_path, "a.yaml")
+    assert (ended.code, ended.imported) == (0, [])
+    assert not (tmp_path / "harm").exists()
+
+
+def test_pipes_and_devices_are_not_read(tmp_path: Path) -> None:
+    (tmp_path / "nodes").mkdir()
+    (tmp_path / "interfaces" / "evil" / "msg").mkdir(parents=True)
+    (tmp_path / "interfaces" / "evil" / "package.xml").write_text("<name>evil</name>")
+    pipes = ["p.yaml", "nodes/pipe.yaml", "pyproject.toml", "pipe.py", "interfaces/evil/msg/P.msg"]
+    for name in pipes:
+        os.mkfifo(tmp_path / name)
+    text = """\
+system: a
+nodes:
+  one: {type: pipe}
+  two: {behavior: pipe:Pipe}
+  three: {publishers: {p: {type: evil/msg/P, qos: command, external: true}}}
+"""
+    (tmp_path / "a.yaml").write_text(text)
+    ended = validate(tmp_path, ".")
+    assert ended.code == 1
+    assert sorted(ended.rules) == [
+        "behavior-module-missing",
+        "unknown-interface",
+        "unknown-node-type",
+    ]
+    for name in ("p.yaml", "/dev/zero"):
+        ended = validate(tmp_path, name)
+        assert (ended.code, ended.rules) == (1, ["unreadable-file"])
+        assert PLACE.findall(ended.out) == [f"{name}:1:1"]
+
+
+def test_no_link_leads_out_of_the_project(tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("node: secret\nsecret: confidential\n")
+    project = tmp_path / "project"
+    (project / "nodes").mkdir(parents=True)
+    for name in ("nodes/secret.yaml", "linked.yaml", "linked.py", "composer.yaml"):
+        (project / name).symlink_to(secret)
+    text = "system: a\nnodes:\n  one: {type: secret}\n  two: {behavior: linked:Linked}\n"
+    (project / "a.yaml").write_text(text)
+    ended = validate(project, ".")
+    assert ended.code == 1
+    assert sorted(ended.rules) == [
+        "behavior-module-missing",
+        "unknown-node-type",
+        "unreadable-file",
+        "unreadable-file",
+        "unreadable-file",
+    ]
+    assert ended.out.count("a link that leads out of the project") == 5
+    assert "confidential" not in ended.out + ended.err
+
+
+@pytest.mark.parametrize("report", ["text", "json", "sarif", "github"])
+def test_names_of_files_steer_no_terminal(tmp_path: Path, report: str) -> None:
+    names = [b"\x1b]0;pwn\x07.yaml", b"\xff\xfe.yaml", b"\xe2\x80\xae.yaml"]
+    for name in names:
+        (tmp_path / os.fsdecode(name)).write_text("system: [\n")
+    (tmp_path / "\x1b[2J.yaml").write_text("foreign: true\n")
+    assert validate(tmp_path, ".", "--format", report).code == 1
+    assert validate(tmp_path, "\x1b[2J missing.yaml").code == 2
