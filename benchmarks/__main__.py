@@ -1,14 +1,77 @@
-"""Run every benchmark and print its table."""
+"""Run the benchmarks, print the table, write the figures."""
 
 from __future__ import annotations
 
-from benchmarks import start_up, validation
+import argparse
+import json
+import os
+import platform
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+from benchmarks import pipeline, start_up, systems
+from benchmarks.figures import Row, as_json, table
+
+RESULTS = Path(__file__).parent / "results"
+BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
+    "commands": ("wall time of commands that start nothing", start_up.measure),
+    "pipeline": ("CPU of systems/pipeline.yaml", pipeline.measure),
+    "chain": ("CPU per message, start-up and memory of N nodes", systems.chain),
+    "timers": ("jitter of a timer", systems.timers),
+}
 
 
 def main() -> None:
-    start_up.main()
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help="which; all of them unless given")
+    parser.add_argument("--list", action="store_true", help="say which there are")
+    parser.add_argument("--long", action="store_true", help="more rounds, sizes and time")
+    options = parser.parse_args()
+    if options.list:
+        for name, (purpose, _) in BENCHMARKS.items():
+            print(f"{name:<10} {purpose}")
+        return
+    unknown = sorted(set(options.names) - set(BENCHMARKS))
+    if unknown:
+        parser.error(f"no such benchmark: {', '.join(unknown)}; there is {', '.join(BENCHMARKS)}")
+    _run(options.names or list(BENCHMARKS), long=options.long)
+
+
+def _run(names: list[str], *, long: bool) -> None:
+    load_before = os.getloadavg()[0]
+    began_s = time.monotonic()
+    rows: list[Row] = []
+    for name in names:
+        purpose, measure = BENCHMARKS[name]
+        print(f"==> {name}: {purpose}", flush=True)
+        rows += measure(long=long)
     print()
-    validation.main()
+    print(table(rows))
+    print()
+    print("Medians of the rounds; a ratio is ours / theirs of one round, below 1 is less for ours.")
+    print(
+        f"Load of the machine: {load_before:.1f} before, {os.getloadavg()[0]:.1f} after;", end=" "
+    )
+    print(f"{os.cpu_count()} processors, {time.monotonic() - began_s:.0f} s.")
+    print(f"Every figure: {_write(rows, load_before, long=long)}")
+
+
+def _write(rows: list[Row], load_before: float, *, long: bool) -> Path:
+    now = datetime.now(UTC)
+    RESULTS.mkdir(exist_ok=True)
+    path = RESULTS / f"{now:%Y%m%dT%H%M%SZ}.json"
+    content = {
+        "time": now.isoformat(timespec="seconds"),
+        "python": platform.python_version(),
+        "processors": os.cpu_count(),
+        "load": [load_before, os.getloadavg()[0]],
+        "long": long,
+        "rows": as_json(rows),
+    }
+    path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    return path
 
 
 if __name__ == "__main__":

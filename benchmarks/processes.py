@@ -1,0 +1,56 @@
+"""Starts what is measured: a process of its own each, in a ROS domain of its own."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+RESULT_MARK = "RESULT "  # begins the one line of a program's output that is its result
+_LOWEST_DOMAIN_ID, _DOMAIN_IDS = 30, 70  # above 101 the ports may meet those that Linux gives out
+
+_domain_ids = itertools.cycle(
+    _LOWEST_DOMAIN_ID + (os.getpid() + step) % _DOMAIN_IDS for step in range(_DOMAIN_IDS)
+)
+
+
+class ProgramFailed(Exception):
+    """A measured program that gave no result; the text says how it ended."""
+
+
+def environment() -> Mapping[str, str]:
+    """Return the environment of the next process: a domain of its own, this machine only."""
+    return {
+        **os.environ,
+        "ROS_DOMAIN_ID": str(next(_domain_ids)),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    }
+
+
+def run_program(name: str, *arguments: str, timeout_s: float) -> dict[str, Any]:
+    """Run ``benchmarks.programs.<name>`` and return what it measured. Raises ProgramFailed."""
+    command = [sys.executable, "-m", f"benchmarks.programs.{name}", *arguments]
+    try:
+        done = subprocess.run(
+            command,
+            cwd=ROOT,
+            env=environment(),
+            capture_output=True,
+            text=True,
+            timeout=timeout_s,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise ProgramFailed(f"no result within {timeout_s:g} s") from error
+    for line in done.stdout.splitlines():
+        if line.startswith(RESULT_MARK):
+            result: dict[str, Any] = json.loads(line.removeprefix(RESULT_MARK))
+            return result
+    last = (done.stderr.strip().splitlines() or ["nothing on stderr"])[-1]
+    raise ProgramFailed(f"exit code {done.returncode}: {last}")

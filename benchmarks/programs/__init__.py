@@ -1,0 +1,1 @@
+"""What is measured, each run as a process of its own."""

@@ -1,0 +1,115 @@
+"""What all the measured systems do alike, and how it is counted.
+
+A ring of nodes passes one message on and on; or one node's timer ticks. The same functions are
+called by the composer's nodes and by the hand-written ones, so that counting costs all the same.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from benchmarks.processes import RESULT_MARK
+
+PAYLOAD = "x" * 32
+KICK_PERIOD_S = 0.2
+_BYTES_PER_MB = 1_000_000
+_PATIENCE_S = 10.0
+_WARM_UP_S = 0.3
+
+
+@dataclass(slots=True)
+class Counts:
+    """What callbacks write and the main thread reads."""
+
+    delivered: int = 0
+    ticks_ns: list[int] = field(default_factory=list)
+
+
+COUNTS = Counts()
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """How large the system is, and what is measured for how long; no timer means the ring."""
+
+    executor: str
+    nodes: int
+    seconds: float
+    timer_hz: float | None
+
+
+def task_from_arguments() -> Task:
+    """Read the command line."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("executor")
+    parser.add_argument("--nodes", type=int, required=True)
+    parser.add_argument("--seconds", type=float, required=True)
+    parser.add_argument("--timer-hz", type=float)
+    return Task(**vars(parser.parse_args()))
+
+
+def topic(index: int, nodes: int) -> str:
+    """Return the topic that node ``index`` of the ring listens to."""
+    return f"/stage_{index % nodes}"
+
+
+def needs_kick(seen: int) -> bool:
+    """Say whether nothing moved since ``seen``: the first messages may precede the matching."""
+    return COUNTS.delivered == seen
+
+
+def memory_mb() -> float:
+    """Return the resident memory of this process."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / _BYTES_PER_MB
+
+
+def measure(
+    task: Task,
+    started_s: float,
+    memory_before_mb: float,
+    kick: Callable[[], None] = lambda: None,
+) -> dict[str, Any]:
+    """Let the running system work for a while and return what that took.
+
+    ``kick`` is called until something moves; a system that kicks itself needs none.
+    """
+    figures: dict[str, Any] = {
+        "start_s": time.perf_counter() - started_s,
+        "memory_mb": memory_mb() - memory_before_mb,
+    }
+    _wait_for_work(kick)
+    time.sleep(_WARM_UP_S)
+    delivered, ticks = COUNTS.delivered, len(COUNTS.ticks_ns)
+    cpu_s, wall_s = time.process_time(), time.perf_counter()
+    time.sleep(task.seconds)
+    figures["cpu_s"] = time.process_time() - cpu_s
+    figures["wall_s"] = time.perf_counter() - wall_s
+    figures["delivered"] = COUNTS.delivered - delivered
+    figures["ticks_ns"] = COUNTS.ticks_ns[ticks:]
+    return figures
+
+
+def hand_over(figures: dict[str, Any]) -> None:
+    """Print the result and end at once: how a system ends is not measured here."""
+    print(RESULT_MARK + json.dumps(figures), flush=True)
+    sys.stderr.flush()
+    os._exit(0)
+
+
+def _wait_for_work(kick: Callable[[], None]) -> None:
+    until_s = time.monotonic() + _PATIENCE_S
+    while not (COUNTS.delivered or COUNTS.ticks_ns):
+        if time.monotonic() > until_s:
+            print(f"nothing moved within {_PATIENCE_S:g} s", file=sys.stderr, flush=True)
+            os._exit(1)
+        kick()
+        time.sleep(KICK_PERIOD_S)
