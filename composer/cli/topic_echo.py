@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from composer.cli.message_filter import Filter, compiled_filter, is_wanted
 from composer.cli.qos_options import (
     QosDepth,
     QosDurability,
@@ -18,6 +17,7 @@ from composer.cli.qos_options import (
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
 from composer.cli.terminal import write
 from composer.cli.values import as_json, as_yaml, cut
+from composer.cli.wanted_messages import Filter, Silence, compiled_filter, is_wanted
 
 if TYPE_CHECKING:
     from composer.runtime.inspect_topics import Listener
@@ -47,14 +47,7 @@ def echo(
         bool, typer.Option("--full-length", "-f", help="Do not cut long lists and texts.")
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
-    silence: Annotated[
-        float | None,
-        typer.Option(
-            metavar="SECONDS",
-            help="Fail when no message comes for so long.",
-            show_default="wait for ever",
-        ),
-    ] = None,
+    silence: Silence = None,
     qos_profile: QosPreset = None,
     qos_reliability: QosReliability = None,
     qos_durability: QosDurability = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,13 +33,29 @@ class Measuring:
     is_wanted: Callable[[Any], bool] | None = None
 
 
-def measure(
-    topic: str, measuring: Measuring, qos: QosWish, count: int | None, timeout_s: float
-) -> None:
-    """Take what comes until ``count`` messages have; print reports every second and at the end."""
-    with ros_session("compose topic", timeout_s) as (session, deadline):
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """When measuring ends. The time limit is for finding the topic, silence for what comes."""
+
+    timeout_s: float
+    count: int
+    silence_s: float
+
+    @classmethod
+    def given(cls, timeout: float, count: int | None, silence: float | None) -> Limits:
+        """Return the limits of the options; what is not given never ends anything."""
+        return cls(
+            timeout,
+            sys.maxsize if count is None else count,
+            float("inf") if silence is None else silence,
+        )
+
+
+def measure(topic: str, measuring: Measuring, qos: QosWish, limits: Limits) -> None:
+    """Take what comes up to the limits; print reports every second and at the end."""
+    with ros_session("compose topic", limits.timeout_s) as (session, deadline):
         from composer.runtime.inspect_topics import Listener, Topics
-        from composer.runtime.session import Deadline
+        from composer.runtime.session import Deadline, NoAnswer
 
         topics = Topics(session, deadline)
         name = topic if topic.startswith("/") else f"/{topic}"
@@ -46,12 +63,17 @@ def measure(
         profile = qos.applied_to(topics.matching(name))
         seen = before = 0
         with Listener(session, name, type_name, profile, raw=measuring.raw) as listener:
-            tick = Deadline(_REPORT_EVERY_S)
-            while count is None or seen < count:
-                wanted = [item for item in listener.take(tick) if _is_wanted(measuring, item)]
-                for item in wanted[: None if count is None else count - seen]:
+            tick, patience = Deadline(_REPORT_EVERY_S), Deadline(limits.silence_s)
+            while seen < limits.count:
+                next_s = Deadline(min(tick.left_s, patience.left_s))
+                wanted = [item for item in listener.take(next_s) if _is_wanted(measuring, item)]
+                for item in wanted[: limits.count - seen]:
                     measuring.take(item)
                     seen += 1
+                if wanted:
+                    patience = Deadline(limits.silence_s)
+                elif patience.passed:
+                    raise NoAnswer(f"nothing came over '{name}' for {limits.silence_s:g} s")
                 if tick.passed:
                     _tell(measuring.report(time.monotonic()) if seen > before else None, name)
                     before, tick = seen, Deadline(_REPORT_EVERY_S)

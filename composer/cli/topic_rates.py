@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.listing import Json
-from composer.cli.message_filter import Filter, compiled_filter, is_wanted
 from composer.cli.qos_options import (
     QosDepth,
     QosDurability,
@@ -17,8 +16,9 @@ from composer.cli.qos_options import (
     QosWish,
 )
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout
-from composer.cli.topic_measure import Measuring, measure
+from composer.cli.topic_measure import Limits, Measuring, measure
 from composer.cli.values import as_json
+from composer.cli.wanted_messages import Filter, Silence, compiled_filter, is_wanted
 
 if TYPE_CHECKING:
     from composer.runtime.inspect_rates import Bandwidth, Delay, Rate
@@ -43,6 +43,7 @@ def hz(
     count: Count = None,
     condition: Filter = None,
     json: Json = False,
+    silence: Silence = None,
     qos_profile: QosPreset = None,
     qos_reliability: QosReliability = None,
     qos_durability: QosDurability = None,
@@ -68,7 +69,7 @@ def hz(
         is_wanted=None if wanted is None else lambda message: is_wanted(wanted, message),
     )
     qos = QosWish(qos_profile, qos_reliability, qos_durability, qos_depth)
-    measure(topic, measuring, qos, count, timeout)
+    measure(topic, measuring, qos, Limits.given(timeout, count, silence))
 
 
 def bw(
@@ -77,6 +78,7 @@ def bw(
     window: Window = 100,
     count: Count = None,
     json: Json = False,
+    silence: Silence = None,
     qos_profile: QosPreset = None,
     qos_reliability: QosReliability = None,
     qos_durability: QosDurability = None,
@@ -98,7 +100,7 @@ def bw(
         take=lambda item: sizes.add(item.at_s, len(item.content)), report=report, raw=True
     )
     qos = QosWish(qos_profile, qos_reliability, qos_durability, qos_depth)
-    measure(topic, measuring, qos, count, timeout)
+    measure(topic, measuring, qos, Limits.given(timeout, count, silence))
 
 
 def delay(
@@ -108,6 +110,7 @@ def delay(
     count: Count = None,
     condition: Filter = None,
     json: Json = False,
+    silence: Silence = None,
     qos_profile: QosPreset = None,
     qos_reliability: QosReliability = None,
     qos_durability: QosDurability = None,
@@ -140,7 +143,7 @@ def delay(
         is_wanted=None if wanted is None else lambda message: is_wanted(wanted, message),
     )
     qos = QosWish(qos_profile, qos_reliability, qos_durability, qos_depth)
-    measure(topic, measuring, qos, count, timeout)
+    measure(topic, measuring, qos, Limits.given(timeout, count, silence))
 
 
 def _rate_text(rate: Rate) -> str:

@@ -1,4 +1,4 @@
-"""``--filter``: which messages of a topic are wanted, as an expression of the language."""
+"""Which messages of a topic are wanted, and for how long they are waited for."""
 
 from __future__ import annotations
 
@@ -18,6 +18,15 @@ Filter = Annotated[
         metavar="EXPRESSION",
         help="Only messages for which it is true; they are called message.",
         show_default=False,
+    ),
+]
+
+Silence = Annotated[
+    float | None,
+    typer.Option(
+        metavar="SECONDS",
+        help="Fail when no message comes for so long.",
+        show_default="wait for ever",
     ),
 ]
 
