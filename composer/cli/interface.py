@@ -9,7 +9,9 @@ import typer
 
 from composer.cli.failure import Failure
 from composer.cli.help import examples
+from composer.cli.listing import Json
 from composer.cli.terminal import write
+from composer.cli.values import as_json
 
 if TYPE_CHECKING:
     from composer.interfaces import Interfaces, Message
@@ -30,15 +32,17 @@ def list_interfaces(
     only_messages: Annotated[bool, typer.Option("--only-msgs", "-m", help="Messages.")] = False,
     only_services: Annotated[bool, typer.Option("--only-srvs", "-s", help="Services.")] = False,
     only_actions: Annotated[bool, typer.Option("--only-actions", "-a", help="Actions.")] = False,
+    json: Json = False,
 ) -> None:
     """List the types that are known."""
     asked = {"msg": only_messages, "srv": only_services, "action": only_actions}
     interfaces = _interfaces()
-    for folder, wanted in asked.items():
-        if wanted or not any(asked.values()):
-            names = interfaces.names(folder)
-            if names:
-                write("\n".join(names))
+    folders = [folder for folder, wanted in asked.items() if wanted or not any(asked.values())]
+    names = [name for folder in folders for name in interfaces.names(folder)]
+    if json:
+        write(as_json(names, indent=2))
+    elif names:
+        write("\n".join(names))
 
 
 @app.command(
@@ -52,6 +56,7 @@ def show(
     name: Annotated[str, typer.Argument(metavar="TYPE", help="std_msgs/msg/String")],
     *,
     flat: Annotated[bool, typer.Option("--flat", help="Do not open the messages in it.")] = False,
+    json: Json = False,
 ) -> None:
     """Print the fields of a type; messages in it are opened, indented."""
     from composer.diagnostics import suggestion
@@ -61,7 +66,12 @@ def show(
     if found is None:
         known = [item for folder in ("msg", "srv", "action") for item in interfaces.names(folder)]
         raise Failure(f"there is no type '{name}'", hint=suggestion(name, known))
-    write("\n---\n".join(_lines_of(part, interfaces, flat) for part in _parts(found)))
+    if json:
+        parts = {title: _as_data(part) for title, part in _parts(found).items()}
+        write(as_json({"name": name, **parts}, indent=2))
+        return
+    parts_shown = (_lines_of(part, interfaces, flat) for part in _parts(found).values())
+    write("\n---\n".join(parts_shown))
 
 
 def _interfaces() -> Interfaces:
@@ -72,16 +82,30 @@ def _interfaces() -> Interfaces:
     return Interfaces.load(interface_folders(Project.at(Path.cwd())))
 
 
-def _parts(found: Any) -> list[Message]:
+def _parts(found: Any) -> dict[str, Message]:
     from composer.interfaces import Action, Service
 
     match found:
         case Service():
-            return [found.request, found.response]
+            return {"request": found.request, "response": found.response}
         case Action():
-            return [found.goal, found.result, found.feedback]
+            return {"goal": found.goal, "result": found.result, "feedback": found.feedback}
         case _:
-            return [found]
+            return {"message": found}
+
+
+def _as_data(message: Message) -> dict[str, Any]:
+    """Return the fields and constants; messages in it are named, not opened."""
+    return {
+        "fields": [
+            {"name": field.name, "type": str(field.type), "default": field.default}
+            for field in message.fields
+        ],
+        "constants": [
+            {"name": item.name, "type": str(item.type), "value": item.value}
+            for item in message.constants
+        ],
+    }
 
 
 def _lines_of(message: Message, interfaces: Interfaces, flat: bool, indent: str = "") -> str:

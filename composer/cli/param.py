@@ -13,7 +13,7 @@ from composer.cli.failure import Failure, UsageFailure
 from composer.cli.help import examples
 from composer.cli.listing import Json
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
-from composer.cli.terminal import columns, write
+from composer.cli.terminal import columns, say, write
 from composer.cli.values import as_json, as_yaml
 
 if TYPE_CHECKING:
@@ -45,17 +45,40 @@ def _parameters(node: str, timeout: float) -> Iterator[Parameters]:
         yield Parameters(session, deadline, node)
 
 
-@app.command("list", epilog=examples("compose param list planner"))
+@app.command("list", epilog=examples("compose param list planner", "compose param list"))
 def list_parameters(
-    node: Node, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
+    node: Annotated[
+        str | None,
+        typer.Argument(metavar="[NODE]", help="Left out: all nodes.", show_default=False),
+    ] = None,
+    *,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """List the parameters of a node."""
+    """List the parameters of a node, or of all nodes."""
+    if node is None:
+        _list_all(json, timeout)
+        return
     with _parameters(node, timeout) as parameters:
         names = parameters.names()
     if json:
         write(as_json(list(names), indent=2))
     elif names:
         write("\n".join(names))
+
+
+def _list_all(json: bool, timeout: float) -> None:
+    with ros_session("compose param", timeout) as (session, deadline):
+        from composer.runtime.inspect_parameters import names_by_node
+
+        found = names_by_node(session, deadline)
+    if json:
+        write(as_json(found, indent=2))
+    for node, names in () if json else found.items():
+        if names is None:
+            say(f"{node} did not answer: its parameter services may be off, or its process busy")
+        else:
+            write("\n".join((f"{node}:", *(f"  {name}" for name in names))))
 
 
 @app.command("get", epilog=examples("compose param get planner max_velocity"))
@@ -85,21 +108,32 @@ def set_value(
 
 @app.command("describe", epilog=examples("compose param describe planner max_velocity"))
 def describe(
-    node: Node, name: Name, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
+    node: Node,
+    names: Annotated[list[str], typer.Argument(metavar="PARAMETER...")],
+    *,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Print what a node says of a parameter: type, bounds, meaning."""
+    """Print what a node says of parameters: type, bounds, meaning.
+
+    The JSON of one is a map, that of several is a list.
+    """
     with _parameters(node, timeout) as parameters:
-        (found,) = parameters.describe([name])
-    facts = _facts(found)
-    write(as_json(facts, indent=2) if json else columns([(f"{k}:", str(facts[k])) for k in facts]))
+        described = [_facts(found) for found in parameters.describe(names)]
+    if json:
+        write(as_json(described[0] if len(described) == 1 else described, indent=2))
+        return
+    tables = (columns([(f"{key}:", str(facts[key])) for key in facts]) for facts in described)
+    write("\n\n".join(tables))
 
 
 @app.command("dump", epilog=examples("compose param dump planner > planner.yaml"))
-def dump(node: Node, *, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
+def dump(node: Node, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
     """Print all parameters as a ROS parameter file."""
     with _parameters(node, timeout) as parameters:
         values = parameters.values(parameters.names())
-    write(as_yaml({parameters.node: {"ros__parameters": values}}))
+    content = {parameters.node: {"ros__parameters": values}}
+    write(as_json(content, indent=2) if json else as_yaml(content))
 
 
 @app.command("load", epilog=examples("compose param load planner planner.yaml"))

@@ -47,12 +47,13 @@ def list_services(
 
 
 @app.command("type", epilog=examples("compose service type /plan_trajectory"))
-def type_of(service: Service, *, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
+def type_of(service: Service, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
     """Print the type of a service."""
     with ros_session("compose service", timeout) as (session, deadline):
         from composer.runtime.inspect_names import Names
 
-        write("\n".join(Names(session, deadline).types("service", service)))
+        types = Names(session, deadline).types("service", service)
+    write(as_json(list(types), indent=2) if json else "\n".join(types))
 
 
 @app.command(

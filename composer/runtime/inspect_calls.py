@@ -20,6 +20,7 @@ _STATUS = {
     GoalStatus.STATUS_ABORTED: "aborted",
 }
 _CANCEL_PATIENCE_S = 2.0
+_LAST_WORDS_S = 0.5
 
 #: Says whether somebody wants the end.
 Stop = Callable[[], bool]
@@ -49,15 +50,24 @@ def call_service(
 class Goal:
     """A goal that an action server has taken."""
 
-    def __init__(self, session: Session, handle: ClientGoalHandle) -> None:
+    def __init__(
+        self, session: Session, client: ActionClient, name: str, handle: ClientGoalHandle
+    ) -> None:
         self._session = session
+        self._client = client
+        self._name = name
         self._handle = handle
         self._result: Future = handle.get_result_async()
 
     def result(self, stop: Stop) -> Outcome | None:
-        """Wait for the end of the goal; None when ``stop`` comes first."""
+        """Wait for the end of the goal; None when ``stop`` comes first.
+
+        Raises NoAnswer when the server goes away.
+        """
         while not self._result.done() and not stop():
             self._session.spin_once(Deadline(1.0))
+            if not self._client.server_is_ready():
+                self._take_last_words()
         return self._outcome() if self._result.done() else None
 
     def cancel(self) -> Outcome:
@@ -67,6 +77,12 @@ class Goal:
         if self._session.wait_for(lambda: self._result.done() or None, patience) is None:
             raise NoAnswer("the goal was to be canceled and goes on")
         return self._outcome()
+
+    def _take_last_words(self) -> None:
+        """Take a result that a server sent before it went away. Raises NoAnswer."""
+        patience = Deadline(_LAST_WORDS_S)
+        if self._session.wait_for(lambda: self._result.done() or None, patience) is None:
+            raise NoAnswer(f"the server of '{self._name}' is gone, and the goal with it")
 
     def _outcome(self) -> Outcome:
         response = self._result.result()
@@ -110,6 +126,6 @@ def sent_goal(session: Session, deadline: Deadline, sending: Sending) -> Iterato
             raise NoAnswer(f"'{name}' did not say within {deadline.timeout_s:g} s if it takes it")
         if not answer.result().accepted:
             raise Rejected(f"'{name}' rejected the goal")
-        yield Goal(session, answer.result())
+        yield Goal(session, client, name, answer.result())
     finally:
         client.destroy()

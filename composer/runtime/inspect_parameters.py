@@ -21,6 +21,7 @@ from composer.runtime.inspect_names import Names
 from composer.runtime.session import Deadline, NoAnswer, RosError, Session
 
 _NOT_SET = "not set"
+_LIST_SERVICE = "/list_parameters"
 _TYPES = {
     ParameterType.PARAMETER_NOT_SET: _NOT_SET,
     ParameterType.PARAMETER_BOOL: "bool",
@@ -76,7 +77,7 @@ class Parameters:
         self._check_known(wanted)
         request = GetParameters.Request(names=wanted)
         response = self._call(GetParameters, "get_parameters", request)
-        return {name: _python(value) for name, value in zip(wanted, response.values, strict=True)}
+        return {name: plain_value(value) for name, value in zip(wanted, response.values, strict=True)}
 
     def describe(self, names: Iterable[str]) -> tuple[Description, ...]:
         """Return what the node says of parameters. Raises UnknownParameter."""
@@ -122,7 +123,22 @@ class Parameters:
             ) from error
 
 
-def _python(value: ParameterValue) -> Any:
+def names_by_node(session: Session, deadline: Deadline) -> dict[str, list[str] | None]:
+    """Return the names of all nodes' parameters; None for a node that did not answer in time."""
+    # A node without parameter services has none to tell of.
+    services = {
+        name: name.removesuffix(_LIST_SERVICE)
+        for name, _ in Names(session, deadline).services()
+        if name.endswith(_LIST_SERVICE)
+    }
+    responses = session.call_each(ListParameters, services, ListParameters.Request(), deadline)
+    return {
+        node: None if responses[name] is None else sorted(responses[name].result.names)
+        for name, node in services.items()
+    }
+
+
+def plain_value(value: ParameterValue) -> Any:
     """Return the value as plain data; byte strings become numbers."""
     found = parameter_value_to_python(value)
     if isinstance(found, list):

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import json
+
 from tests.cli.compose import compose
 
 
@@ -44,3 +46,13 @@ def test_an_unknown_type_gets_the_nearest() -> None:
     done = compose("interface", "show", "std_msgs/msg/Sting")
     assert done.code == 1
     assert "did you mean 'std_msgs/msg/String'?" in done.err
+
+
+def test_types_are_listed_and_shown_for_programs() -> None:
+    listed = json.loads(compose("interface", "list", "--only-srvs", "--json").out)
+    assert listed == compose("interface", "list", "--only-srvs").out.split()
+    shown = json.loads(compose("interface", "show", "std_srvs/srv/SetBool", "--json").out)
+    assert shown["name"] == "std_srvs/srv/SetBool"
+    assert shown["request"]["fields"] == [{"name": "data", "type": "bool", "default": None}]
+    log = json.loads(compose("interface", "show", "rcl_interfaces/msg/Log", "--json").out)
+    assert {"name": "DEBUG", "type": "uint8", "value": 10} in log["message"]["constants"]

@@ -186,6 +186,16 @@ def test_bw_counts_serialized_bytes() -> None:
     assert found["bytes_per_s"] == pytest.approx(400.0, rel=0.1)
 
 
+def test_measuring_looks_at_wanted_messages_only_and_does_not_wait_for_ever() -> None:
+    even = ("--filter", "message.data % 2 == 0", "--count", "20", "--json")
+    last = out("topic", "hz", "/lab/count", *even).splitlines()[-1]
+    assert json.loads(last)["average_hz"] == pytest.approx(25.0, rel=0.1)
+    silence = ("--silence", "0.2", "--qos-reliability", "reliable")
+    assert "nothing came over '/lab/count' for 0.2 s" in error(
+        "topic", "bw", "/lab/count", *silence
+    )
+
+
 def test_what_is_published_arrives() -> None:
     arguments = ("/lab/in", "std_msgs/msg/String", '{data: "number {count}"}')
     done = compose("topic", "pub", "-r", "20", "--times", "2", *arguments)
@@ -208,6 +218,7 @@ def test_publishing_says_what_is_wrong() -> None:
 def test_services() -> None:
     assert "/lab/add" in out("service", "list").split()
     assert out("service", "type", "/lab/add") == "std_srvs/srv/SetBool\n"
+    assert json.loads(out("service", "type", "/lab/add", "--json")) == ["std_srvs/srv/SetBool"]
     answer = {"success": True, "message": "switched"}
     assert yaml.safe_load(out("service", "call", "/lab/add", "{data: true}")) == answer
     typed = ("service", "call", "/lab/add", "std_srvs/srv/SetBool", "{data: true}", "--json")
@@ -287,6 +298,14 @@ def test_a_parameter_is_described() -> None:
         "minimum": 0.0,
         "maximum": 5.0,
     }
+
+
+def test_parameters_of_all_nodes_are_listed_and_several_described() -> None:
+    everything = json.loads(out("param", "list", "--json"))
+    assert {"speed", "name", "gains"} <= set(everything["/lab/talker"])
+    assert "/lab/talker:\n" in out("param", "list")
+    several = json.loads(out("param", "describe", "talker", "speed", "name", "--json"))
+    assert [item["name"] for item in several] == ["speed", "name"]
 
 
 def test_what_is_dumped_can_be_loaded(tmp_path: Path) -> None:
