@@ -27,7 +27,7 @@ MISSING_S = 3.0
 #: With Fast DDS a new participant is met at once or, in about half of the cases, only with the
 #: next announcement up to 3 s later (measured). Joining anew is another throw of that coin.
 _MEET_WITHIN_S = 0.25
-_JOINS = 4
+_JOINS = 8
 #: Commands do not count as somebody: they come and go.
 _NAME_PREFIX = "_compose_"
 
