@@ -77,7 +77,9 @@ class Parameters:
         self._check_known(wanted)
         request = GetParameters.Request(names=wanted)
         response = self._call(GetParameters, "get_parameters", request)
-        return {name: plain_value(value) for name, value in zip(wanted, response.values, strict=True)}
+        return {
+            name: plain_value(value) for name, value in zip(wanted, response.values, strict=True)
+        }
 
     def describe(self, names: Iterable[str]) -> tuple[Description, ...]:
         """Return what the node says of parameters. Raises UnknownParameter."""
