@@ -6,6 +6,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 SYSTEM ?= systems/pipeline.yaml
+FUZZ_SECONDS ?= 600
 
 BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
@@ -20,7 +21,7 @@ ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION
 endif
 
-.PHONY: help run test check lint format bench clean
+.PHONY: help run test check lint format bench fuzz clean
 .NOTPARALLEL:
 
 help:
@@ -29,6 +30,7 @@ help:
 	@echo "make check    run what CI runs: lint, types, layers, tests"
 	@echo "make format   format the Python code"
 	@echo "make bench    measure"
+	@echo "make fuzz     look for files that validate cannot take (FUZZ_SECONDS=$(FUZZ_SECONDS))"
 	@echo "make clean    remove everything that was built or installed here"
 
 # Ctrl-C is to reach the system, which ends in order, and not make, which would call it an error.
@@ -55,6 +57,11 @@ format: $(STAMPS)/checks
 
 bench: $(STAMPS)/composer $(STAMPS)/interfaces
 	@$(BIN)/python -m benchmarks
+
+# atheris finds more, where there is a wheel of it for this Python.
+fuzz: $(STAMPS)/composer $(STAMPS)/checks
+	@$(INSTALL) atheris || echo "==> no atheris for this Python: without it"
+	@$(BIN)/python tools/fuzz.py --seconds $(FUZZ_SECONDS)
 
 clean:
 	rm -rf $(VENV) build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache

@@ -1,0 +1,64 @@
+"""What holds for everything that ``compose validate`` can be given."""
+
+from __future__ import annotations
+
+import io
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+from composer.diagnostics import Diagnostic
+from composer.document import read_document
+from composer.interfaces import Interfaces
+from composer.loading import load_bytes
+from composer.report import github, sarif, text
+from composer.report import json as report
+from composer.resources import interfaces_folder, nodes_folder, systems_folder
+from composer.source import Span
+from composer.tree import plain
+
+ROOT = Path(__file__).parents[2]
+INTERFACES = Interfaces.load([interfaces_folder()])
+SHIPPED = tuple(
+    path for folder in (systems_folder(), nodes_folder()) for path in sorted(folder.glob("*.yaml"))
+)
+RENDERERS = (report.render, sarif.render, github.render, text.render)
+
+
+def shipped_contents() -> list[Any]:
+    """Return what the shipped systems and node types say."""
+    trees = (read_document(path)[0] for path in SHIPPED)
+    return [plain(tree) for tree in trees if tree is not None]
+
+
+def judge(data: bytes) -> list[Diagnostic]:
+    """Validate ``data`` as a file of this project, and hold the findings to their promises."""
+    said = io.StringIO()
+    with redirect_stdout(said), redirect_stderr(said):
+        found = load_bytes(data, ROOT, shown="systems/it.yaml", interfaces=INTERFACES).diagnostics
+    assert said.getvalue() == ""
+    assert found == sorted(found, key=lambda finding: finding.sort_key)
+    for finding in found:
+        _hold(finding)
+    for render in RENDERERS:
+        _hold_text(render(found))
+    return found
+
+
+def _hold(finding: Diagnostic) -> None:
+    for told in (finding.message, finding.hint or ""):
+        assert "\n" not in told
+        assert len(told) < 2000
+    for span in (finding.primary, *(label.span for label in finding.related)):
+        _hold_place(span)
+
+
+def _hold_place(span: Span) -> None:
+    line = span.file.line(span.line)
+    assert 1 <= span.line <= max(len(span.file.lines), 1)
+    assert 1 <= span.column <= len(line) + 1
+    assert span.length >= 1
+
+
+def _hold_text(rendered: str) -> None:
+    assert all(character.isprintable() or character == "\n" for character in rendered)
