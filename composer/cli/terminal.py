@@ -28,6 +28,16 @@ def write_raw(text: str) -> None:
         _end_quietly()
 
 
+def write_bytes(data: bytes) -> None:
+    """Like :func:`write_raw`, for data that is no text."""
+    try:
+        sys.stdout.flush()
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        _end_quietly()
+
+
 def say(text: str) -> None:
     """Print ``text``, which is for the person and no data, to stderr."""
     print(text, file=sys.stderr, flush=True)

@@ -1,14 +1,19 @@
-"""Diagrams: a system becomes a graph (``views/``), a graph becomes text (one file a format)."""
+"""Diagrams: systems or a running graph become a scene, a scene a graph (``views/``), that a text.
+
+One file makes a scene (``declared``, ``live``), one a view, one a format.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 
 from composer.diagnostics import Diagnostic
-from composer.graph import dot, json, mermaid, svg
+from composer.drift import Snapshot
+from composer.graph import declared, live
 from composer.graph.findings import Findings
 from composer.graph.picture import Graph
+from composer.graph.scene import Scene
 from composer.graph.views import connections, deployment, lifecycle, nodes, states
 from composer.model import System
 
@@ -23,7 +28,7 @@ class View(StrEnum):
     STATES = "states"
 
 
-_VIEWS: dict[View, Callable[[System, Findings], Graph]] = {
+_VIEWS: dict[View, Callable[[Scene], Graph]] = {
     View.NODES: nodes.build,
     View.CONNECTIONS: connections.build,
     View.LIFECYCLE: lifecycle.build,
@@ -31,17 +36,17 @@ _VIEWS: dict[View, Callable[[System, Findings], Graph]] = {
     View.STATES: states.build,
 }
 
-#: The renderers of text formats, by the file ending that asks for them.
-RENDERERS: dict[str, Callable[[Graph], str]] = {
-    "mermaid": mermaid.render,
-    "dot": dot.render,
-    "json": json.render,
-    "svg": svg.render,
-}
+
+def scene_of(systems: Sequence[System], diagnostics: Iterable[Diagnostic] = ()) -> Scene:
+    """Return what there is to see in systems; what a finding points at is marked as wrong."""
+    return declared.scene_of(systems, Findings(diagnostics))
 
 
-def build_graph(
-    system: System, view: View = View.NODES, diagnostics: Iterable[Diagnostic] = ()
-) -> Graph:
-    """Return the diagram of ``system``; what a finding points at is marked as wrong."""
-    return _VIEWS[view](system, Findings(diagnostics))
+def live_scene_of(snapshot: Snapshot, rates_hz: Mapping[str, float]) -> Scene:
+    """Return what there is to see in a running ROS graph; rates are measured, by topic."""
+    return live.scene_of(snapshot, rates_hz)
+
+
+def build_graph(scene: Scene, view: View = View.NODES) -> Graph:
+    """Return the diagram of a scene."""
+    return _VIEWS[view](scene)

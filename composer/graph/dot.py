@@ -20,6 +20,7 @@ _EDGES = {
     Line.SERVICE: 'color="#c2410c", style=dashed',
     Line.ACTION: 'color="#7e22ce", style=bold',
     Line.DEPENDENCY: 'color="#475569"',
+    Line.IMPLIED: 'color="#475569", style=dashed',
     Line.TRANSITION: 'color="#475569"',
 }
 

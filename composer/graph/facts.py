@@ -5,8 +5,20 @@ from __future__ import annotations
 from composer.graph.labels import qos_facts
 from composer.graph.picture import Details
 from composer.graph.rates import publishing_rate_hz, timer_rate_hz
-from composer.model import Channel, Node, Port, PortKind
+from composer.graph.scene import Channel, Meeting
+from composer.model import ChannelKind, Node, Port, PortKind
 from composer.tree import Plain
+
+_SOURCES = {
+    ChannelKind.TOPIC: "publishers",
+    ChannelKind.SERVICE: "servers",
+    ChannelKind.ACTION: "servers",
+}
+_SINKS = {
+    ChannelKind.TOPIC: "subscriptions",
+    ChannelKind.SERVICE: "clients",
+    ChannelKind.ACTION: "clients",
+}
 
 
 def node_facts(node: Node) -> Details:
@@ -54,19 +66,19 @@ def port_facts(node: Node, port: Port) -> Details:
 
 def channel_facts(channel: Channel) -> Details:
     """Return what is worth knowing about a topic, service or action."""
-    types: list[Plain] = [*dict.fromkeys(end.port.interface.value for end in channel.ends)]
+    types: list[Plain] = [*channel.types]
     return _said(
         {
             "name": channel.name,
             "type": types[0] if len(types) == 1 else types,
-            "sources": [_end(end.node, end.port) for end in channel.sources],
-            "sinks": [_end(end.node, end.port) for end in channel.sinks],
+            _SOURCES[channel.kind]: [*map(_end, channel.sources)],
+            _SINKS[channel.kind]: [*map(_end, channel.sinks)],
         }
     )
 
 
-def _end(node: Node, port: Port) -> str:
-    return f"{node.full_name}.{port.name.value}"
+def _end(meeting: Meeting) -> str:
+    return f"{meeting.actor.full_name}.{meeting.end.name}"
 
 
 def _said(facts: dict[str, Plain]) -> Details:

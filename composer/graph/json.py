@@ -30,6 +30,7 @@ def _cluster(cluster: Cluster) -> dict[str, Any]:
         "label": cluster.label,
         "parent": cluster.parent or None,
         "details": dict(cluster.details),
+        "wrong": cluster.wrong or None,
     }
 
 
@@ -46,6 +47,7 @@ def _vertex(vertex: Vertex) -> dict[str, Any]:
 
 def _edge(edge: Edge) -> dict[str, Any]:
     return {
+        "key": edge.key,
         "source": edge.source,
         "target": edge.target,
         "kind": edge.kind.value,

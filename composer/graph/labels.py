@@ -12,8 +12,8 @@ def short_type(interface: str) -> str:
 
 
 def rate(hertz: float) -> str:
-    """Return ``10 Hz``."""
-    return f"{hertz:g} Hz"
+    """Return ``10 Hz``, with three digits: more would pretend that clocks are better."""
+    return f"{float(f'{hertz:.3g}'):g} Hz"
 
 
 def qos_label(profile: QosProfile) -> str:
@@ -22,6 +22,11 @@ def qos_label(profile: QosProfile) -> str:
         if profile == PRESETS[name]:
             return name
     return ", ".join([profile.reliability, profile.durability, _history(profile), *_times(profile)])
+
+
+def told_qos_label(profile: QosProfile) -> str:
+    """Return what other processes are told of a profile: history and depth are not."""
+    return ", ".join([profile.reliability, profile.durability, *_times(profile)])
 
 
 def qos_facts(profile: QosProfile) -> dict[str, Plain]:

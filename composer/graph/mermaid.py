@@ -21,6 +21,7 @@ _ARROWS = {
     Line.SERVICE: "-.->",
     Line.ACTION: "==>",
     Line.DEPENDENCY: "-->",
+    Line.IMPLIED: "-.->",
     Line.TRANSITION: "-->",
 }
 

@@ -5,37 +5,38 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from composer.graph.picture import Cluster
-from composer.model import Node
 
 
 class Namespaces:
-    """The namespaces of some nodes. One that holds nothing but one other is not drawn."""
+    """The namespaces of nodes. One that holds nothing but one other is not drawn."""
 
-    def __init__(self, nodes: Iterable[Node]) -> None:
-        used = {node.namespace.value for node in nodes} - {"/"}
+    def __init__(self, namespaces: Iterable[str]) -> None:
+        used = set(namespaces) - {"/"}
         self._drawn = {name for name in _with_ancestors(used) if name in used or _forks(name, used)}
 
     def clusters(self) -> tuple[Cluster, ...]:
         """Return a cluster for each namespace that is drawn, parents first."""
         return tuple(
-            Cluster(name, name, self.around(_parent(name))) for name in sorted(self._drawn)
+            Cluster(name, name, self.around(parent_of(name)), namespace=name)
+            for name in sorted(self._drawn)
         )
 
     def around(self, namespace: str) -> str:
         """Return the innermost drawn namespace that ``namespace`` is or lies in; else empty."""
         while namespace not in self._drawn:
-            if namespace in ("", "/"):
+            if namespace == "/":
                 return ""
-            namespace = _parent(namespace)
+            namespace = parent_of(namespace)
         return namespace
 
     def around_name(self, full_name: str) -> str:
         """Return the innermost drawn namespace that a topic, service or action name lies in."""
-        return self.around(_parent(full_name))
+        return self.around(parent_of(full_name))
 
 
-def _parent(name: str) -> str:
-    return name.rpartition("/")[0]
+def parent_of(name: str) -> str:
+    """Return the namespace that a full name stands in."""
+    return name.rpartition("/")[0] or "/"
 
 
 def _with_ancestors(names: Iterable[str]) -> set[str]:

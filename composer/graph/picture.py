@@ -33,6 +33,7 @@ class Line(StrEnum):
     SERVICE = "service"
     ACTION = "action"
     DEPENDENCY = "dependency"
+    IMPLIED = "implied"  # a dependency that nobody wrote down
     TRANSITION = "transition"
 
 
@@ -47,22 +48,24 @@ class Direction(StrEnum):
 class Vertex:
     """Something drawn as a shape. ``key`` is unique in its graph; ``lines`` is the label.
 
-    ``cluster`` is the key of the cluster it stands in, empty for none. ``wrong`` is the finding
-    that colours it, empty for none.
+    ``cluster`` is the key of the cluster it stands in, empty for none; ``namespace`` is where it
+    belongs by its name. ``wrong`` is the finding that colours it, empty for none.
     """
 
     key: str
     kind: Kind
     lines: tuple[str, ...]
     cluster: str = ""
+    namespace: str = "/"
     details: Details = ()
     wrong: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """An arrow between two vertices."""
+    """An arrow between two vertices. ``key`` is unique in its graph."""
 
+    key: str
     source: str
     target: str
     kind: Line
@@ -73,12 +76,18 @@ class Edge:
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """A frame around vertices and other clusters; ``parent`` is empty for the outermost."""
+    """A frame around vertices and other clusters; ``parent`` is empty for the outermost.
+
+    A ``block`` is a node that shows its ports: they are all it holds, and it stays in one piece.
+    """
 
     key: str
     label: str
     parent: str = ""
     details: Details = ()
+    block: bool = False
+    namespace: str = "/"
+    wrong: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,93 +2,82 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+
+#: name -> (on a light page, on a dark page)
+_PLAIN = {
+    "page": ("#ffffff", "#0b1220"),
+    "text": ("#0f172a", "#e2e8f0"),
+    "faint": ("#475569", "#94a3b8"),
+    "frame": ("#f8fafc", "#111a2c"),
+    "frame-line": ("#cbd5e1", "#334155"),
+    "wrong": ("#dc2626", "#f87171"),
+}
+
+#: kind -> (fill, line) on a light page, then on a dark page
+_KINDS = {
+    "node": (("#dbeafe", "#1d4ed8"), ("#172c54", "#60a5fa")),
+    "topic": (("#dcfce7", "#15803d"), ("#0f3321", "#4ade80")),
+    "service": (("#ffedd5", "#c2410c"), ("#43210f", "#fb923c")),
+    "action": (("#f3e8ff", "#7e22ce"), ("#321a4d", "#c084fc")),
+    "port": (("#f1f5f9", "#64748b"), ("#1e293b", "#94a3b8")),
+    "state": (("#e2e8f0", "#475569"), ("#1e293b", "#94a3b8")),
+    "dependency": (("none", "#475569"), ("none", "#94a3b8")),
+    "implied": (("none", "#475569"), ("none", "#94a3b8")),
+    "transition": (("none", "#475569"), ("none", "#94a3b8")),
+}
 
 
-@dataclass(frozen=True, slots=True)
-class _Colors:
-    page: str
-    text: str
-    faint: str
-    frame: str
-    frame_line: str
-    label: str
-    wrong: str
-    kinds: dict[str, tuple[str, str]]  # kind -> (fill, line)
+def colors(*, dark: bool) -> dict[str, str]:
+    """Return all colours by name: ``page``, ``text``, ..., ``node`` (fill), ``node-line``."""
+    side = int(dark)
+    found = {name: both[side] for name, both in _PLAIN.items()}
+    for kind, both in _KINDS.items():
+        found[kind], found[f"{kind}-line"] = both[side]
+    return found
 
 
-_LIGHT = _Colors(
-    page="#ffffff",
-    text="#0f172a",
-    faint="#475569",
-    frame="#f8fafc",
-    frame_line="#cbd5e1",
-    label="#ffffff",
-    wrong="#dc2626",
-    kinds={
-        "node": ("#dbeafe", "#1d4ed8"),
-        "topic": ("#dcfce7", "#15803d"),
-        "service": ("#ffedd5", "#c2410c"),
-        "action": ("#f3e8ff", "#7e22ce"),
-        "port": ("#f1f5f9", "#64748b"),
-        "state": ("#e2e8f0", "#475569"),
-        "dependency": ("none", "#475569"),
-        "transition": ("none", "#475569"),
-    },
-)
-
-_DARK = _Colors(
-    page="#0b1220",
-    text="#e2e8f0",
-    faint="#94a3b8",
-    frame="#111a2c",
-    frame_line="#334155",
-    label="#0b1220",
-    wrong="#f87171",
-    kinds={
-        "node": ("#172c54", "#60a5fa"),
-        "topic": ("#0f3321", "#4ade80"),
-        "service": ("#43210f", "#fb923c"),
-        "action": ("#321a4d", "#c084fc"),
-        "port": ("#1e293b", "#94a3b8"),
-        "state": ("#1e293b", "#94a3b8"),
-        "dependency": ("none", "#94a3b8"),
-        "transition": ("none", "#94a3b8"),
-    },
-)
-
-
-def _rules(colors: _Colors) -> str:
+def color_rules(color: Mapping[str, str]) -> str:
+    """Return the rules of a style sheet that give every part of a picture its colour."""
     rules = [
-        f".page{{fill:{colors.page}}}",
-        f"text{{fill:{colors.text}}}",
-        f".faint,.frame-label,.edge-label{{fill:{colors.faint}}}",
-        f".frame{{fill:{colors.frame};stroke:{colors.frame_line}}}",
-        f".label-back{{fill:{colors.label};fill-opacity:.85}}",
+        f".page{{fill:{color['page']}}}",
+        f"text{{fill:{color['text']}}}",
+        f".faint,.row-end,.frame-label,.edge-label{{fill:{color['faint']}}}",
+        f".frame{{fill:{color['frame']};stroke:{color['frame-line']}}}",
+        f".label-back{{fill:{color['page']};fill-opacity:.9}}",
     ]
-    for kind, (fill, line) in colors.kinds.items():
-        rules.append(f".shape.{kind}{{fill:{fill};stroke:{line}}}")
+    for kind in _KINDS:
+        line = color[f"{kind}-line"]
+        rules.append(f".shape.{kind}{{fill:{color[kind]};stroke:{line}}}")
         rules.append(f".edge.{kind}{{stroke:{line}}}")
         rules.append(f".head.{kind}{{fill:{line}}}")
-    rules.append(f".shape.wrong,.edge.wrong{{stroke:{colors.wrong};stroke-width:2.5}}")
-    rules.append(f".head.wrong{{fill:{colors.wrong}}}")
+    rules.append(f".shape.wrong,.edge.wrong{{stroke:{color['wrong']};stroke-width:2.5}}")
+    rules.append(f".head.wrong{{fill:{color['wrong']}}}")
     return "".join(rules)
 
 
-#: The style sheet of a picture.
-STYLE = (
+#: Everything about a picture but its colours.
+FORMS = (
     'text{font-family:"Helvetica Neue",Helvetica,Arial,"Liberation Sans",sans-serif;'
     "font-size:12px;text-anchor:middle}"
     ".title{font-size:14px;font-weight:600;text-anchor:start}"
-    ".faint,.edge-label{font-size:10px}"
+    ".faint,.edge-label,.row-end{font-size:10px}"
+    ".row{text-anchor:start}"
+    ".row-end{text-anchor:end}"
     ".frame-label{font-size:10px;text-anchor:start}"
     ".frame{stroke-width:1}"
     ".shape{stroke-width:1.2}"
+    ".shape.port{stroke-width:.8}"
     ".edge{fill:none;stroke-width:1.3}"
-    ".edge.service{stroke-dasharray:5 3}"
+    ".edge.service,.edge.implied{stroke-dasharray:5 3}"
     ".edge.action{stroke-width:2.2}"
-    + _rules(_LIGHT)
+)
+
+#: The style sheet of a picture that stands alone.
+STYLE = (
+    FORMS
+    + color_rules(colors(dark=False))
     + "@media (prefers-color-scheme:dark){"
-    + _rules(_DARK)
+    + color_rules(colors(dark=True))
     + "}"
 )

@@ -17,7 +17,13 @@ def test_the_default_is_mermaid_of_the_nodes_on_stdout() -> None:
 
 @pytest.mark.parametrize(
     ("name", "begin"),
-    [("p.svg", "<svg "), ("p.DOT", "digraph "), ("p.json", "{\n"), ("p.mmd", "---\n")],
+    [
+        ("p.svg", "<svg "),
+        ("p.DOT", "digraph "),
+        ("p.json", "{\n"),
+        ("p.mmd", "---\n"),
+        ("p.html", "<!DOCTYPE html>\n"),
+    ],
 )
 def test_the_ending_of_the_file_says_as_what(name: str, begin: str, tmp_path: Path) -> None:
     target = tmp_path / name
@@ -48,7 +54,7 @@ def test_views() -> None:
     done = compose("graph", "pipeline", "--view", "lifecycle", "-f", "json")
     edges = json.loads(done.out)["edges"]
     assert [(edge["source"], edge["target"]) for edge in edges] == [
-        ("node:planner", "node:motor_controller")
+        ("node:/planning/planner", "node:/control/motor_controller")
     ]
 
 

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from composer.graph.layout import Layout, Place, arrange
+from composer.graph.measure import sizes
 from composer.graph.picture import Cluster, Direction, Edge, Graph, Kind, Line, Vertex
-from composer.graph.svg import sizes
 
 
 def graph_of(
@@ -23,7 +23,10 @@ def graph_of(
         view="nodes",
         direction=direction,
         vertices=tuple(Vertex(key, Kind.NODE, (key,), around) for key, around in vertices.items()),
-        edges=tuple(Edge(begin, end, Line.TOPIC, (f"{begin} to {end}",)) for begin, end in edges),
+        edges=tuple(
+            Edge(f"e{number}", begin, end, Line.TOPIC, (f"{begin} to {end}",))
+            for number, (begin, end) in enumerate(edges)
+        ),
         clusters=tuple(Cluster(key, key, parent) for key, parent in clusters or []),
     )
 
@@ -50,14 +53,14 @@ def holds(outer: Place, inner: Place) -> bool:
 
 def test_a_chain_runs_from_left_to_right_in_a_straight_line() -> None:
     layout = laid_out(graph_of(dict.fromkeys("abc", ""), [("a", "b"), ("b", "c")]))
-    places = [place for _, place in layout.vertices]
+    places = list(layout.vertices.values())
     assert places[0].center.x < places[1].center.x < places[2].center.x
     assert len({round(place.center.y, 3) for place in places}) == 1
 
 
 def test_a_chain_runs_downwards_when_asked_to() -> None:
     graph = graph_of(dict.fromkeys("ab", ""), [("a", "b")], direction=Direction.DOWN)
-    (_, first), (_, second) = laid_out(graph).vertices
+    first, second = laid_out(graph).vertices.values()
     assert first.center.y < second.center.y
     assert first.center.x == second.center.x
 
@@ -65,7 +68,7 @@ def test_a_chain_runs_downwards_when_asked_to() -> None:
 def test_an_edge_begins_at_its_source_and_ends_at_its_target_also_against_the_direction() -> None:
     graph = graph_of(dict.fromkeys("ab", ""), [("a", "b"), ("b", "a")])
     layout = laid_out(graph)
-    places = {vertex.key: place for vertex, place in layout.vertices}
+    places = layout.vertices
     for path in layout.paths:
         begin, end = path.points[0], path.points[-1]
         source, target = places[path.edge.source], places[path.edge.target]
@@ -75,7 +78,7 @@ def test_an_edge_begins_at_its_source_and_ends_at_its_target_also_against_the_di
 
 def test_no_vertices_make_an_empty_picture() -> None:
     layout = laid_out(graph_of({}, []))
-    assert layout.vertices == ()
+    assert layout.vertices == {}
     assert layout.size.width > 0
 
 
@@ -110,11 +113,11 @@ def graphs(draw: st.DrawFn) -> Graph:
 @given(graphs())
 def test_nothing_overlaps_that_must_not(graph: Graph) -> None:
     layout = laid_out(graph)
-    places = {vertex.key: place for vertex, place in layout.vertices}
+    places = layout.vertices
     for first, second in combinations(places.values(), 2):
         assert not overlap(first, second)
     labels = [
-        Place(path.label, sizes(graph).labels[graph.edges.index(path.edge)])
+        Place(path.label, sizes(graph).labels[path.edge.key])
         for path in layout.paths
         if path.label is not None
     ]
@@ -136,7 +139,8 @@ def test_frames_hold_what_is_theirs_and_nothing_else(graph: Graph) -> None:
         for other in layout.frames:  # parents come first
             if other.cluster.parent in inside:
                 inside.add(other.cluster.key)
-        for vertex, place in layout.vertices:
+        for vertex in graph.vertices:
+            place = layout.vertices[vertex.key]
             if vertex.cluster in inside:
                 assert holds(frame.place, place)
             else:
@@ -147,7 +151,7 @@ def test_frames_hold_what_is_theirs_and_nothing_else(graph: Graph) -> None:
 @given(graphs())
 def test_everything_is_inside_the_picture_and_comes_out_the_same_again(graph: Graph) -> None:
     layout = laid_out(graph)
-    everything = [place for _, place in layout.vertices] + [frame.place for frame in layout.frames]
+    everything = [*layout.vertices.values(), *(frame.place for frame in layout.frames)]
     for place in everything:
         assert place.left >= 0.0
         assert place.top >= 0.0

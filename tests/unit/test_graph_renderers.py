@@ -11,9 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from composer.graph import RENDERERS, View, build_graph, dot, mermaid, svg
+from composer.graph import View, build_graph, dot, mermaid, scene_of, svg
 from composer.graph import json as graph_json
+from composer.graph.output import Format, render
 from composer.graph.picture import Cluster, Direction, Edge, Graph, Kind, Line, Vertex
+from composer.graph.placing import Engine
 from composer.loading import load
 from composer.resources import systems_folder
 
@@ -30,7 +32,7 @@ def evil_graph() -> Graph:
             Vertex(f"one {EVIL}", Kind.NODE, (EVIL, "second line"), cluster=EVIL),
             Vertex("two", Kind.TOPIC, ("graph",), wrong=EVIL),
         ),
-        edges=(Edge(f"one {EVIL}", "two", Line.TOPIC, (EVIL,), wrong=EVIL),),
+        edges=(Edge("edge", f"one {EVIL}", "two", Line.TOPIC, (EVIL,), wrong=EVIL),),
         clusters=(Cluster(EVIL, EVIL),),
     )
 
@@ -80,6 +82,7 @@ def test_json_says_what_is_wrong_and_where() -> None:
     data = json.loads(graph_json.render(evil_graph()))
     assert [vertex["wrong"] for vertex in data["vertices"]] == [None, EVIL]
     assert data["edges"][0] == {
+        "key": "edge",
         "source": f"one {EVIL}",
         "target": "two",
         "kind": "topic",
@@ -112,9 +115,9 @@ def check(form: str, text: str) -> None:
 def test_every_example_system_is_drawn_in_every_format(path: Path, view: View) -> None:
     loading = load(path)
     assert loading.system is not None
-    graph = build_graph(loading.system, view, loading.diagnostics)
+    graph = build_graph(scene_of([loading.system], loading.diagnostics), view)
     keys = {vertex.key for vertex in graph.vertices}
     assert len(keys) == len(graph.vertices)
     assert all({edge.source, edge.target} <= keys for edge in graph.edges)
-    for form, render in RENDERERS.items():
-        check(form, render(graph))
+    for form in (Format.JSON, Format.SVG, Format.MERMAID, Format.DOT):
+        check(form, render([graph], form, Engine.BUNDLED).decode())

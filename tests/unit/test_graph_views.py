@@ -3,14 +3,14 @@ from __future__ import annotations
 from pathlib import Path
 from textwrap import dedent
 
-from composer.graph import View, build_graph
+from composer.graph import View, build_graph, scene_of
 from composer.graph.picture import Graph
 from composer.loading import load_bytes
 from tests.unit.resolving import system_of
 
 
 def drawn(text: str, view: View = View.NODES) -> Graph:
-    return build_graph(system_of(text), view)
+    return build_graph(scene_of([system_of(text)]), view)
 
 
 def arrows(graph: Graph) -> dict[tuple[str, str], tuple[str, ...]]:
@@ -38,23 +38,23 @@ TALK = """
 
 def test_messages_go_from_publisher_to_subscription_and_requests_from_client_to_server() -> None:
     assert set(arrows(drawn(TALK))) == {
-        ("node:talker", "topic:/chatter"),
-        ("topic:/chatter", "node:listener"),
-        ("node:asker", "service:/ask"),
-        ("service:/ask", "node:answerer"),
+        ("node:/left/talker", "topic:/chatter"),
+        ("topic:/chatter", "node:/right/listener"),
+        ("node:/right/asker", "service:/ask"),
+        ("service:/ask", "node:/answerer"),
     }
 
 
 def test_the_rate_comes_from_the_timer_and_its_parameter_and_the_profile_is_said_once() -> None:
     lines = arrows(drawn(TALK))
-    assert lines["node:talker", "topic:/chatter"] == ("4 Hz", "sensor_data")
-    assert lines["topic:/chatter", "node:listener"] == ()
+    assert lines["node:/left/talker", "topic:/chatter"] == ("4 Hz", "sensor_data")
+    assert lines["topic:/chatter", "node:/right/listener"] == ()
 
 
 def test_a_timer_with_a_condition_promises_no_rate() -> None:
     text = TALK.replace("publish: {chatter", "when: count > 3, publish: {chatter")
     lines = arrows(drawn(text))
-    assert lines["node:talker", "topic:/chatter"] == ("sensor_data",)
+    assert lines["node:/left/talker", "topic:/chatter"] == ("sensor_data",)
 
 
 def test_namespaces_are_frames_and_one_that_holds_one_other_is_none() -> None:
@@ -87,12 +87,13 @@ def test_connections_join_ports_and_say_both_profiles_where_they_differ() -> Non
         "/chatter, qos: {extends: sensor_data, depth: 2}}}\n      asker",
     )
     lines = arrows(drawn(text, View.CONNECTIONS))
-    assert lines["port:talker.chatter", "port:listener.chatter"] == (
+    assert lines["publisher:/left/talker.chatter", "subscription:/right/listener.chatter"] == (
         "/chatter",
         "String",
+        "4 Hz",
         "sensor_data → best_effort, volatile, keep_last 2",
     )
-    assert lines["port:asker.ask", "port:answerer.ask"] == ("/ask", "Trigger")
+    assert lines["client:/right/asker.ask", "service:/answerer.ask"] == ("/ask", "Trigger")
 
 
 LIFECYCLE = """
@@ -107,10 +108,10 @@ LIFECYCLE = """
 
 def test_the_lifecycle_view_tells_the_steps_and_who_waits_for_whom() -> None:
     graph = drawn(LIFECYCLE, View.LIFECYCLE)
-    assert arrows(graph) == {("node:early", "node:late"): ("once active",)}
+    assert arrows(graph) == {("node:/early", "node:/late"): ("once active",)}
     lines = {vertex.key: vertex.lines for vertex in graph.vertices}
-    assert lines["node:early"] == ("early", "#1 configure, #3 activate")
-    assert lines["node:asleep"] == ("asleep", "stays unconfigured")
+    assert lines["node:/early"] == ("early", "#1 configure, #3 activate")
+    assert lines["node:/asleep"] == ("asleep", "stays unconfigured")
 
 
 def test_the_states_view_puts_nodes_where_the_bring_up_takes_them() -> None:
@@ -123,13 +124,13 @@ def test_the_states_view_puts_nodes_where_the_bring_up_takes_them() -> None:
 def test_the_deployment_view_groups_nodes_by_executor() -> None:
     graph = drawn(LIFECYCLE, View.DEPLOYMENT)
     assert {cluster.key: cluster.label for cluster in graph.clusters} == {
-        "executor:quick": "quick: single_threaded",
-        "executor:default": "default: events",
+        "executor:order.quick": "quick: single_threaded",
+        "executor:order.default": "default: events",
     }
     assert {vertex.key: vertex.cluster for vertex in graph.vertices} == {
-        "node:late": "executor:default",
-        "node:early": "executor:quick",
-        "node:asleep": "executor:default",
+        "node:/late": "executor:order.default",
+        "node:/early": "executor:order.quick",
+        "node:/asleep": "executor:order.default",
     }
 
 
@@ -143,7 +144,7 @@ def test_what_a_finding_points_at_is_marked() -> None:
     """
     loading = load_bytes(dedent(text).encode(), Path("/nowhere"), shown="broken.yaml")
     assert loading.system is not None
-    graph = build_graph(loading.system, View.NODES, loading.diagnostics)
+    graph = build_graph(scene_of([loading.system], loading.diagnostics))
     wrong = {edge.target: edge.wrong for edge in graph.edges}
-    assert "reliab" in wrong["node:strict"]
-    assert {vertex.key for vertex in graph.vertices if vertex.wrong} == {"node:lost"}
+    assert "reliab" in wrong["node:/strict"]
+    assert {vertex.key for vertex in graph.vertices if vertex.wrong} == {"node:/lost"}

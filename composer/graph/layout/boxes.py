@@ -20,6 +20,19 @@ FRAME_LABEL = 20.0
 
 
 @dataclass(slots=True, eq=False)
+class Link:
+    """A piece of a line, from a box to one on the next rank.
+
+    The offsets say where it leaves and arrives, across, from the boxes' centres.
+    """
+
+    low: Box
+    high: Box
+    low_offset: float = 0.0
+    high_offset: float = 0.0
+
+
+@dataclass(slots=True, eq=False)
 class Box:
     """A vertex, the bend of a long edge, or an edge's label."""
 
@@ -27,9 +40,10 @@ class Box:
     along: float  # its size along the arrows
     across: float
     gap: float = BOX_GAP
+    tail: float = 0.0  # the part of ``along``, at its end, that is for lines back to itself
     position: float = 0.0  # of its centre, across
-    before: list[Box] = field(default_factory=list)  # neighbours on the rank before
-    after: list[Box] = field(default_factory=list)
+    before: list[Link] = field(default_factory=list)  # from the rank before
+    after: list[Link] = field(default_factory=list)  # to the rank after
 
     @property
     def first_rank(self) -> int:
@@ -120,14 +134,46 @@ Item: TypeAlias = "Box | Group"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """An edge as the boxes it passes, in the order of the ranks."""
+    """An edge as the boxes it passes, in the order of the ranks.
+
+    The offsets say where it leaves the first box and reaches the last one, across, from their
+    centres; None where any place on the side will do.
+    """
 
     edge: Edge
     boxes: tuple[Box, ...]
     label: Box | None
     backward: bool  # the arrow points against the ranks
+    first_offset: float | None = None
+    last_offset: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Loop:
+    """An edge from a box to itself; it runs through the box's tail."""
+
+    edge: Edge
+    box: Box
+    source_offset: float
+    target_offset: float
+    label_offset: float
+    label: tuple[float, float] | None  # its size along and across
 
 
 def space_between(first: Item, second: Item) -> float:
     """Return the least space between two neighbours."""
     return max(first.gap, second.gap)
+
+
+def link(chain: Chain) -> None:
+    """Join the boxes of a chain; pieces that lines share are there once."""
+    last = len(chain.boxes) - 1
+    for index in range(last):
+        low, high = chain.boxes[index], chain.boxes[index + 1]
+        low_offset = (chain.first_offset or 0.0) if index == 0 else 0.0
+        high_offset = (chain.last_offset or 0.0) if index + 1 == last else 0.0
+        if any(known.high is high and known.low_offset == low_offset for known in low.after):
+            continue
+        joined = Link(low, high, low_offset, high_offset)
+        low.after.append(joined)
+        high.before.append(joined)

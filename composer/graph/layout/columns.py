@@ -40,13 +40,14 @@ def columns(root: Group, start: float) -> list[Extent]:
 
 
 def reach(item: Item, ranks: list[Extent]) -> Extent:
-    """Return the extent of a box or a frame."""
+    """Return the extent of a box, without the tail for its loops, or of a frame."""
     if isinstance(item, Box):
         middle = ranks[item.rank].middle
-        return Extent(middle - item.along / 2, middle + item.along / 2)
+        return Extent(middle - item.along / 2, middle + item.along / 2 - item.tail)
     inside = [reach(child, ranks) for child in item.children]
+    tails = [child.tail if isinstance(child, Box) else 0.0 for child in item.children]
     begin = min(extent.begin for extent in inside) - item.padding - item.label_along
-    end = max(extent.end for extent in inside) + item.padding
+    end = max(map(_end, inside, tails)) + item.padding
     missing = max(0.0, item.least_along - (end - begin))
     return Extent(begin - missing / 2, end + missing / 2)
 
@@ -61,3 +62,7 @@ def _room_behind(group: Group, rank: int) -> float:
     own = group.padding if group.last_rank == rank else 0.0
     nested = [child for child in group.inner() if child.first_rank <= rank <= child.last_rank]
     return own + max((_room_behind(child, rank) for child in nested), default=0.0)
+
+
+def _end(extent: Extent, tail: float) -> float:
+    return extent.end + tail

@@ -1,135 +1,150 @@
 """The order of boxes across the ranks, found by the barycentre method.
 
-Sweeps to and fro sort by the places of the neighbours; the order with the fewest crossings is kept.
-A group is sorted as a whole.
+Sweeps along the ranks, to and fro, put every box near the middle of its neighbours; a group goes
+as a whole. Of all orders seen, the one with the fewest crossings is kept, and neighbours change
+places wherever that makes it better.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_right, insort
-from collections.abc import Callable, Iterable, Sequence
+from collections import deque
+from collections.abc import Callable
 
-from composer.graph.layout.boxes import Box, Group, Item, space_between
+from composer.graph.layout.boxes import Box, Group, Item, Link
+from composer.graph.layout.pack import Cost, cost, pack
+from composer.graph.layout.switch import switch
 
-_SWEEPS = 16
-#: Neighbours change places one by one in graphs up to so many boxes; beyond, it takes too long.
-_MOST_BOXES = 160
-_ROUNDS = 3
+_SWEEPS = 12
+_VAIN_SWEEPS = 4
+_ROUNDS = 8
 
-#: What an order costs: crossings first, then the length of the lines across, in pixels.
-Cost = tuple[int, float]
+#: The children of every group.
+_Order = list[tuple[Group, list[Item]]]
 
 
 def put_in_order(root: Group) -> None:
     """Sort the children of all groups for few crossings, and give every box a position."""
+    by_rank = _by_rank(root)
+    found = [_swept(root, by_rank, start) for start in (_as_declared, _as_reached)]
+    best = min(found, key=lambda one: one[0])
+    _restore(best[1])
+    _switch(root, best)
+    pack(root)
+
+
+def _swept(
+    root: Group, by_rank: list[list[Box]], start: Callable[[Group], None]
+) -> tuple[Cost, _Order]:
+    """Return the best order that is met on sweeps from a start; ends when it gets no better."""
+    order = _children(root)
+    start(root)
     pack(root)
     best = (cost(root), _children(root))
+    vain = 0
     for sweep in range(_SWEEPS):
-        _sort(root, (_before, _after, _both)[sweep % 3])
+        _sweep(by_rank, backwards=bool(sweep % 2))
+        _sort(root)
+        pack(root)
+        reached = cost(root)
+        vain += 1
+        if reached < best[0]:
+            best = (reached, _children(root))
+            vain = 0
+        if vain == _VAIN_SWEEPS:
+            break
+    _restore(order)
+    return best
+
+
+def _switch(root: Group, best: tuple[Cost, _Order]) -> None:
+    for _ in range(_ROUNDS):
+        pack(root)
+        if not switch(root):
+            break
         pack(root)
         reached = cost(root)
         if reached < best[0]:
             best = (reached, _children(root))
-    for group, children in best[1]:
-        group.children = children
-    pack(root)
-    if sum(1 for _ in root.boxes()) <= _MOST_BOXES:
-        _switch(root)
+    _restore(best[1])
 
 
-def _switch(root: Group) -> None:
-    """Let neighbours change places wherever that makes things better."""
-    reached = cost(root)
-    for _ in range(_ROUNDS):
-        before = reached
-        for group in [root, *root.groups()]:
-            for index in range(len(group.children) - 1):
-                reached = _try_switch(root, group, index, reached)
-        if reached == before:
-            break
-    pack(root)
-
-
-def _try_switch(root: Group, group: Group, index: int, reached: Cost) -> Cost:
-    children = group.children
-    children[index], children[index + 1] = children[index + 1], children[index]
-    pack(root)
-    found = cost(root)
-    if found < reached:
-        return found
-    children[index], children[index + 1] = children[index + 1], children[index]
-    return reached
-
-
-def pack(group: Group, start: float = 0.0) -> None:
-    """Place the children in their order, each as close to ``start`` as those before it allow."""
-    group.low = start
-    inside = start + group.padding + group.label
-    last: dict[int, Item] = {}
-    for child in group.children:
-        covered = range(child.first_rank, child.last_rank + 1)
-        above = [last[rank] for rank in covered if rank in last]
-        low = max((item.high + space_between(item, child) for item in above), default=inside)
-        if isinstance(child, Group):
-            pack(child, low)
-        else:
-            child.position = low + child.across / 2
-        last.update(dict.fromkeys(covered, child))
-    high = max(child.high for child in group.children) + group.padding
-    group.high = max(high, group.low + group.least)
-
-
-def cost(root: Group) -> Cost:
-    """Return how often lines between neighbouring ranks cross, and how far they go across."""
-    by_rank: dict[int, list[tuple[float, float]]] = {}
+def _by_rank(root: Group) -> list[list[Box]]:
+    ranks: list[list[Box]] = [[] for _ in range(root.last_rank + 1)]
     for box in root.boxes():
-        for other in box.after:
-            by_rank.setdefault(box.rank, []).append((box.position, other.position))
-    length = sum(abs(begin - end) for lines in by_rank.values() for begin, end in lines)
-    return sum(map(_inversions, by_rank.values())), round(length, 3)
+        ranks[box.rank].append(box)
+    return ranks
 
 
-def _inversions(lines: Iterable[tuple[float, float]]) -> int:
-    count = 0
-    seen: list[float] = []
-    for _, end in sorted(lines):
-        count += len(seen) - bisect_right(seen, end)
-        insort(seen, end)
-    return count
-
-
-def _children(group: Group) -> list[tuple[Group, list[Item]]]:
-    found = [(group, list(group.children))]
-    for child in group.children:
-        if isinstance(child, Group):
-            found += _children(child)
+def _children(group: Group) -> _Order:
+    found: _Order = [(group, list(group.children))]
+    for child in group.inner():
+        found += _children(child)
     return found
 
 
-def _before(box: Box) -> Sequence[Box]:
-    return box.before
+def _restore(order: _Order) -> None:
+    for group, children in order:
+        group.children = list(children)
 
 
-def _after(box: Box) -> Sequence[Box]:
-    return box.after
+def _as_declared(root: Group) -> None:
+    """Leave the order as it is."""
 
 
-def _both(box: Box) -> Sequence[Box]:
-    return [*box.before, *box.after]
+def _as_reached(root: Group) -> None:
+    """Sort by the order in which boxes are reached from others: related ones come together."""
+    number: dict[int, int] = {}
+    for start in sorted(root.boxes(), key=lambda box: box.rank):
+        waiting = deque([start])
+        while waiting:
+            box = waiting.popleft()
+            if id(box) in number:
+                continue
+            number[id(box)] = len(number)
+            waiting.extend(piece.high for piece in box.after)
+            waiting.extend(piece.low for piece in box.before)
+    for box in root.boxes():
+        box.position = float(number[id(box)])
+    _sort(root)
 
 
-def _sort(group: Group, neighbours: Callable[[Box], Sequence[Box]]) -> None:
-    wanted = {id(child): _wanted(child, neighbours) for child in group.children}
+def _sweep(by_rank: list[list[Box]], *, backwards: bool) -> None:
+    """Give every box the mean place of its neighbours on the rank before (or behind) it."""
+    for rank in reversed(by_rank) if backwards else by_rank:
+        for box in rank:
+            places = _behind(box.after) if backwards else _before(box.before)
+            if places:
+                box.position = sum(places) / len(places)
+        rank.sort(key=lambda box: box.position)
+        _push_apart(rank)
+
+
+def _before(pieces: list[Link]) -> list[float]:
+    return [piece.low.position + piece.low_offset - piece.high_offset for piece in pieces]
+
+
+def _behind(pieces: list[Link]) -> list[float]:
+    return [piece.high.position + piece.high_offset - piece.low_offset for piece in pieces]
+
+
+def _push_apart(rank: list[Box]) -> None:
+    """Keep the order and the middle of a rank, and make room for every box."""
+    middle = sum(box.position for box in rank) / len(rank) if rank else 0.0
+    end = None
+    for box in rank:
+        least = box.position if end is None else end + box.gap + box.across / 2
+        box.position = max(box.position, least)
+        end = box.high
+    drift = sum(box.position for box in rank) / len(rank) - middle if rank else 0.0
+    for box in rank:
+        box.position -= drift
+
+
+def _sort(group: Group) -> float:
+    """Sort all children by where they are, groups by their mean; return the group's own."""
+    wanted = {
+        id(child): _sort(child) if isinstance(child, Group) else child.position
+        for child in group.children
+    }
     group.children.sort(key=lambda child: wanted[id(child)])
-    for child in group.children:
-        if isinstance(child, Group):
-            _sort(child, neighbours)
-
-
-def _wanted(item: Item, neighbours: Callable[[Box], Sequence[Box]]) -> float:
-    """Return the mean place of the neighbours outside the item; where it is if it has none."""
-    own = set(map(id, item.boxes()))
-    places = [
-        other.position for box in item.boxes() for other in neighbours(box) if id(other) not in own
-    ]
-    return sum(places) / len(places) if places else (item.low + item.high) / 2
+    return sum(wanted.values()) / len(wanted)

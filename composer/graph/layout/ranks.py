@@ -6,7 +6,7 @@ Arrows lead to a higher rank, but for the few that have to point backwards to br
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 Pair = tuple[str, str]
 
@@ -21,8 +21,12 @@ def forward(keys: Sequence[str], pairs: Sequence[Pair]) -> list[Pair]:
     return [pair if place[pair[0]] <= place[pair[1]] else pair[::-1] for pair in pairs]
 
 
-def ranks(keys: Sequence[str], pairs: Sequence[Pair]) -> dict[str, int]:
-    """Return the rank of each key, from 0. ``pairs`` has no cycles."""
+def ranks(clusters: Mapping[str, str], pairs: Sequence[Pair]) -> dict[str, int]:
+    """Return the rank of each key of ``clusters``, from 0. ``pairs`` has no cycles.
+
+    What no arrow touches stands in a block together with others of its cluster.
+    """
+    keys = list(clusters)
     outgoing = _neighbours(keys, pairs)
     incoming = _neighbours(keys, [pair[::-1] for pair in pairs])
     order = _topological(keys, outgoing, incoming)
@@ -34,7 +38,9 @@ def ranks(keys: Sequence[str], pairs: Sequence[Pair]) -> dict[str, int]:
             found[key] = _best_rank(key, found, incoming[key], outgoing[key])
         for key in order:
             found[key] = _best_rank(key, found, incoming[key], outgoing[key])
-    _spread_lonely(found, [key for key in order if not incoming[key] and not outgoing[key]])
+    lonely = [key for key in order if not incoming[key] and not outgoing[key]]
+    for cluster in dict.fromkeys(clusters[key] for key in lonely):
+        _spread(found, [key for key in lonely if clusters[key] == cluster])
     lowest = min(found.values(), default=0)
     return {key: rank - lowest for key, rank in found.items()}
 
@@ -96,8 +102,8 @@ def _best_rank(key: str, found: dict[str, int], incoming: list[str], outgoing: l
     return min(found[other] for other in outgoing) - 1
 
 
-def _spread_lonely(found: dict[str, int], lonely: list[str]) -> None:
-    """Put vertices without arrows into a block that is about as wide as it is high."""
+def _spread(found: dict[str, int], lonely: list[str]) -> None:
+    """Put vertices into a block that is about as wide as it is high."""
     columns = max(1, round(math.sqrt(len(lonely) / 2)))
     for index, key in enumerate(lonely):
         found[key] = index % columns

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from composer.graph.picture import Cluster, Edge, Vertex
+from composer.graph.picture import Cluster, Edge
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,6 +13,10 @@ class Point:
 
     x: float
     y: float
+
+    def moved(self, by: Point) -> Point:
+        """Return the point so much further."""
+        return Point(self.x + by.x, self.y + by.y)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +44,15 @@ class Place:
         """The y of its upper side."""
         return self.center.y - self.size.height / 2
 
+    def row(self, below_middle: float, height: float) -> Place:
+        """Return the row of it, over all its width, that is so far below its middle."""
+        center = Point(self.center.x, self.center.y + below_middle)
+        return Place(center, Size(self.size.width, height))
+
+    def moved(self, by: Point) -> Place:
+        """Return the rectangle so much further."""
+        return Place(self.center.moved(by), self.size)
+
 
 @dataclass(frozen=True, slots=True)
 class Frame:
@@ -60,12 +73,29 @@ class Path:
     points: tuple[Point, ...]
     label: Point | None
 
+    def moved(self, by: Point) -> Path:
+        """Return the path so much further."""
+        return replace(
+            self,
+            points=tuple(point.moved(by) for point in self.points),
+            label=None if self.label is None else self.label.moved(by),
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Everything in its place, from (0, 0) to ``size``."""
+    """Everything in its place, from (0, 0) to ``size``. Vertices are named by their keys."""
 
     size: Size
-    vertices: tuple[tuple[Vertex, Place], ...]
+    vertices: dict[str, Place]
     frames: tuple[Frame, ...]  # outer ones first
     paths: tuple[Path, ...]
+
+    def moved(self, by: Point) -> Layout:
+        """Return the layout with everything so much further, and as much bigger."""
+        return Layout(
+            size=Size(self.size.width + by.x, self.size.height + by.y),
+            vertices={key: place.moved(by) for key, place in self.vertices.items()},
+            frames=tuple(Frame(frame.cluster, frame.place.moved(by)) for frame in self.frames),
+            paths=tuple(path.moved(by) for path in self.paths),
+        )

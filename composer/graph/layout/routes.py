@@ -9,6 +9,7 @@ from composer.graph.layout.axes import Axes
 from composer.graph.layout.boxes import Box, Chain
 from composer.graph.layout.columns import Extent, reach
 from composer.graph.layout.result import Path
+from composer.graph.layout.shortcuts import Obstacles, Station
 
 #: How much of a vertex's side lines may use, leaving its corners free.
 _USED_SIDE = 0.6
@@ -17,18 +18,20 @@ _USED_SIDE = 0.6
 class Router:
     """Draws chains once all boxes have their place; ``ranks`` are the extents along the arrows."""
 
-    def __init__(self, axes: Axes, ranks: list[Extent]) -> None:
+    def __init__(self, axes: Axes, ranks: list[Extent], obstacles: Obstacles) -> None:
         self._axes = axes
         self._ranks = ranks
+        self._obstacles = obstacles
 
-    def paths(self, chains: list[Chain]) -> tuple[Path, ...]:
+    def paths(self, chains: list[Chain]) -> list[Path]:
         """Return a path for each chain. Lines that share a side of a vertex are spread over it."""
-        leaving = _spread(chains, lambda chain: (chain.boxes[0], chain.boxes[1]))
-        arriving = _spread(chains, lambda chain: (chain.boxes[-1], chain.boxes[-2]))
-        return tuple(self._path(chain, leaving[id(chain)], arriving[id(chain)]) for chain in chains)
+        leaving = _spread(chains, lambda chain: (chain.boxes[0], chain.boxes[1]), _first_offset)
+        arriving = _spread(chains, lambda chain: (chain.boxes[-1], chain.boxes[-2]), _last_offset)
+        return [self._path(chain, leaving[id(chain)], arriving[id(chain)]) for chain in chains]
 
     def _path(self, chain: Chain, leaving: float, arriving: float) -> Path:
-        points = _curve(self._stations(chain, leaving, arriving))
+        stations = self._obstacles.shortened(self._stations(chain, leaving, arriving))
+        points = _curve(stations)
         if chain.backward:
             points.reverse()
         label = chain.label
@@ -40,37 +43,73 @@ class Router:
             else self._axes.point(self._ranks[label.rank].middle, label.position),
         )
 
-    def _stations(self, chain: Chain, leaving: float, arriving: float) -> list[tuple[float, float]]:
-        """Return the points where the line is parallel to the ranks' direction."""
+    def _stations(self, chain: Chain, leaving: float, arriving: float) -> list[Station]:
+        """Return the stretches on which the line is parallel to the ranks' direction."""
         first, last = chain.boxes[0], chain.boxes[-1]
-        stations = [(reach(first, self._ranks).end, leaving)]
+        begin, end = reach(first, self._ranks).end, reach(last, self._ranks).begin
+        stations = [Station(begin, begin, leaving, first.rank, needed=True)]
         for box in chain.boxes[1:-1]:
             rank = self._ranks[box.rank]
-            stations.append((rank.begin, box.position))
-            if rank.end > rank.begin:
-                stations.append((rank.end, box.position))
-        stations.append((reach(last, self._ranks).begin, arriving))
-        return stations
+            forks = len(box.before) > 1 or len(box.after) > 1
+            needed = box is chain.label or forks
+            stations.append(Station(rank.begin, rank.end, box.position, box.rank, needed))
+        return [*stations, Station(end, end, arriving, last.rank, needed=True)]
 
 
-def _spread(chains: list[Chain], side: Callable[[Chain], tuple[Box, Box]]) -> dict[int, float]:
-    """Return, by chain, where on the side of its vertex the line begins or ends, across."""
+def _first_offset(chain: Chain) -> float | None:
+    return chain.first_offset
+
+
+def _last_offset(chain: Chain) -> float | None:
+    return chain.last_offset
+
+
+def _spread(
+    chains: list[Chain],
+    side: Callable[[Chain], tuple[Box, Box]],
+    fixed: Callable[[Chain], float | None],
+) -> dict[int, float]:
+    """Return, by chain, where on the side of its vertex the line begins or ends, across.
+
+    Lines that run on through the same bend leave from the same place.
+    """
+    found = {}
     by_box: dict[int, list[Chain]] = {}
     for chain in chains:
-        by_box.setdefault(id(side(chain)[0]), []).append(chain)
-    found = {}
+        offset = fixed(chain)
+        if offset is None:
+            by_box.setdefault(id(side(chain)[0]), []).append(chain)
+        else:
+            found[id(chain)] = side(chain)[0].position + offset
     for sharing in by_box.values():
         box = side(sharing[0])[0]
-        sharing.sort(key=lambda chain: side(chain)[1].position)
-        step = box.across * _USED_SIDE / len(sharing)
-        for index, chain in enumerate(sharing):
-            found[id(chain)] = box.position + (index - (len(sharing) - 1) / 2) * step
+        bends = sorted(
+            {id(side(chain)[1]): side(chain)[1] for chain in sharing}.values(),
+            key=lambda bend: bend.position,
+        )
+        step = box.across * _USED_SIDE / len(bends)
+        places = {
+            id(bend): box.position + (index - (len(bends) - 1) / 2) * step
+            for index, bend in enumerate(bends)
+        }
+        found.update({id(chain): places[id(side(chain)[1])] for chain in sharing})
     return found
 
 
-def _curve(stations: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    points = [stations[0]]
-    for (along, across), (next_along, next_across) in pairwise(stations):
-        middle = (along + next_along) / 2
-        points += [(middle, across), (middle, next_across), (next_along, next_across)]
+def _curve(stations: list[Station]) -> list[tuple[float, float]]:
+    points = [(stations[0].end, stations[0].across)]
+    for station, following in pairwise(stations):
+        middle = (station.end + following.begin) / 2
+        points += [
+            (middle, station.across),
+            (middle, following.across),
+            (following.begin, following.across),
+        ]
+        if following.end > following.begin:
+            third = (following.end - following.begin) / 3
+            points += [
+                (following.begin + third, following.across),
+                (following.end - third, following.across),
+                (following.end, following.across),
+            ]
     return points

@@ -6,13 +6,29 @@ The order stays as it is, and so does every frame: nothing that did not overlap 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import groupby
 
 from composer.graph.layout.boxes import Box, Group, Item, space_between
 
+#: Sweeps carry a place over all ranks at once; rounds even out what pulls from both sides.
+_SWEEPS = 4
 _ROUNDS = 24
+#: A round that moves nothing further than this, in pixels, is the last one.
+_STILL = 0.5
 #: A bend wants to lie in line more than a vertex does: long lines look best straight.
 _BEND_WEIGHT = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Pull:
+    """A box of an item, and a neighbour outside it that it wants to be level with."""
+
+    box: Box
+    other: Box
+    offset: float  # of the box from the neighbour when the line between them is straight
+    weight: float
 
 
 @dataclass(slots=True)
@@ -23,20 +39,39 @@ class _Room:
     group: Group
     above: list[Item]
     below: list[Item]
-    pulls: list[tuple[Box, Box, float]]  # (own box, neighbour outside, weight)
+    before: list[_Pull]
+    after: list[_Pull]
+    both: list[_Pull] = field(default_factory=list)
 
 
 def straighten(root: Group) -> None:
     """Move everything towards its neighbours, across."""
     rooms = _rooms(root, root)
+    by_rank = sorted(rooms, key=lambda room: room.item.first_rank)
+    for number in range(_SWEEPS):
+        if number % 2:
+            _sweep(by_rank[::-1], root, lambda room: room.after)
+        else:
+            _sweep(by_rank, root, lambda room: room.before)
+    for room in rooms:
+        room.both = room.before + room.after
     for number in range(_ROUNDS):
-        for room in rooms if number % 2 else reversed(rooms):
-            _move(room, root)
+        in_turn = rooms if number % 2 else rooms[::-1]
+        if max(_move(room, root, room.both) for room in in_turn) < _STILL:
+            break
     root.fit()
 
 
+def _sweep(rooms: list[_Room], root: Group, pulls: Callable[[_Room], list[_Pull]]) -> None:
+    """Go over the ranks; on each, first those at one end give way, then those at the other."""
+    for _, on_rank in groupby(rooms, key=lambda room: room.item.first_rank):
+        in_order = sorted(on_rank, key=lambda room: room.item.low)
+        for room in (*reversed(in_order), *in_order):
+            _move(room, root, pulls(room))
+
+
 def _rooms(group: Group, root: Group) -> list[_Room]:
-    found = {id(child): _Room(child, group, [], [], _pulls(child)) for child in group.children}
+    found = {id(child): _Room(child, group, [], [], *_pulls(child)) for child in group.children}
     last: dict[int, Item] = {}
     for child in group.children:
         for rank in range(child.first_rank, child.last_rank + 1):
@@ -53,35 +88,63 @@ def _rooms(group: Group, root: Group) -> list[_Room]:
     return rooms
 
 
-def _pulls(item: Item) -> list[tuple[Box, Box, float]]:
+def _pulls(item: Item) -> tuple[list[_Pull], list[_Pull]]:
     own = set(map(id, item.boxes()))
-    return [
-        (box, other, _weight(box) * _weight(other))
+    before = [
+        _Pull(box, piece.low, piece.low_offset - piece.high_offset, _weight(box, piece.low))
         for box in item.boxes()
-        for other in (*box.before, *box.after)
-        if id(other) not in own
+        for piece in box.before
+        if id(piece.low) not in own
     ]
+    after = [
+        _Pull(box, piece.high, piece.high_offset - piece.low_offset, _weight(box, piece.high))
+        for box in item.boxes()
+        for piece in box.after
+        if id(piece.high) not in own
+    ]
+    return before, after
 
 
-def _weight(box: Box) -> float:
-    return _BEND_WEIGHT if box.across == 0.0 else 1.0
+def _weight(box: Box, other: Box) -> float:
+    bends = (box.across == 0.0) + (other.across == 0.0)
+    return _BEND_WEIGHT**bends
 
 
-def _move(room: _Room, root: Group) -> None:
-    weight = sum(pull for _, _, pull in room.pulls)
-    if not weight:
-        return
-    wanted = sum((other.position - box.position) * pull for box, other, pull in room.pulls) / weight
+def _move(room: _Room, root: Group, pulls: list[_Pull]) -> float:
+    """Move an item to where it is pulled, as far as there is room; return how far, across."""
+    weight = wanted = 0.0
+    for pull in pulls:
+        weight += pull.weight
+        wanted += (pull.other.position + pull.offset - pull.box.position) * pull.weight
+    if weight == 0.0:
+        return 0.0
+    item = room.item
+    distance = wanted / weight
+    if distance < 0.0:
+        distance = -min(-distance, max(_room_above(room, root), 0.0))
+    else:
+        distance = min(distance, max(_room_below(room, root), 0.0))
+    item.shift(distance)
+    return abs(distance)
+
+
+def _room_above(room: _Room, root: Group) -> float:
     item, group = room.item, room.group
-    up = min(
-        (item.low - other.high - space_between(item, other) for other in room.above),
-        default=math.inf,
-    )
-    down = min(
-        (other.low - item.high - space_between(item, other) for other in room.below),
-        default=math.inf,
-    )
+    found = math.inf
     if group is not root:
-        up = min(up, item.low - group.low - group.padding - group.label)
-        down = min(down, group.high - group.padding - item.high)
-    item.shift(max(-max(up, 0.0), min(max(down, 0.0), wanted)))
+        found = item.low - group.low - group.padding - group.label
+    low = item.low
+    for other in room.above:
+        found = min(found, low - other.high - space_between(item, other))
+    return found
+
+
+def _room_below(room: _Room, root: Group) -> float:
+    item, group = room.item, room.group
+    found = math.inf
+    if group is not root:
+        found = group.high - group.padding - item.high
+    high = item.high
+    for other in room.below:
+        found = min(found, other.low - high - space_between(item, other))
+    return found

@@ -4,86 +4,87 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.graph.facts import node_facts, port_facts
-from composer.graph.findings import Findings
-from composer.graph.labels import qos_label, short_type
+from composer.graph.keys import end_key, node_key
+from composer.graph.labels import rate, short_type
 from composer.graph.namespaces import Namespaces
 from composer.graph.picture import Cluster, Direction, Edge, Graph, Kind, Line, Vertex
-from composer.model import Channel, ChannelKind, Node, Port, PortOfNode, System, channels
+from composer.graph.scene import Actor, Channel, Meeting, Scene, channels
+from composer.graph.views.vertices import node_vertex
+from composer.model import ChannelKind
 
 
-def build(system: System, findings: Findings) -> Graph:
-    """Return the graph of ports: nodes are frames around their ports, arrows join ports."""
-    namespaces = Namespaces(system.nodes)
+def build(scene: Scene) -> Graph:
+    """Return the graph of ports: nodes are blocks of their ports, arrows join ports."""
+    namespaces = Namespaces(actor.namespace for actor in scene.actors)
     return Graph(
-        title=system.name.value,
+        title=scene.title,
         view="connections",
         direction=Direction.RIGHT,
-        vertices=tuple(
-            vertex for node in system.nodes for vertex in _ports_of(node, namespaces, findings)
-        ),
-        edges=tuple(
-            edge for channel in channels(system.nodes) for edge in _edges(channel, findings)
-        ),
+        vertices=tuple(vertex for actor in scene.actors for vertex in _ports_of(actor, namespaces)),
+        edges=tuple(edge for channel in channels(scene.actors) for edge in _edges(channel)),
         clusters=(
             *namespaces.clusters(),
-            *(_frame(node, namespaces) for node in system.nodes if node.ports),
+            *(_block(actor, namespaces) for actor in scene.actors if actor.ends),
         ),
     )
 
 
-def _frame(node: Node, namespaces: Namespaces) -> Cluster:
-    around = namespaces.around(node.namespace.value)
-    return Cluster(f"node:{node.name.value}", node.name.value, around, node_facts(node))
+def _block(actor: Actor, namespaces: Namespaces) -> Cluster:
+    return Cluster(
+        key=node_key(actor),
+        label=actor.name,
+        parent=namespaces.around(actor.namespace),
+        details=actor.details,
+        block=True,
+        namespace=actor.namespace,
+        wrong=actor.wrong,
+    )
 
 
-def _ports_of(node: Node, namespaces: Namespaces, findings: Findings) -> Iterator[Vertex]:
-    if not node.ports:
+def _ports_of(actor: Actor, namespaces: Namespaces) -> Iterator[Vertex]:
+    if not actor.ends:
+        yield node_vertex(actor, actor.name, actor.note, namespaces.around(actor.namespace))
+    for end in actor.ends:
         yield Vertex(
-            key=f"node:{node.name.value}",
-            kind=Kind.NODE,
-            lines=(node.name.value,),
-            cluster=namespaces.around(node.namespace.value),
-            details=node_facts(node),
-            wrong=findings.about_node(node),
-        )
-    for port in node.ports:
-        yield Vertex(
-            key=_key(node, port),
+            key=end_key(actor, end),
             kind=Kind.PORT,
-            lines=(port.name.value, port.kind.value),
-            cluster=f"node:{node.name.value}",
-            details=port_facts(node, port),
-            wrong=findings.about_port(port),
+            lines=(end.name, end.kind.value),
+            cluster=node_key(actor),
+            namespace=actor.namespace,
+            details=end.details,
+            wrong=end.wrong,
         )
 
 
-def _edges(channel: Channel, findings: Findings) -> Iterator[Edge]:
+def _edges(channel: Channel) -> Iterator[Edge]:
     for source in channel.sources:
         for sink in channel.sinks:
             # A message goes from source to sink, a request from the client to the server.
             towards_sink = channel.kind is ChannelKind.TOPIC
             begin, end = (source, sink) if towards_sink else (sink, source)
+            source_key, target_key = _key(begin), _key(end)
             yield Edge(
-                source=_key(begin.node, begin.port),
-                target=_key(end.node, end.port),
+                key=f"{source_key} -> {target_key}",
+                source=source_key,
+                target=target_key,
                 kind=Line(channel.kind.value),
-                lines=(channel.name, *_type_and_qos(source, sink)),
-                details=(
-                    ("from", dict(port_facts(begin.node, begin.port))),
-                    ("to", dict(port_facts(end.node, end.port))),
-                ),
-                wrong=findings.about_port(source.port) or findings.about_port(sink.port),
+                lines=(channel.name, *_said(source, sink)),
+                details=(("from", dict(begin.end.details)), ("to", dict(end.end.details))),
+                wrong=source.end.wrong or sink.end.wrong,
             )
 
 
-def _type_and_qos(source: PortOfNode, sink: PortOfNode) -> tuple[str, ...]:
-    types = dict.fromkeys(short_type(end.port.interface.value) for end in (source, sink))
-    if source.port.kind.channel is not ChannelKind.TOPIC:
-        return (" / ".join(types),)
-    qos = dict.fromkeys(qos_label(end.port.qos.profile) for end in (source, sink))
-    return (" / ".join(types), " → ".join(qos))
+def _said(source: Meeting, sink: Meeting) -> Iterator[str]:
+    """Yield the type; of a topic the rate and the QoS of both ends, once where they agree."""
+    yield " / ".join(dict.fromkeys(short_type(end.end.interface) for end in (source, sink)))
+    if source.end.kind.channel is not ChannelKind.TOPIC:
+        return
+    if source.end.rate_hz is not None:
+        yield rate(source.end.rate_hz)
+    told = dict.fromkeys(end.end.qos for end in (source, sink) if end.end.qos)
+    if told:
+        yield " → ".join(told)
 
 
-def _key(node: Node, port: Port) -> str:
-    return f"port:{node.name.value}.{port.name.value}"
+def _key(meeting: Meeting) -> str:
+    return end_key(meeting.actor, meeting.end)

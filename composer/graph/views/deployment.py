@@ -4,68 +4,52 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.graph.facts import node_facts
-from composer.graph.findings import Findings
-from composer.graph.picture import Cluster, Direction, Edge, Graph, Kind, Line, Vertex
-from composer.model import ChannelKind, Executor, ExecutorKind, Node, System, channels
+from composer.graph.keys import node_key
+from composer.graph.picture import Cluster, Direction, Edge, Graph, Line
+from composer.graph.scene import Scene, channels
+from composer.graph.views.vertices import node_vertex
+from composer.model import ChannelKind
 
-_DEFAULT = "default"
+#: An arrow that stands for more names than these says how many.
+_MOST_NAMES = 3
 
 
-def build(system: System, findings: Findings) -> Graph:
+def build(scene: Scene) -> Graph:
     """Return the graph of executors, each with the nodes whose callbacks it calls."""
     return Graph(
-        title=system.name.value,
+        title=scene.title,
         view="deployment",
         direction=Direction.RIGHT,
-        vertices=tuple(_node(node, findings) for node in system.nodes),
-        edges=tuple(_edges(system)),
-        clusters=tuple(_clusters(system)),
+        vertices=tuple(
+            node_vertex(actor, actor.full_name, "", actor.executor) for actor in scene.actors
+        ),
+        edges=tuple(_edges(scene)),
+        clusters=tuple(Cluster(group.key, group.label) for group in scene.executors),
     )
 
 
-def _node(node: Node, findings: Findings) -> Vertex:
-    return Vertex(
-        key=f"node:{node.name.value}",
-        kind=Kind.NODE,
-        lines=(node.full_name,),
-        cluster=_cluster_key(_executor_name(node)),
-        details=node_facts(node),
-        wrong=findings.about_node(node),
-    )
-
-
-def _executor_name(node: Node) -> str:
-    return node.executor.value if node.executor is not None else _DEFAULT
-
-
-def _cluster_key(executor: str) -> str:
-    return f"executor:{executor}"
-
-
-def _clusters(system: System) -> Iterator[Cluster]:
-    declared = {executor.name.value: executor for executor in system.executors}
-    for name in dict.fromkeys([*declared, *map(_executor_name, system.nodes)]):
-        yield Cluster(_cluster_key(name), f"{name}: {_kind(declared.get(name))}")
-
-
-def _kind(executor: Executor | None) -> str:
-    if executor is None:
-        return ExecutorKind.EVENTS.value
-    if executor.kind is ExecutorKind.MULTI_THREADED:
-        return f"{executor.kind}, {executor.threads} threads"
-    return executor.kind.value
-
-
-def _edges(system: System) -> Iterator[Edge]:
+def _edges(scene: Scene) -> Iterator[Edge]:
     """One arrow for all that goes from one node to another in one way."""
-    names: dict[tuple[str, str, ChannelKind], list[str]] = {}
-    for channel in channels(system.nodes):
+    names: dict[tuple[str, str, ChannelKind], dict[str, None]] = {}
+    for channel in channels(scene.actors):
         for source in channel.sources:
             for sink in channel.sinks:
-                ends = (source.node.name.value, sink.node.name.value)
+                ends = (node_key(source.actor), node_key(sink.actor))
                 if channel.kind is not ChannelKind.TOPIC:
                     ends = ends[::-1]
-                names.setdefault((*ends, channel.kind), []).append(channel.name)
+                names.setdefault((*ends, channel.kind), {})[channel.name] = None
     for (begin, end, kind), joined in sorted(names.items()):
-        yield Edge(f"node:{begin}", f"node:{end}", Line(kind.value), tuple(dict.fromkeys(joined)))
+        yield Edge(
+            key=f"{begin} -> {end} {kind}",
+            source=begin,
+            target=end,
+            kind=Line(kind.value),
+            lines=_label(tuple(joined), kind),
+            details=(("carries", [*joined]),),
+        )
+
+
+def _label(names: tuple[str, ...], kind: ChannelKind) -> tuple[str, ...]:
+    if len(names) <= _MOST_NAMES:
+        return names
+    return (*names[: _MOST_NAMES - 1], f"and {len(names) - _MOST_NAMES + 1} more {kind}s")

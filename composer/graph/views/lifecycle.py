@@ -2,51 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-from composer.graph.facts import node_facts
-from composer.graph.findings import Findings
 from composer.graph.namespaces import Namespaces
-from composer.graph.picture import Direction, Edge, Graph, Kind, Line, Vertex
-from composer.model import Node, System
-from composer.plan import Plan, bring_up
+from composer.graph.picture import Direction, Edge, Graph, Line
+from composer.graph.scene import Scene
+from composer.graph.views.vertices import node_vertex
 
 
-def build(system: System, findings: Findings) -> Graph:
+def build(scene: Scene) -> Graph:
     """Return the graph of dependencies. Arrows point from a node to those that wait for it."""
-    plan = bring_up(system)
-    namespaces = Namespaces(system.nodes)
+    namespaces = Namespaces(actor.namespace for actor in scene.actors)
     return Graph(
-        title=system.name.value,
+        title=scene.title,
         view="lifecycle",
         direction=Direction.DOWN,
         vertices=tuple(
-            Vertex(
-                key=f"node:{node.name.value}",
-                kind=Kind.NODE,
-                lines=(node.name.value, *_steps(node, plan)),
-                cluster=namespaces.around(node.namespace.value),
-                details=node_facts(node),
-                wrong=findings.about_node(node),
+            node_vertex(
+                actor,
+                actor.name,
+                actor.steps or "stays unconfigured",
+                namespaces.around(actor.namespace),
             )
-            for node in system.nodes
+            for actor in scene.actors
         ),
-        edges=tuple(edge for node in system.nodes for edge in _dependencies(node, system)),
+        edges=tuple(
+            Edge(
+                key=f"node:{wait.waited_for} -> node:{wait.waiting} {wait.reason}",
+                source=f"node:{wait.waited_for}",
+                target=f"node:{wait.waiting}",
+                kind=Line.IMPLIED if wait.implied else Line.DEPENDENCY,
+                lines=(wait.reason,),
+            )
+            for wait in scene.waits
+        ),
         clusters=namespaces.clusters(),
     )
-
-
-def _steps(node: Node, plan: Plan) -> Iterator[str]:
-    steps = [step for step in plan.steps if step.node == node.name.value]
-    yield ", ".join(f"#{step.number} {step.transition}" for step in steps) or "stays unconfigured"
-
-
-def _dependencies(node: Node, system: System) -> Iterator[Edge]:
-    for dependency in node.depends_on:
-        if system.node(dependency.node.value) is not None:
-            yield Edge(
-                source=f"node:{dependency.node.value}",
-                target=f"node:{node.name.value}",
-                kind=Line.DEPENDENCY,
-                lines=(f"once {dependency.state}",),
-            )

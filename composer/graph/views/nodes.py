@@ -4,86 +4,80 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.graph.facts import channel_facts, node_facts, port_facts
-from composer.graph.findings import Findings
-from composer.graph.labels import qos_label, rate, short_type
-from composer.graph.namespaces import Namespaces
+from composer.graph.facts import channel_facts
+from composer.graph.keys import channel_key, end_key, node_key
+from composer.graph.labels import rate, short_type
+from composer.graph.namespaces import Namespaces, parent_of
 from composer.graph.picture import Direction, Edge, Graph, Kind, Line, Vertex
-from composer.graph.rates import publishing_rate_hz
-from composer.model import Channel, ChannelKind, Node, PortKind, PortOfNode, System, channels
+from composer.graph.scene import SENDING, Channel, Meeting, Scene, channels
+from composer.graph.views.vertices import node_vertex
+from composer.model import ChannelKind, PortKind
 
 
-def build(system: System, findings: Findings) -> Graph:
+def build(scene: Scene) -> Graph:
     """Return the graph of who talks to whom over what. Arrows point where data or requests go."""
-    namespaces = Namespaces(system.nodes)
-    joined = channels(system.nodes)
+    namespaces = Namespaces(actor.namespace for actor in scene.actors)
+    joined = channels(scene.actors)
     return Graph(
-        title=system.name.value,
+        title=scene.title,
         view="nodes",
         direction=Direction.RIGHT,
         vertices=(
-            *(_node(node, namespaces, findings) for node in system.nodes),
-            *(_channel(channel, namespaces) for channel in joined),
+            *(
+                node_vertex(actor, actor.name, actor.note, namespaces.around(actor.namespace))
+                for actor in scene.actors
+            ),
+            *(_channel(channel, namespaces, scene) for channel in joined),
         ),
-        edges=tuple(edge for channel in joined for edge in _edges(channel, findings)),
+        edges=tuple(edge for channel in joined for edge in _edges(channel)),
         clusters=namespaces.clusters(),
     )
 
 
-def _node(node: Node, namespaces: Namespaces, findings: Findings) -> Vertex:
-    lines = [node.name.value]
-    if node.type_name is not None and node.type_name.value != node.name.value:
-        lines.append(node.type_name.value)
+def _channel(channel: Channel, namespaces: Namespaces, scene: Scene) -> Vertex:
+    measured = scene.rates_hz.get(channel.name) if channel.kind is ChannelKind.TOPIC else None
     return Vertex(
-        key=f"node:{node.name.value}",
-        kind=Kind.NODE,
-        lines=tuple(lines),
-        cluster=namespaces.around(node.namespace.value),
-        details=node_facts(node),
-        wrong=findings.about_node(node),
-    )
-
-
-def _channel(channel: Channel, namespaces: Namespaces) -> Vertex:
-    types = dict.fromkeys(short_type(end.port.interface.value) for end in channel.ends)
-    return Vertex(
-        key=f"{channel.kind}:{channel.name}",
+        key=channel_key(channel),
         kind=Kind(channel.kind.value),
-        lines=(channel.name, " / ".join(types)),
+        lines=(
+            channel.name,
+            " / ".join(dict.fromkeys(map(short_type, channel.types))),
+            *([] if measured is None else [rate(measured)]),
+        ),
         cluster=namespaces.around_name(channel.name),
+        namespace=parent_of(channel.name),
         details=channel_facts(channel),
+        wrong=f"more than one type: {', '.join(channel.types)}" if len(channel.types) > 1 else "",
     )
 
 
-def _edges(channel: Channel, findings: Findings) -> Iterator[Edge]:
+def _edges(channel: Channel) -> Iterator[Edge]:
     """Yield an arrow for each port: node to channel where it sends, channel to node elsewhere."""
-    key = f"{channel.kind}:{channel.name}"
-    for end in channel.ends:
-        node_key = f"node:{end.node.name.value}"
-        into_channel = end.port.kind in _SENDING
+    for meeting in channel.ends:
+        actor, end = meeting.actor, meeting.end
+        ends = (node_key(actor), channel_key(channel))
+        source, target = ends if end.kind in SENDING else ends[::-1]
         yield Edge(
-            source=node_key if into_channel else key,
-            target=key if into_channel else node_key,
+            key=end_key(actor, end),
+            source=source,
+            target=target,
             kind=Line(channel.kind.value),
-            lines=_label(channel, end),
-            details=port_facts(end.node, end.port),
-            wrong=findings.about_port(end.port),
+            lines=_label(channel, meeting),
+            details=end.details,
+            wrong=end.wrong,
         )
 
 
-_SENDING = (PortKind.PUBLISHER, PortKind.CLIENT, PortKind.ACTION_CLIENT)
-
-
-def _label(channel: Channel, end: PortOfNode) -> tuple[str, ...]:
+def _label(channel: Channel, meeting: Meeting) -> tuple[str, ...]:
     """Say the rate of a publisher, and the QoS; a subscription's only if it differs from that."""
     if channel.kind is not ChannelKind.TOPIC:
         return ()
+    end = meeting.end
     lines = []
-    hertz = publishing_rate_hz(end.node, end.port)
-    if end.port.kind is PortKind.PUBLISHER and hertz is not None:
-        lines.append(rate(hertz))
-    offered = {source.port.qos.profile for source in channel.sources}
-    is_told = end.port.kind is PortKind.SUBSCRIPTION and offered == {end.port.qos.profile}
-    if end.port.qos.explicit and not is_told:
-        lines.append(qos_label(end.port.qos.profile))
+    if end.kind is PortKind.PUBLISHER and end.rate_hz is not None:
+        lines.append(rate(end.rate_hz))
+    offered = {source.end.qos for source in channel.sources}
+    is_told = end.kind is PortKind.SUBSCRIPTION and offered == {end.qos}
+    if end.qos and not is_told:
+        lines.append(end.qos)
     return tuple(lines)

@@ -1,11 +1,9 @@
-"""The lifecycle machine of REP-style managed nodes, with the place each node is brought to."""
+"""The lifecycle machine of managed nodes, with the place each node has in it."""
 
 from __future__ import annotations
 
-from composer.graph.findings import Findings
 from composer.graph.picture import Direction, Edge, Graph, Kind, Line, Vertex
-from composer.model import System
-from composer.plan import bring_up
+from composer.graph.scene import Scene
 
 _STATES = ("unconfigured", "inactive", "active", "finalized")
 
@@ -20,38 +18,40 @@ _TRANSITIONS = (
     ("active", "shutdown", "finalized"),
 )
 
-_REACHED = {"configure": "inactive", "activate": "active"}
+#: A state with more nodes than these says how many more there are.
+_MOST_NODES = 24
 
 
-def build(system: System, findings: Findings) -> Graph:
-    """Return the state machine; each state lists the nodes that the bring-up leaves there."""
-    places = _places(system)
+def build(scene: Scene) -> Graph:
+    """Return the state machine; each state lists the nodes that are in it."""
+    others = sorted({actor.state for actor in scene.actors} - {*_STATES, ""})
     return Graph(
-        title=system.name.value,
+        title=scene.title,
         view="states",
         direction=Direction.RIGHT,
-        vertices=tuple(_state(state, places, system, findings) for state in _STATES),
+        vertices=tuple(_state(state, scene) for state in (*_STATES, *others)),
         edges=tuple(
-            Edge(f"state:{begin}", f"state:{end}", Line.TRANSITION, (name,))
+            Edge(
+                f"state:{begin} -> state:{end}",
+                f"state:{begin}",
+                f"state:{end}",
+                Line.TRANSITION,
+                (name,),
+            )
             for begin, name, end in _TRANSITIONS
         ),
     )
 
 
-def _places(system: System) -> dict[str, str]:
-    """Return the state that the bring-up takes each node to."""
-    places = dict.fromkeys((node.name.value for node in system.nodes), "unconfigured")
-    for step in bring_up(system).steps:
-        places[step.node] = _REACHED.get(step.transition, places[step.node])
-    return places
-
-
-def _state(state: str, places: dict[str, str], system: System, findings: Findings) -> Vertex:
-    nodes = [node for node in system.nodes if places[node.name.value] == state]
+def _state(state: str, scene: Scene) -> Vertex:
+    actors = [actor for actor in scene.actors if actor.state == state]
+    names = [actor.full_name for actor in actors]
+    shown = names if len(names) <= _MOST_NODES else names[: _MOST_NODES - 1]
+    more = [f"and {len(names) - len(shown)} more"] if len(names) > len(shown) else []
     return Vertex(
         key=f"state:{state}",
         kind=Kind.STATE,
-        lines=(state, *(node.full_name for node in nodes)),
-        details=(("nodes", [node.full_name for node in nodes]),),
-        wrong=next(filter(None, map(findings.about_node, nodes)), ""),
+        lines=(state, *shown, *more),
+        details=(("nodes", [*names]),),
+        wrong=next((actor.wrong for actor in actors if actor.wrong), ""),
     )

@@ -1,0 +1,137 @@
+"""From systems to a scene: what their files declare, with what the checks say about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from composer.drift.expected import states_after_bring_up
+from composer.graph.facts import node_facts, port_facts
+from composer.graph.findings import Findings
+from composer.graph.labels import qos_label
+from composer.graph.rates import publishing_rate_hz
+from composer.graph.scene import Actor, End, ExecutorGroup, Scene, Wait
+from composer.model import Executor, ExecutorKind, Node, Port, System
+from composer.model.dependencies import dependency_edges
+from composer.plan import bring_up
+
+_DEFAULT = "default"
+
+
+@dataclass(frozen=True, slots=True)
+class _BroughtUp:
+    """What the bring-up does with each node, by its key in the system."""
+
+    steps: dict[str, str]
+    states: dict[str, str]
+
+    @classmethod
+    def of(cls, system: System) -> _BroughtUp:
+        steps: dict[str, list[str]] = {}
+        for step in bring_up(system).steps:
+            steps.setdefault(step.node, []).append(f"#{step.number} {step.transition}")
+        said = {name: ", ".join(texts) for name, texts in steps.items()}
+        return cls(said, states_after_bring_up(system))
+
+
+def scene_of(systems: Sequence[System], findings: Findings) -> Scene:
+    """Return the nodes of one or several systems as one scene.
+
+    ROS knows nodes by their full names: of two that share one, the first is drawn and marked.
+    """
+    several = len(systems) > 1
+    actors: dict[str, Actor] = {}
+    for system in systems:
+        brought_up = _BroughtUp.of(system)
+        for node in system.nodes:
+            actor = _actor(node, system, brought_up, findings, several)
+            known = actors.get(actor.full_name)
+            actors[actor.full_name] = actor if known is None else _twice(known)
+    return Scene(
+        title=" + ".join(system.name.value for system in systems),
+        actors=tuple(actors.values()),
+        waits=tuple(wait for system in systems for wait in _waits(system)),
+        executors=tuple(
+            dict.fromkeys(group for system in systems for group in _groups(system, several))
+        ),
+    )
+
+
+def _actor(
+    node: Node, system: System, brought_up: _BroughtUp, findings: Findings, several: bool
+) -> Actor:
+    return Actor(
+        name=node.name.value,
+        full_name=node.full_name,
+        namespace=node.namespace.value,
+        note=_note(node, system, several),
+        state=brought_up.states[node.name.value],
+        steps=brought_up.steps.get(node.name.value, ""),
+        executor=_executor_key(system, _executor_name(node)),
+        ends=tuple(_end(node, port, findings) for port in node.ports),
+        details=node_facts(node),
+        wrong=findings.about_node(node),
+    )
+
+
+def _twice(actor: Actor) -> Actor:
+    wrong = actor.wrong or f"two nodes are called '{actor.full_name}'"
+    return replace(actor, wrong=wrong)
+
+
+def _note(node: Node, system: System, several: bool) -> str:
+    """Say what the name does not: the node's type, and whose it is where there are several."""
+    type_name = node.type_name.value if node.type_name is not None else ""
+    said = type_name if type_name != node.name.value else ""
+    return " · ".join(filter(None, (said, system.name.value if several else "")))
+
+
+def _end(node: Node, port: Port, findings: Findings) -> End:
+    return End(
+        kind=port.kind,
+        name=port.name.value,
+        channel=port.full_name,
+        interface=port.interface.value,
+        qos=qos_label(port.qos.profile) if port.qos.explicit else "",
+        rate_hz=publishing_rate_hz(node, port),
+        details=port_facts(node, port),
+        wrong=findings.about_port(port),
+    )
+
+
+def _waits(system: System) -> Iterator[Wait]:
+    names = {node.name.value: node.full_name for node in system.nodes}
+    states = {
+        (node.name.value, dependency.node.value): dependency.state.value
+        for node in system.nodes
+        for dependency in node.depends_on
+    }
+    for edge in dependency_edges(system):
+        if edge.implied and (edge.node, edge.on) in states:
+            continue  # it is said already
+        reason = f"serves {edge.serves}" if edge.implied else f"once {states[edge.node, edge.on]}"
+        yield Wait(names[edge.node], names[edge.on], reason, edge.implied)
+
+
+def _groups(system: System, several: bool) -> Iterator[ExecutorGroup]:
+    declared = {executor.name.value: executor for executor in system.executors}
+    whose = f"{system.name.value} · " if several else ""
+    for name in dict.fromkeys([*declared, *map(_executor_name, system.nodes)]):
+        label = f"{whose}{name}: {_kind(declared.get(name))}"
+        yield ExecutorGroup(_executor_key(system, name), label)
+
+
+def _executor_name(node: Node) -> str:
+    return node.executor.value if node.executor is not None else _DEFAULT
+
+
+def _executor_key(system: System, executor: str) -> str:
+    return f"executor:{system.name.value}.{executor}"
+
+
+def _kind(executor: Executor | None) -> str:
+    if executor is None:
+        return ExecutorKind.EVENTS.value
+    if executor.kind is ExecutorKind.MULTI_THREADED:
+        return f"{executor.kind}, {executor.threads} threads"
+    return executor.kind.value

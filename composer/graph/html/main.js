@@ -1,0 +1,64 @@
+/** Puts the parts together. */
+const ZOOM_STEP = 1.25;
+
+function main() {
+  const pictures = [...document.querySelectorAll(".view")].map(readPicture);
+  const viewports = new Map(pictures.map((picture) => [picture, createViewport(picture)]));
+  const placed = new Set();
+  const currentPicture = () => tabs.current();
+  const viewportOf = (picture) => viewports.get(picture);
+
+  /** A picture that is not shown has no size yet: place it when it first is. */
+  function placeOnce() {
+    const picture = currentPicture();
+    if (placed.has(picture)) return;
+    placed.add(picture);
+    viewportOf(picture).start();
+  }
+
+  const tabs = createTabs(pictures, {
+    before: () => selection.unmark(),
+    after: () => {
+      placeOnce();
+      search.update();
+      if (selection.isOpen()) selection.mark();
+    },
+  });
+  const selection = createSelection(currentPicture, viewportOf);
+  const search = createSearch(currentPicture, selection.goTo);
+  createFilter(pictures);
+  createAppearance();
+  for (const picture of pictures) listenToThings(picture, selection, viewportOf(picture));
+
+  const commands = {
+    in: () => viewportOf(currentPicture()).zoom(ZOOM_STEP),
+    out: () => viewportOf(currentPicture()).zoom(1 / ZOOM_STEP),
+    fit: () => viewportOf(currentPicture()).fit(),
+  };
+  for (const button of document.querySelectorAll("[data-zoom]")) {
+    button.addEventListener("click", commands[button.dataset.zoom]);
+  }
+  listenToKeys(commands, { search, selection });
+  placeOnce();
+}
+
+/** Keys that work wherever nothing is typed: + - 0 / and Escape. */
+function listenToKeys(commands, { search, selection }) {
+  const actions = {
+    "+": commands.in,
+    "=": commands.in,
+    "-": commands.out,
+    0: commands.fit,
+    "/": search.focus,
+    Escape: selection.clear,
+  };
+  document.addEventListener("keydown", (event) => {
+    const typing = event.target instanceof HTMLInputElement && event.target.type === "search";
+    const action = actions[event.key];
+    if (typing || !action || event.ctrlKey || event.metaKey || event.altKey) return;
+    action();
+    event.preventDefault();
+  });
+}
+
+main();

@@ -1,0 +1,184 @@
+"""The page: toolbar, pictures, details; style and script are put into it, nothing is loaded."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from composer.graph.drawing import markers, number, text
+from composer.graph.html.articles import articles
+from composer.graph.layout import Layout
+from composer.graph.picture import Graph, Kind
+from composer.graph.svg import contents
+from composer.graph.theme import FORMS, color_rules, colors
+
+#: The parts of the script, each before those that use it.
+_SCRIPTS = (
+    "picture.js",
+    "viewport.js",
+    "filter.js",
+    "search.js",
+    "selection.js",
+    "tabs.js",
+    "appearance.js",
+    "main.js",
+)
+_KINDS = (Kind.NODE, Kind.TOPIC, Kind.SERVICE, Kind.ACTION)
+
+Picture = tuple[Graph, Layout]
+
+
+def render(pictures: Sequence[Picture], shown: int = 0) -> str:
+    """Return the page with one picture or more, each of another view.
+
+    The one at index ``shown`` is the one that is shown first.
+    """
+    return "\n".join(_lines(pictures, shown)) + "\n"
+
+
+def _lines(pictures: Sequence[Picture], shown: int) -> Iterator[str]:
+    title = text(pictures[0][0].title)
+    script = _script()
+    yield "<!DOCTYPE html>"
+    yield '<html lang="en">'
+    yield "<head>"
+    yield '<meta charset="utf-8">'
+    yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
+    yield f'<meta http-equiv="Content-Security-Policy" content="{_policy(script)}">'
+    yield '<meta name="generator" content="compose graph">'
+    yield f"<title>{title}</title>"
+    yield f"<style>{_style()}</style>"
+    yield "<noscript><style>.listing{display:block}.tools{display:none}</style></noscript>"
+    yield "</head>"
+    yield "<body>"
+    yield from _toolbar(title, pictures, shown)
+    yield "<main>"
+    for index, (graph, layout) in enumerate(pictures):
+        yield from _view(graph, layout, shown=index == shown)
+    yield from _panel()
+    yield "</main>"
+    yield '<section class="listing" aria-label="All details">'
+    yield from articles(graph for graph, _ in pictures)
+    yield "</section>"
+    yield f'<svg class="heads" aria-hidden="true">{markers()}</svg>'
+    yield f"<script>{script}</script>"
+    yield "</body>"
+    yield "</html>"
+
+
+def _policy(script: str) -> str:
+    """Allow our own style and script and nothing else: the page cannot load anything."""
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    return (
+        f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}';"
+        " base-uri 'none'; form-action 'none'"
+    )
+
+
+def _toolbar(title: str, pictures: Sequence[Picture], shown: int) -> Iterator[str]:
+    yield '<header class="bar">'
+    yield f"<h1>{title}</h1>"
+    yield '<div class="tools">'
+    yield from _tabs([graph.view for graph, _ in pictures], shown)
+    yield (
+        '<div class="search" role="search"><input type="search" id="search" autocomplete="off"'
+        ' spellcheck="false" placeholder="Search ( / )" aria-label="Search names, types, notes">'
+        '<output id="matches" for="search" aria-live="polite"></output></div>'
+    )
+    yield from _filters([graph for graph, _ in pictures])
+    yield (
+        '<div class="group" role="group" aria-label="Zoom">'
+        '<button type="button" data-zoom="out" aria-label="Zoom out" title="-">-</button>'
+        '<button type="button" data-zoom="in" aria-label="Zoom in" title="+">+</button>'
+        '<button type="button" data-zoom="fit" title="Show everything (0)">Fit</button></div>'
+    )
+    yield '<button type="button" id="appearance" title="Light or dark">Theme: auto</button>'
+    yield "</div>"
+    yield "</header>"
+
+
+def _tabs(views: Sequence[str], shown: int) -> Iterator[str]:
+    if len(views) < 2:
+        return
+    yield '<div class="group" role="tablist" aria-label="View">'
+    for index, view in enumerate(views):
+        selected = "true" if index == shown else "false"
+        yield (
+            f'<button type="button" role="tab" id="tab-{view}" aria-controls="view-{view}"'
+            f' aria-selected="{selected}" tabindex="{0 if index == shown else -1}">{view}</button>'
+        )
+    yield "</div>"
+
+
+def _filters(graphs: Sequence[Graph]) -> Iterator[str]:
+    vertices = [vertex for graph in graphs for vertex in graph.vertices]
+    blocks = [cluster for graph in graphs for cluster in graph.clusters if cluster.block]
+    kinds = {vertex.kind for vertex in vertices} | ({Kind.NODE} if blocks else set())
+    namespaces = {vertex.namespace for vertex in vertices if vertex.kind is Kind.NODE}
+    namespaces |= {block.namespace for block in blocks}
+    yield '<details class="filter"><summary>Filter</summary><div class="menu">'
+    yield "<fieldset><legend>Kind</legend>"
+    yield from (_choice("kind", kind.value, f"{kind.value}s") for kind in _KINDS if kind in kinds)
+    yield "</fieldset><fieldset><legend>Namespace</legend>"
+    yield from (_choice("namespace", name, name) for name in sorted(namespaces))
+    yield "</fieldset>"
+    yield '<button type="button" id="everything">Show everything</button></div></details>'
+
+
+def _choice(group: str, value: str, label: str) -> str:
+    return (
+        f'<label><input type="checkbox" name="{group}" value="{text(value)}" checked>'
+        f" {text(label)}</label>"
+    )
+
+
+def _view(graph: Graph, layout: Layout, *, shown: bool) -> Iterator[str]:
+    width, height = number(layout.size.width), number(layout.size.height)
+    hidden = "" if shown else " hidden"
+    yield (
+        f'<section class="view" id="view-{graph.view}" role="tabpanel" data-view="{graph.view}"'
+        f' aria-label="{text(graph.view)}"{hidden}>'
+    )
+    yield (
+        f'<svg class="picture" viewBox="0 0 {width} {height}" role="group"'
+        f' aria-label="{text(f"{graph.title}: {graph.view}")}">'
+    )
+    yield '<g class="world">'
+    yield from contents(graph, layout)
+    yield "</g></svg></section>"
+
+
+def _panel() -> Iterator[str]:
+    yield '<aside id="details" aria-label="Details" tabindex="-1" hidden>'
+    yield '<button type="button" id="close" aria-label="Close details">Close</button>'
+    yield '<div id="about"></div>'
+    yield '<nav id="neighbors" aria-label="Connected to"></nav>'
+    yield "</aside>"
+
+
+def _script() -> str:
+    parts = "\n".join(_asset(name) for name in _SCRIPTS)
+    return f'(() => {{\n"use strict";\n{parts}}})();\n'
+
+
+def _style() -> str:
+    names = colors(dark=False)
+    variables = {name: f"var(--{name})" for name in names}
+    light, dark = (_variables(colors(dark=side)) for side in (False, True))
+    return (
+        f":root{{{light}}}"
+        f"@media (prefers-color-scheme:dark){{:root:not([data-theme=light]){{{dark}}}}}"
+        f":root[data-theme=dark]{{{dark}}}"
+        f"@media print{{:root:root{{{light}}}}}"
+        f"{FORMS}{color_rules(variables)}\n{_asset('page.css')}"
+    )
+
+
+def _variables(values: dict[str, str]) -> str:
+    return "".join(f"--{name}:{value};" for name, value in values.items())
+
+
+def _asset(name: str) -> str:
+    return (Path(__file__).parent / name).read_text(encoding="utf-8")

@@ -1,0 +1,165 @@
+/**
+ * Pan and zoom of one picture.
+ *
+ * The SVG's viewBox holds all of it, so the browser shows everything when nothing is moved (and in
+ * print); what is here is the movement from there: a scale and a shift, in the picture's units.
+ */
+const LEAST_SCALE = 0.2;
+const MOST_PIXELS_A_UNIT = 4;
+/** A small picture is not blown up beyond this when all of it is shown. */
+const COMFORTABLE_PIXELS_A_UNIT = 1.6;
+/** A picture that would be smaller than this is not shown whole at first. */
+const LEAST_PIXELS_A_UNIT = 0.3;
+/** What is gone to is shown at least this big. */
+const READABLE_PIXELS_A_UNIT = 1.1;
+const DRAG_BEGINS_PIXELS = 4;
+
+function createViewport(picture) {
+  const { svg, world } = picture;
+  const size = svg.viewBox.baseVal;
+  let scale = 1;
+  let shift = { x: 0, y: 0 };
+
+  function pixelsPerUnit() {
+    const { width, height } = svg.getBoundingClientRect();
+    return Math.min(width / size.width, height / size.height) || 1;
+  }
+
+  function show() {
+    world.style.transform = `translate(${shift.x}px, ${shift.y}px) scale(${scale})`;
+    svg.dataset.scale = scale.toFixed(3);
+  }
+
+  function fit() {
+    scale = Math.min(1, COMFORTABLE_PIXELS_A_UNIT / pixelsPerUnit());
+    shift = { x: (size.width * (1 - scale)) / 2, y: (size.height * (1 - scale)) / 2 };
+    show();
+  }
+
+  /** Show it first: all of it, or of a very tall one its beginning, as wide as it is. */
+  function start() {
+    const { width, height } = svg.getBoundingClientRect();
+    fit();
+    if (pixelsPerUnit() * scale >= LEAST_PIXELS_A_UNIT || size.height * width < size.width * height) return;
+    scale = width / size.width / pixelsPerUnit();
+    shift = { x: (size.width * (1 - scale)) / 2, y: 0 };
+    show();
+  }
+
+  /** Where a point of the screen is in the SVG's units. */
+  function pointAt(clientX, clientY) {
+    return new DOMPoint(clientX, clientY).matrixTransform(svg.getScreenCTM().inverse());
+  }
+
+  function zoomAt(factor, point) {
+    const most = Math.max(MOST_PIXELS_A_UNIT / pixelsPerUnit(), 1);
+    const wanted = Math.min(Math.max(scale * factor, LEAST_SCALE), most);
+    shift.x = point.x - ((point.x - shift.x) * wanted) / scale;
+    shift.y = point.y - ((point.y - shift.y) * wanted) / scale;
+    scale = wanted;
+    show();
+  }
+
+  function zoom(factor) {
+    zoomAt(factor, { x: size.width / 2, y: size.height / 2 });
+  }
+
+  function pan(x, y) {
+    shift.x += x;
+    shift.y += y;
+    show();
+  }
+
+  /** Bring a box, in the picture's units, to the middle; near enough to be read. */
+  function center(box) {
+    scale = Math.max(scale, READABLE_PIXELS_A_UNIT / pixelsPerUnit());
+    shift.x = size.width / 2 - (box.x + box.width / 2) * scale;
+    shift.y = size.height / 2 - (box.y + box.height / 2) * scale;
+    show();
+  }
+
+  /** Bring a box into sight, if it is not there. */
+  function reveal(element, box) {
+    const frame = svg.getBoundingClientRect();
+    const place = element.getBoundingClientRect();
+    const seen =
+      place.left >= frame.left && place.right <= frame.right &&
+      place.top >= frame.top && place.bottom <= frame.bottom;
+    if (!seen) center(box);
+  }
+
+  /** Move the picture so that an element is not behind a panel on the right. */
+  function uncover(element, panel) {
+    const hidden = element.getBoundingClientRect().right + 24 - panel.getBoundingClientRect().left;
+    if (hidden > 0 && panel.clientWidth < svg.clientWidth) pan(-hidden / pixelsPerUnit(), 0);
+  }
+
+  listenToWheel(svg, zoomAt, pointAt);
+  listenToPointers(svg, { zoomAt, pan, pointAt });
+  return { start, fit, zoom, center, reveal, uncover };
+}
+
+function listenToWheel(svg, zoomAt, pointAt) {
+  svg.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 16 : 1;
+      zoomAt(Math.exp((-event.deltaY * lines) / 500), pointAt(event.clientX, event.clientY));
+    },
+    { passive: false },
+  );
+}
+
+/** One pointer drags, two pinch. A press that does not move stays a click. */
+function listenToPointers(svg, viewport) {
+  const pointers = new Map();
+  let dragging = false;
+  let pressedAt = null;
+
+  svg.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0) return;
+    pointers.set(event.pointerId, event);
+    pressedAt = { x: event.clientX, y: event.clientY };
+    dragging = false;
+  });
+
+  svg.addEventListener("pointermove", (event) => {
+    const before = pointers.get(event.pointerId);
+    if (!before) return;
+    const far = Math.hypot(event.clientX - pressedAt.x, event.clientY - pressedAt.y);
+    if (!dragging && far < DRAG_BEGINS_PIXELS) return;
+    if (!dragging) {
+      dragging = true;
+      svg.setPointerCapture(event.pointerId);
+      svg.classList.add("dragged");
+    }
+    const other = [...pointers.values()].find((one) => one.pointerId !== event.pointerId);
+    if (other) pinch(before, event, other);
+    else drag(before, event);
+    pointers.set(event.pointerId, event);
+  });
+
+  for (const name of ["pointerup", "pointercancel"]) {
+    svg.addEventListener(name, (event) => {
+      pointers.delete(event.pointerId);
+      svg.classList.remove("dragged");
+    });
+  }
+
+  // What ends a drag is no click on whatever lies under it.
+  svg.addEventListener("click", (event) => { if (dragging) event.stopPropagation(); }, true);
+
+  function drag(before, event) {
+    const from = viewport.pointAt(before.clientX, before.clientY);
+    const to = viewport.pointAt(event.clientX, event.clientY);
+    viewport.pan(to.x - from.x, to.y - from.y);
+  }
+
+  function pinch(before, event, other) {
+    const distance = (one) => Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY);
+    if (distance(before) === 0) return;
+    const middle = [(event.clientX + other.clientX) / 2, (event.clientY + other.clientY) / 2];
+    viewport.zoomAt(distance(event) / distance(before), viewport.pointAt(...middle));
+  }
+}

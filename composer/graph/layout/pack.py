@@ -1,0 +1,49 @@
+"""Everything in a given order, as close together as it may be, and what that order costs."""
+
+from __future__ import annotations
+
+from bisect import bisect_right, insort
+from collections.abc import Iterable
+
+from composer.graph.layout.boxes import Group, Item, space_between
+
+#: What an order costs: crossings first, then the length of the lines across, in pixels.
+Cost = tuple[int, float]
+
+
+def pack(group: Group, start: float = 0.0) -> None:
+    """Place the children in their order, each as close to ``start`` as those before it allow."""
+    group.low = start
+    inside = start + group.padding + group.label
+    last: dict[int, Item] = {}
+    for child in group.children:
+        covered = range(child.first_rank, child.last_rank + 1)
+        above = [last[rank] for rank in covered if rank in last]
+        low = max((item.high + space_between(item, child) for item in above), default=inside)
+        if isinstance(child, Group):
+            pack(child, low)
+        else:
+            child.position = low + child.across / 2
+        last.update(dict.fromkeys(covered, child))
+    high = max(child.high for child in group.children) + group.padding
+    group.high = max(high, group.low + group.least)
+
+
+def cost(root: Group) -> Cost:
+    """Return how often lines between neighbouring ranks cross, and how far they go across."""
+    by_rank: dict[int, list[tuple[float, float]]] = {}
+    for box in root.boxes():
+        for piece in box.after:
+            ends = (box.position + piece.low_offset, piece.high.position + piece.high_offset)
+            by_rank.setdefault(box.rank, []).append(ends)
+    length = sum(abs(begin - end) for lines in by_rank.values() for begin, end in lines)
+    return sum(map(_inversions, by_rank.values())), round(length, 3)
+
+
+def _inversions(lines: Iterable[tuple[float, float]]) -> int:
+    count = 0
+    seen: list[float] = []
+    for _, end in sorted(lines):
+        count += len(seen) - bisect_right(seen, end)
+        insort(seen, end)
+    return count

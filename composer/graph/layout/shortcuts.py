@@ -1,0 +1,86 @@
+"""Bends that a line does not need: where nothing is in the way, it goes straight on."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from composer.graph.layout.boxes import Box
+from composer.graph.layout.columns import Extent
+
+#: A line that takes a short cut keeps so far from everything, in pixels.
+_DISTANCE = 7.0
+_HALVINGS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """A stretch of a line, parallel to the ranks' direction, on a rank."""
+
+    begin: float
+    end: float
+    across: float
+    rank: int
+    needed: bool
+
+
+class Obstacles:
+    """What stands on each rank: everything but the bends of lines."""
+
+    def __init__(self, boxes: Iterable[Box], ranks: list[Extent]) -> None:
+        self._ranks = ranks
+        self._solid: list[list[tuple[float, float]]] = [[] for _ in ranks]
+        for box in boxes:
+            if box.across > 0.0:
+                self._solid[box.rank].append((box.low - _DISTANCE, box.high + _DISTANCE))
+        for solid in self._solid:
+            solid.sort()
+
+    def shortened(self, stations: list[Station]) -> list[Station]:
+        """Return the stations without those that the line can leave out."""
+        kept = [stations[0]]
+        index = 0
+        while index < len(stations) - 1:
+            index = self._furthest(stations, index)
+            kept.append(stations[index])
+        return kept
+
+    def _furthest(self, stations: list[Station], index: int) -> int:
+        """Return the furthest station that can be reached directly from the one at ``index``."""
+        reached = index + 1
+        while not stations[reached].needed and self._is_free(stations, index, reached + 1):
+            reached += 1
+        return reached
+
+    def _is_free(self, stations: list[Station], first: int, last: int) -> bool:
+        begin, end = stations[first], stations[last]
+        return all(self._passes(begin, end, station.rank) for station in stations[first + 1 : last])
+
+    def _passes(self, begin: Station, end: Station, rank: int) -> bool:
+        extent = self._ranks[rank]
+        at = sorted(_across(begin, end, along) for along in (extent.begin, extent.end))
+        solid = self._solid[rank]
+        # Solid stretches do not overlap by more than their distance: the neighbours are enough.
+        place = bisect_left(solid, (at[1], at[1]))
+        return all(high <= at[0] or low >= at[1] for low, high in solid[max(place - 2, 0) : place])
+
+
+def _across(begin: Station, end: Station, along: float) -> float:
+    """Return where the curve between two stations is, across, at a point along it.
+
+    It is the cubic that ``routes`` draws: its control points lie halfway along.
+    """
+    span = end.begin - begin.end
+    if span <= 0.0:
+        return end.across
+    wanted = min(max((along - begin.end) / span, 0.0), 1.0)
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        if 1.5 * middle * (1 - middle) + middle**3 < wanted:
+            low = middle
+        else:
+            high = middle
+    share = 3 * low**2 - 2 * low**3
+    return begin.across + (end.across - begin.across) * share

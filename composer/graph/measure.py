@@ -1,0 +1,82 @@
+"""How big everything in a picture is: what its texts need."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.graph.layout import Size, Sizes
+from composer.graph.picture import Cluster, Edge, Graph, Kind, Vertex
+from composer.graph.text_size import text_width
+
+FONT_SIZE = 12.0
+SMALL = 10.0
+LINE_HEIGHT = 15.0
+EDGE_LINE_HEIGHT = SMALL + 3.0
+ROW_HEIGHT = 20.0
+#: The head of a block, with its name.
+HEAD_HEIGHT = 24.0
+ROW_INDENT = 10.0
+HEXAGON_SLANT = 12.0
+_PADDING = Size(14.0, 8.0)
+_ROW_GAP = 16.0
+
+
+def sizes(graph: Graph) -> Sizes:
+    """Return how much room the texts of a graph need."""
+    blocks = dict(_blocks(graph))
+    return Sizes(
+        vertices={
+            vertex.key: _row_size(vertex) if vertex.cluster in blocks else _vertex_size(vertex)
+            for vertex in graph.vertices
+        },
+        labels={edge.key: label_size(edge) for edge in graph.edges if edge.lines},
+        frames={
+            cluster.key: Size(text_width(cluster.label, SMALL), LINE_HEIGHT)
+            for cluster in graph.clusters
+        },
+        blocks={key: _block_size(cluster, ports) for key, (cluster, ports) in blocks.items()},
+        rows={
+            port.key: HEAD_HEIGHT / 2 + (index - (len(ports) - 1) / 2) * ROW_HEIGHT
+            for _, ports in blocks.values()
+            for index, port in enumerate(ports)
+        },
+    )
+
+
+def label_size(edge: Edge) -> Size:
+    """Return the size of an edge's label."""
+    width = max(text_width(line, SMALL) for line in edge.lines)
+    return Size(round(width + 8.0), len(edge.lines) * EDGE_LINE_HEIGHT + 4.0)
+
+
+def _blocks(graph: Graph) -> Iterator[tuple[str, tuple[Cluster, list[Vertex]]]]:
+    ports: dict[str, list[Vertex]] = {}
+    for vertex in graph.vertices:
+        ports.setdefault(vertex.cluster, []).append(vertex)
+    for cluster in graph.clusters:
+        if cluster.block and cluster.key in ports:
+            yield cluster.key, (cluster, ports[cluster.key])
+
+
+def _vertex_size(vertex: Vertex) -> Size:
+    first, *others = vertex.lines
+    width = max([text_width(first, FONT_SIZE), *(text_width(line, SMALL) for line in others)])
+    slant = HEXAGON_SLANT if vertex.kind in (Kind.SERVICE, Kind.TOPIC) else 0.0
+    return Size(
+        round(width + 2 * (_PADDING.width + slant / 2)),
+        len(vertex.lines) * LINE_HEIGHT + 2 * _PADDING.height,
+    )
+
+
+def _row_size(vertex: Vertex) -> Size:
+    first, *others = vertex.lines
+    width = text_width(first, FONT_SIZE) + sum(
+        _ROW_GAP + text_width(line, SMALL) for line in others
+    )
+    return Size(round(width + 2 * ROW_INDENT), ROW_HEIGHT)
+
+
+def _block_size(cluster: Cluster, ports: list[Vertex]) -> Size:
+    head = text_width(cluster.label, FONT_SIZE) + 2 * _PADDING.width
+    widest = max(_row_size(port).width for port in ports)
+    return Size(round(max(head, widest)), HEAD_HEIGHT + len(ports) * ROW_HEIGHT)

@@ -1,0 +1,43 @@
+"""A picture as PNG: drawn from ours by resvg where that is installed, else by Graphviz."""
+
+from __future__ import annotations
+
+import math
+from importlib.util import find_spec
+
+from composer.graph import dot, graphviz, svg
+from composer.graph.layout import Layout
+from composer.graph.picture import Graph
+
+#: Two pixels for one of the layout's, for screens of today; fewer where that would be too many.
+_ZOOM = 2.0
+_MOST_PIXELS = 40_000_000
+
+
+class PngMissing(Exception):
+    """Nothing that can make a PNG is installed."""
+
+
+def render(graph: Graph, layout: Layout) -> bytes:
+    """Return the picture as PNG. Raises PngMissing."""
+    if find_spec("resvg_py") is not None:
+        return _by_resvg(graph, layout)
+    try:
+        return graphviz.run_dot(dot.render(graph), "png")
+    except graphviz.GraphvizFailed as error:
+        raise PngMissing(
+            'a PNG needs Graphviz (apt install graphviz) or pip install "ros2-composer[png]";'
+            " -f svg and -f html need neither"
+        ) from error
+
+
+def _by_resvg(graph: Graph, layout: Layout) -> bytes:
+    import resvg_py  # noqa: PLC0415 - an extra
+
+    pixels = layout.size.width * layout.size.height
+    zoom = min(_ZOOM, math.sqrt(_MOST_PIXELS / max(pixels, 1.0)))
+    width, _ = svg.page_size(graph, layout)
+    drawn = resvg_py.svg_to_bytes(
+        svg_string=svg.render(graph, layout), width=max(1, round(width * zoom))
+    )
+    return bytes(drawn)
