@@ -72,6 +72,9 @@ def timers(*, long: bool) -> list[Row]:
                 case = f"timer {rate_hz:g} Hz p{share * 100:g}, N={nodes}"
                 figure = _jitter_us(rate_hz, share)
                 found += rows(case, "jitter us", turns, figure)
+            found += rows(
+                f"timer {rate_hz:g} Hz, N={nodes}", "% left out", turns, _left_out(rate_hz)
+            )
     return found
 
 
@@ -93,10 +96,18 @@ def _cpu_us_per_message(result: Mapping[str, Any]) -> float | None:
 def _jitter_us(rate_hz: float, share: float) -> Callable[[Mapping[str, Any]], float | None]:
     def figure(result: Mapping[str, Any]) -> float | None:
         ticks = result["ticks_ns"]
-        expected = 0.9 * result["wall_s"] * rate_hz
-        if len(ticks) < expected:  # a timer that leaves calls out is not a steady one
-            return None
         gaps_ns = [after - before for before, after in pairwise(ticks)]
+        if not gaps_ns:
+            return None
         return percentile([abs(gap - 1e9 / rate_hz) / 1000.0 for gap in gaps_ns], share)
+
+    return figure
+
+
+def _left_out(rate_hz: float) -> Callable[[Mapping[str, Any]], float | None]:
+    """Return what tells the calls that never came: jitter alone would not show them."""
+
+    def figure(result: Mapping[str, Any]) -> float | None:
+        return 100.0 * max(0.0, 1.0 - len(result["ticks_ns"]) / (result["wall_s"] * rate_hz))
 
     return figure

@@ -18,7 +18,6 @@ from benchmarks.programs.work import (
     Task,
     hand_over,
     measure,
-    memory_mb,
     task_from_arguments,
     topic,
 )
@@ -50,7 +49,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "ring.yaml")
         path.write_text(yaml.safe_dump(system_tree(task), sort_keys=False), encoding="utf-8")
-        memory_before_mb, started_s = memory_mb(), time.perf_counter()
+        started_s = time.perf_counter()
         loading = load(path)
         if loading.system is None or not loading.runnable:
             sys.exit("; ".join(str(finding) for finding in loading.diagnostics))
@@ -59,7 +58,7 @@ def main() -> None:
         threading.Thread(target=host.run, daemon=True).start()
         if not up.wait(120.0):
             sys.exit("the system did not come up")
-        figures = measure(task, started_s, memory_before_mb)
+        figures = measure(task, started_s)
     hand_over(figures)
 
 

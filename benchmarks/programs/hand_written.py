@@ -17,7 +17,6 @@ from benchmarks.programs.work import (
     Task,
     hand_over,
     measure,
-    memory_mb,
     needs_kick,
     task_from_arguments,
     topic,
@@ -71,7 +70,7 @@ class Relay(LifecycleNode):
 def main() -> None:
     """Bring the system up, measure, tell."""
     task = task_from_arguments()
-    memory_before_mb, started_s = memory_mb(), time.perf_counter()
+    started_s = time.perf_counter()
     rclpy.init()
     nodes = [Relay(task, index) for index in range(task.nodes)]
     for node in nodes:
@@ -83,7 +82,7 @@ def main() -> None:
         executor.add_node(node)
     threading.Thread(target=executor.spin, daemon=True).start()
     # From here and not by a timer: EventsExecutor's did not always run, which is its own matter.
-    hand_over(measure(task, started_s, memory_before_mb, nodes[0].kick))
+    hand_over(measure(task, started_s, nodes[0].kick))
 
 
 if __name__ == "__main__":
