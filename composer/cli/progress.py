@@ -10,8 +10,11 @@ from composer.runtime.events import (
     Event,
     Fault,
     Logged,
+    NodeFailed,
     NodeSummary,
     Outcome,
+    Restarted,
+    RolledBack,
     RollingBack,
     StateChanged,
     Stopping,
@@ -44,7 +47,7 @@ class Progress:
 
 def _severity(event: Event) -> str:
     match event:
-        case TransitionRefused() | RollingBack() | Stuck():
+        case TransitionRefused() | RollingBack() | Stuck() | NodeFailed():
             return "ERROR"
         case _:
             return "INFO"
@@ -52,11 +55,11 @@ def _severity(event: Event) -> str:
 
 def _code(event: Event) -> str:
     match event:
-        case TransitionRefused() | RollingBack() | Stuck():
+        case TransitionRefused() | RollingBack() | Stuck() | NodeFailed():
             return _RED
-        case BroughtUp():
+        case BroughtUp() | Restarted():
             return _GREEN
-        case Stopping():
+        case Stopping() | RolledBack():
             return _YELLOW
         case StateChanged():
             return _DIM

@@ -8,7 +8,7 @@ after a while is wanted up again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -21,7 +21,8 @@ from composer.plan.steps import Plan, rank
 class FaultKind(StrEnum):
     """How it was found that a node has failed."""
 
-    TRANSITION = "transition"  # one did not lead where it should
+    TRANSITION = "transition"  # one that was asked for from outside ended in an error
+    STEP = "step"  # one of a plan did not lead where it should
     SILENCE = "silence"
     CALLBACK = "callback"  # one took too long, and was interrupted
     ERRORS = "errors"  # too many
@@ -116,13 +117,9 @@ def wanted(system: System, upkeep: Upkeep) -> Mapping[str, PrimaryState]:
 
 def held_back(system: System, upkeep: Upkeep) -> Mapping[str, str]:
     """Return the nodes that cannot be active, each with the failed one it needs in the end."""
-    edges = dependency_edges(system)
-    needs: dict[str, list[Edge]] = {}
-    for edge in edges:
-        needs.setdefault(edge.node, []).append(edge)
     held: dict[str, str] = {}
-    for name in in_dependency_order(system, edges):
-        for edge in needs.get(name, ()):
+    for name, needs in _needs(system):
+        for edge in needs:
             if name in upkeep.down or name in held:
                 break
             if edge.on in upkeep.down:
@@ -141,4 +138,30 @@ def mend(system: System, upkeep: Upkeep, states: Mapping[str, PrimaryState], why
     causes = {node.name.value: why for node in system.nodes}
     causes |= {name: f"it needs {failed}, which is down" for name, failed in held.items()}
     causes |= upkeep.down
-    return reach(system, states, wanted(system, upkeep), causes)
+    return reach(system, states, _reachable(system, states, wanted(system, upkeep)), causes)
+
+
+def _reachable(
+    system: System, states: Mapping[str, PrimaryState], goals: Mapping[str, PrimaryState]
+) -> Mapping[str, PrimaryState]:
+    """Return the goals, without those that would take a node up before what it needs.
+
+    What somebody keeps low by hand takes nobody down, but nobody is sent after it either.
+    """
+    reachable = dict(goals)
+    for name, needs in _needs(system):
+        if name not in states or reachable.get(name) is not PrimaryState.ACTIVE:
+            continue
+        if any(rank(reachable.get(edge.on, edge.state)) < rank(edge.state) for edge in needs):
+            reachable[name] = max(states[name], PrimaryState.INACTIVE, key=rank)
+    return reachable
+
+
+def _needs(system: System) -> Iterator[tuple[str, tuple[Edge, ...]]]:
+    """Yield every node, behind those it depends on, with what it depends on."""
+    edges = dependency_edges(system)
+    needs: dict[str, list[Edge]] = {}
+    for edge in edges:
+        needs.setdefault(edge.node, []).append(edge)
+    for name in in_dependency_order(system, edges):
+        yield name, tuple(needs.get(name, ()))

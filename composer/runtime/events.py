@@ -52,6 +52,53 @@ class RollingBack:
 
 
 @dataclass(frozen=True, slots=True)
+class RolledBack:
+    """What a bring-up that failed had started is where it was before, in the order of that."""
+
+    elapsed_s: float
+    nodes: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"rolled back: {', '.join(self.nodes) or 'nothing, there was nothing to undo'}"
+
+
+@dataclass(frozen=True, slots=True)
+class NodeFailed:
+    """A node of a system that is up has failed; ``consequence`` is what is done about it."""
+
+    elapsed_s: float
+    node: str
+    reason: str
+    consequence: str
+
+    def __str__(self) -> str:
+        return f"{self.node} failed: {self.reason}; {self.consequence}"
+
+
+@dataclass(frozen=True, slots=True)
+class Restarted:
+    """A node that had failed is up again, and so are those that depend on it."""
+
+    elapsed_s: float
+    node: str
+    attempt: int
+
+    def __str__(self) -> str:
+        return f"{self.node} is up again, restart {self.attempt}"
+
+
+@dataclass(frozen=True, slots=True)
+class Commanded:
+    """Somebody outside wants something of the whole system."""
+
+    elapsed_s: float
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.what}, asked for from outside"
+
+
+@dataclass(frozen=True, slots=True)
 class BroughtUp:
     """Every step of the bring-up is done."""
 
@@ -115,7 +162,8 @@ class Logged:
 
 
 Event: TypeAlias = (
-    "Logged | StateChanged | TransitionRefused | RollingBack | BroughtUp | Fault | Stopping | Stuck"
+    "Logged | StateChanged | TransitionRefused | RollingBack | RolledBack | BroughtUp | NodeFailed"
+    " | Restarted | Commanded | Fault | Stopping | Stuck"
 )
 Report: TypeAlias = Callable[[Event], None]
 

@@ -31,33 +31,24 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
-from composer.behavior import CallCancelled
-from composer.model import Executor, ExecutorKind, LogLevel, Node, System
-from composer.plan import Plan, Step
+from composer.model import LogLevel, PrimaryState, System
+from composer.model.dependencies import dependency_edges, in_dependency_order
+from composer.plan import Fault, FaultKind, Plan
+from composer.runtime import events
+from composer.runtime.board import Board
+from composer.runtime.claim import claimed, refusal
+from composer.runtime.commands import Commands
+from composer.runtime.crew import FINALIZED, CreationFailed, Crew
 from composer.runtime.environment import StartRefused, prepare_environment
-from composer.runtime.events import (
-    BroughtUp,
-    Event,
-    Fault,
-    Logged,
-    NodeSummary,
-    Outcome,
-    Report,
-    RollingBack,
-    StateChanged,
-    Stopping,
-    Stuck,
-    TransitionRefused,
-)
-from composer.runtime.executors import log_exception, make_loop
-from composer.runtime.lifecycle import Result
+from composer.runtime.events import NodeSummary, Outcome, Report
+from composer.runtime.inbox import Inbox
 from composer.runtime.log import describe
-from composer.runtime.loop import Loop
-from composer.runtime.node import Listener, NodeOptions, RunningNode
-from composer.runtime.parameters import ParameterError
+from composer.runtime.manager import Command, Manager, Office, manager_namespace
+from composer.runtime.node import Listener, RunningNode
+from composer.runtime.reporter import Reporter
 from composer.runtime.signals import stop_signals
-from composer.runtime.stop_request import StopRequest
-from composer.source import Located
+from composer.runtime.supervisor import Moved, Supervisor
+from composer.runtime.watch import Hanging, Returned, Watch
 
 #: Where a transition ends when all goes well.
 _GOALS = {
@@ -65,27 +56,28 @@ _GOALS = {
     "activate": "active",
     "deactivate": "inactive",
     "cleanup": "unconfigured",
-    "shutdown": "finalized",
+    "shutdown": FINALIZED,
 }
+_DOWN = (PrimaryState.UNCONFIGURED.value, FINALIZED)
 #: The most that one step of the tear-down may take of the time for all of it.
 _STEP_SHARE = 0.6
 _HURRY_S = 0.2
-#: A transition ends itself in time; only a callback that does not return outlasts it by this.
-_STUCK_AFTER_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class HostOptions:
     """How a system is run.
 
-    ``run_for_s`` ends it by itself; ``stop_within_s`` is the time for the whole tear-down. If the
-    process still stands ``grace_s`` after the request to stop, ``hard_exit`` is called, on a
-    thread of its own: it is to end the process.
+    ``run_for_s`` ends it by itself; ``bring_up_within_s`` is the time for the whole bring-up;
+    ``transition_timeout_s`` goes before what the system says; ``stop_within_s`` is the time for the
+    whole tear-down. If the process still stands ``grace_s`` after the request to stop,
+    ``hard_exit`` is called, on a thread of its own: it is to end the process.
     """
 
     run_for_s: float | None = None
     log_level: LogLevel = LogLevel.INFO
-    transition_timeout_s: float = 10.0
+    bring_up_within_s: float = math.inf
+    transition_timeout_s: float | None = None
     stop_within_s: float = 2.0
     grace_s: float = 10.0
     hard_exit: Callable[[], None] | None = None
@@ -105,122 +97,159 @@ class Host:
         self._system = system
         self._up = up
         self._down = down
-        self._plan_down: tuple[Step, ...] = ()  # nothing to do before the loops run
         self._options = options or HostOptions()
-        self._listener = report
-        self._report_lock = threading.Lock()
-        self._started_at_s = time.monotonic()
-        self._loops: dict[str, Loop] = {}
-        self._nodes: dict[str, RunningNode] = {}
-        self._stop = StopRequest()
+        self._inbox: Inbox[object] = Inbox()
+        self._reporter = Reporter(report)
+        order = in_dependency_order(system, dependency_edges(system))
+        self._board = Board(system, order)
+        self._crew = Crew(
+            system,
+            self._listener,
+            log_level=self._options.log_level,
+            transition_timeout_s=self._options.transition_timeout_s,
+        )
+        self._supervisor = Supervisor(system, self._crew, self._inbox, self._board, self._reporter)
+        self._commands = Commands(system, self._crew, self._supervisor, self._board)
         self._failed = False
+        self._is_created = False
         self._summary: tuple[NodeSummary, ...] = ()
+        self._farewells: list[Command] = []
         self._end_s = math.inf  # when the tear-down has to be through
         self._remains = False  # something that only the end of the process removes
-        self._hung: set[str] = set()  # the loops with a callback that does not return
 
     def stop(self, reason: str) -> None:
         """Ask for the end, from any thread or a signal handler. Asking again hurries."""
-        self._stop.ask(reason)
+        self._inbox.ask(reason)
 
     def run(self) -> Outcome:
         """Bring the system up, keep it up until it is to stop, tear it down.
 
-        Raises StartRefused when the environment does not allow a start.
+        Raises StartRefused when the environment does not allow a start, or the system runs already.
         """
         prepare_environment()
-        self._started_at_s = time.monotonic()
-        with stop_signals(self.stop):
+        namespace = manager_namespace(self._system.namespace, self._system.name.value)
+        with claimed(namespace), stop_signals(self.stop):
             _start_ros()
             try:
-                if self._create() and self._bring_up():
-                    self._stop.wait(self._options.run_for_s)
-                with self._hard_exit():
-                    self._tear_down()
-                    self._close()
-            except BaseException:
-                self._close()
-                raise
+                self._run(namespace)
+            finally:
+                try_shutdown()
         return self._outcome()
+
+    def _run(self, namespace: str) -> None:
+        office = Office(
+            self._obey, self._measure, lambda host, pid: self._yield_to(namespace, host, pid)
+        )
+        manager = Manager(namespace, self._board, office)
+        try:
+            if self._create():
+                self._live()
+        finally:
+            with self._hard_exit():
+                self._tear_down()
+                self._close(manager)
 
     # --- up
 
     def _create(self) -> bool:
-        executors = {executor.name.value: executor for executor in self._system.executors}
-        for node in self._system.nodes:
-            executor = _executor_of(node, executors)
-            try:
-                self._nodes[node.name.value] = self._create_node(node, executor)
-            except ParameterError as error:
-                self._roll_back(node.full_name, str(error))
-                return False
-            except Exception as error:
-                self._roll_back(node.full_name, f"it cannot be created: {describe(error)}")
-                return False
-        for loop in self._loops.values():
-            loop.start()
-        self._plan_down = self._down.steps
+        try:
+            self._crew.create()
+        except CreationFailed as error:
+            at_s = self._reporter.elapsed_s
+            self._reporter.tell(events.RollingBack(at_s, error.node, str(error)))
+            self._fail(f"{error.node} failed")
+            return False
+        self._is_created = True
         return True
 
-    def _create_node(self, node: Node, executor: Executor) -> RunningNode:
-        if executor.name.value not in self._loops:
-            self._loops[executor.name.value] = make_loop(executor, _take_exception)
-        name = node.full_name
-        return RunningNode(
-            node,
-            self._loops[executor.name.value],
-            NodeOptions(
-                parallel=executor.kind is ExecutorKind.MULTI_THREADED,
-                log_level=self._options.log_level,
-                transition_timeout_s=self._options.transition_timeout_s,
-            ),
-            Listener(
-                on_rest=lambda transition, state: self._take_rest(name, transition, state),
-                on_fault=lambda callback, text: self._take_fault(name, callback, text),
-                write_log=self._write_log,
-            ),
-        )
+    def _live(self) -> None:
+        watch = Watch(self._crew, self._inbox.put)
+        watch.start()
+        try:
+            if self._bring_up():
+                self._keep_up()
+        finally:
+            watch.stop()
 
     def _bring_up(self) -> bool:
-        limit_s = self._options.transition_timeout_s + _STUCK_AFTER_S
-        for step in self._up.steps:
-            if self._stop.reason is not None:
-                return False
-            result = self._make(step, limit_s, stoppable=True)
-            if self._stop.reason is not None:
-                return False
-            if result is None or not result.success:
-                node = self._nodes[step.node]
-                reason = "it is stuck" if result is None else result.reason
-                self._roll_back(node.full_name, f"it did not {step.transition}: {reason}")
-                return False
-        active = sum(node.state == "active" for node in self._nodes.values())
-        self._report(BroughtUp(self._elapsed_s(), active, len(self._nodes)))
+        failed = self._supervisor.bring_up(self._up, self._options.bring_up_within_s)
+        if failed is not None:
+            self._fail(f"{failed.partition(':')[0]} failed")
+        if self._inbox.closing:
+            return False
+        self._supervisor.want(self._crew.states())
+        self._board.set_activity("running")
+        self._reporter.tell(
+            events.BroughtUp(self._reporter.elapsed_s, self._crew.active(), len(self._crew.nodes))
+        )
         return True
 
-    def _roll_back(self, node: str, reason: str) -> None:
+    def _fail(self, reason: str) -> None:
         self._failed = True
-        self._report(RollingBack(self._elapsed_s(), node, reason))
-        self._stop.ask(f"{node} failed")
+        self._inbox.ask(reason)
+
+    # --- up and running
+
+    def _keep_up(self) -> None:
+        """Deal with what happens until the end is asked for, or the time is over."""
+        run_for_s = self._options.run_for_s
+        end_s = None if run_for_s is None else time.monotonic() + run_for_s
+        while not self._inbox.closing:
+            now_s = time.monotonic()
+            due_s = self._supervisor.next_restart_s()
+            if end_s is not None and now_s >= end_s:
+                self._inbox.ask(f"{run_for_s:g} s are over")
+            elif due_s is not None and now_s >= due_s:
+                self._supervisor.restart_due()
+            else:
+                times = [at_s for at_s in (end_s, due_s) if at_s is not None]
+                self._deal_with(self._inbox.take(min(times, default=None)))
+
+    def _deal_with(self, item: object) -> None:
+        match item:
+            case Fault():
+                self._supervisor.take_fault(item)
+            case Moved():
+                self._supervisor.take_move(item)
+            case Hanging():
+                self._supervisor.take_hanging(item)
+            case Returned():
+                self._supervisor.take_return(item)
+            case Command():
+                self._reporter.tell(events.Commanded(self._reporter.elapsed_s, item.what))
+                item.answer(*self._commands.carry_out(item.what))
+
+    def _obey(self, command: Command) -> None:
+        """Take a command, on the manager's thread."""
+        if command.what == "shutdown":
+            self._farewells.append(command)
+            self.stop("shutdown, asked for from outside")
+        else:
+            self._inbox.put(command)
+
+    def _measure(self) -> None:
+        nodes = self._crew.nodes.items()
+        self._board.measure({name: node.statistics for name, node in nodes})
+
+    def _yield_to(self, namespace: str, host: str, pid: str) -> None:
+        if not self._inbox.closing:
+            self._fail(str(refusal(namespace, host, pid)))
 
     # --- down
 
     def _tear_down(self) -> None:
-        if self._stop.reason is None:
-            self._stop.ask(f"{self._options.run_for_s:g} s are over")
-        self._report(Stopping(self._elapsed_s(), self._reason))
-        self._end_s = time.monotonic() + self._options.stop_within_s
-        for step in self._plan_down:
-            node = self._nodes[step.node]
-            if node.loop.name in self._hung or step.transition not in node.legal:
-                continue
-            left_s = self._end_s - time.monotonic()
-            if left_s <= 0.0:
-                break
-            self._make(
-                step, min(_STEP_SHARE * self._options.stop_within_s, left_s), stoppable=False
-            )
-        self._summary = tuple(_summary(node) for node in self._nodes.values())
+        if not self._inbox.closing:
+            self._inbox.ask("it cannot go on")
+        self._failed = self._failed or self._supervisor.has_failed_nodes
+        self._board.set_activity("stopping")
+        self._reporter.tell(events.Stopping(self._reporter.elapsed_s, self._reason))
+        stop_within_s = self._options.stop_within_s
+        self._end_s = time.monotonic() + stop_within_s
+        if self._is_created:
+            share_s = _STEP_SHARE * stop_within_s
+            if not self._supervisor.tear_down(self._down, self._end_s, share_s):
+                self._failed = True
+        self._summary = tuple(_summary(node) for node in self._crew.nodes.values())
 
     @contextmanager
     def _hard_exit(self) -> Iterator[None]:
@@ -233,90 +262,64 @@ class Host:
         finally:
             watchdog.cancel()
 
-    def _close(self) -> None:
-        for name, loop in self._loops.items():
-            if not loop.stop(_HURRY_S):
-                self._hung.add(name)
+    def _close(self, manager: Manager) -> None:
+        for item in (*self._farewells, *self._inbox.rest()):
+            if isinstance(item, Command):
+                item.answer(item.what == "shutdown", f"the system has stopped: {self._reason}")
+        self._board.set_activity("stopped")
         end_s = self._end_s
-        if self._stop.hurry:
+        if self._inbox.hurry:
             end_s = min(end_s, time.monotonic() + _HURRY_S)
-        # Fast DDS takes longer for each endpoint the more there are: seconds for 100 nodes. What
-        # there is no time for is missed by others when its lease ends.
-        for node in reversed(self._nodes.values()):
-            if node.loop.name in self._hung or time.monotonic() > end_s:
-                self._remains = True
-            else:
-                node.destroy()
-        try_shutdown()
+        self._remains = not self._crew.close(end_s)
+        self._failed = self._failed or bool(self._crew.hung)
+        manager.close()
 
     def _outcome(self) -> Outcome:
         return Outcome(
-            exit_code=1 if self._failed or self._hung else 0,
+            exit_code=1 if self._failed else 0,
             reason=self._reason,
-            elapsed_s=self._elapsed_s(),
+            elapsed_s=self._reporter.elapsed_s,
             nodes=self._summary,
             hung=self._remains,
         )
 
     @property
     def _reason(self) -> str:
-        return self._stop.reason or ""
+        return self._inbox.reason or ""
 
-    # --- both ways
+    # --- what nodes tell, on the threads of their loops
 
-    def _make(self, step: Step, limit_s: float, *, stoppable: bool) -> Result | None:
-        """Make one step; None when it did not end in time or was given up."""
-        node = self._nodes[step.node]
-        future = node.loop.run_task(node.change(step.transition))
-        if not self._stop.wait_for(future, limit_s, stoppable=stoppable):
-            if not (stoppable and self._stop.reason is not None):
-                self._take_stuck(node, step.transition)
-            return None
-        if future.cancelled():
-            return None  # the executor stops
-        result = future.result()
-        if not result.success:
-            self._failed = True
-            self._report(
-                TransitionRefused(
-                    self._elapsed_s(),
-                    node.full_name,
-                    step.transition,
-                    result.state,
-                    result.reason,
-                )
-            )
-        return result
+    def _listener(self, name: str) -> Listener:
+        return Listener(
+            on_rest=lambda transition, state, cause: self._take_rest(
+                name, transition, state, cause
+            ),
+            on_fault=lambda callback, text: self._take_fault(name, callback, text),
+            write_log=self._write_log,
+        )
 
-    def _take_stuck(self, node: RunningNode, transition: str) -> None:
-        self._failed = True
-        stack = node.loop.where()
-        if stack:
-            self._hung.add(node.loop.name)
-        self._report(Stuck(self._elapsed_s(), node.full_name, transition, stack))
+    def _take_rest(
+        self, name: str, transition: str, state: str, cause: BaseException | None
+    ) -> None:
+        at_s = self._reporter.elapsed_s
+        self._board.set_state(name, state)
+        full_name = self._crew.nodes[name].full_name
+        self._reporter.tell(events.StateChanged(at_s, full_name, transition, state))
+        if name in self._supervisor.moving:
+            return
+        if state == _GOALS[transition]:
+            self._inbox.put(Moved(name, state))
+        elif state in _DOWN:
+            text = f"{transition} ended in an error: {describe(cause)}" if cause else transition
+            self._inbox.put(Fault(name, FaultKind.TRANSITION, text, time.monotonic()))
 
-    def _take_rest(self, node: str, transition: str, state: str) -> None:
-        if state != _GOALS[transition] and state in ("unconfigured", "finalized"):
-            self._failed = True  # it went through error processing
-        self._report(StateChanged(self._elapsed_s(), node, transition, state))
-
-    def _take_fault(self, node: str, callback: str, text: str) -> None:
-        self._report(Fault(self._elapsed_s(), node, callback, text))
+    def _take_fault(self, name: str, callback: str, text: str) -> None:
+        self._board.set_error(name, f"{callback}: {text}")
+        full_name = self._crew.nodes[name].full_name
+        self._reporter.tell(events.Fault(self._reporter.elapsed_s, full_name, callback, text))
 
     def _write_log(self, level: LogLevel, logger: str, message: str) -> None:
-        self._report(Logged(self._elapsed_s(), logger, level, message))
-
-    def _report(self, event: Event) -> None:
-        with self._report_lock:
-            if self._listener is None:
-                return
-            try:
-                self._listener(event)
-            except Exception:  # nobody reads any more; the system is more than its spectators
-                self._listener = None
-
-    def _elapsed_s(self) -> float:
-        return time.monotonic() - self._started_at_s
+        self._reporter.tell(events.Logged(self._reporter.elapsed_s, logger, level, message))
 
 
 def _start_ros() -> None:
@@ -324,21 +327,6 @@ def _start_ros() -> None:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     except rclpy_implementation.RCLError as error:
         raise StartRefused(f"ROS does not start: {error}", "see the lines above") from error
-
-
-def _executor_of(node: Node, executors: dict[str, Executor]) -> Executor:
-    """Return the executor the node runs on; without one it is ``default``, an event loop."""
-    if node.executor is not None:
-        return executors[node.executor.value]
-    return executors.get("default") or Executor(
-        Located("default", node.span), ExecutorKind.EVENTS, node.span
-    )
-
-
-def _take_exception(what: str, error: BaseException) -> None:
-    """Log what leaves a callback; that a call ended with its node is nothing to tell."""
-    if not isinstance(error, CallCancelled):
-        log_exception(what, error)
 
 
 def _summary(node: RunningNode) -> NodeSummary:

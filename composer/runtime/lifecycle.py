@@ -51,8 +51,11 @@ class Hooks(Protocol):
     async def on_error(self, cause: BaseException) -> None:
         """Clean up after a transition that raised ``cause``. Raising finalizes the node."""
 
-    def on_rest(self, state: str, transition: str) -> None:
-        """Take note that the node has come to rest in the primary state ``state``."""
+    def on_rest(self, state: str, transition: str, cause: BaseException | None) -> None:
+        """Take note that the node has come to rest in the primary state ``state``.
+
+        ``cause`` is what went wrong on the way, if anything did.
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +169,7 @@ class Lifecycle:
         else:
             self._machine.trigger_transition_by_label(_SUCCESS, True)
         state = self.state
-        self._hooks.on_rest(state, transition)
+        self._hooks.on_rest(state, transition, cause)
         if cause is None:
             return Result(success=True, state=state)
         return Result(success=False, state=state, reason=describe(cause))

@@ -54,11 +54,12 @@ class NodeOptions:
 class Listener:
     """Who is told what a node does.
 
-    ``on_rest(transition, state)``: a transition has ended; ``on_fault(callback, text)``: user code
-    failed; ``write_log(level, logger, message)``: a line for the log.
+    ``on_rest(transition, state, cause)``: a transition has ended, and ``cause`` is what went wrong
+    with it, if anything did; ``on_fault(callback, text)``: user code failed; ``write_log(level,
+    logger, message)``: a line for the log.
     """
 
-    on_rest: Callable[[str, str], None]
+    on_rest: Callable[[str, str, BaseException | None], None]
     on_fault: Callable[[str, str], None]
     write_log: Write
 
@@ -168,14 +169,14 @@ class RunningNode:
         self._core.gate.waiting = True
         await self._tell("error", cause)
 
-    def on_rest(self, state: str, transition: str) -> None:
+    def on_rest(self, state: str, transition: str, cause: BaseException | None) -> None:
         """Open or shut everything as ``state`` wants it."""
         _rest(self._core.gate, state, state == "active", self._assembly.gated)
         living = state in ("inactive", "active")
         _rest(self._standby.gate, state, living, self._assembly.always_on)
         if state in ("unconfigured", "finalized"):
             self._release()
-        self._listener.on_rest(transition, state)
+        self._listener.on_rest(transition, state, cause)
 
     # --- transitions
 

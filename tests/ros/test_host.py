@@ -234,6 +234,6 @@ def test_who_listens_badly_does_not_disturb(tmp_path: Path) -> None:
     def fail(_: object) -> None:
         raise BrokenPipeError
 
-    system.host._listener = fail
+    system.host._reporter._listener = fail
     assert system.stop().exit_code == 0
     assert not system.told(Fault)

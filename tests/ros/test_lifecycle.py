@@ -254,7 +254,7 @@ def test_cycles_leave_nothing_behind(tmp_path: Path, peer: Peer) -> None:
         timers: {tick: {period_ms: 1000, log: x}}
     """
     with running(text, tmp_path) as system:
-        node = system.host._nodes["cycled"]
+        node = system.host._crew.nodes["cycled"]
         ros = node._ros
 
         def entities() -> int:

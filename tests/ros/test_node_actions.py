@@ -285,7 +285,7 @@ def test_goals_are_canceled_when_the_node_that_sent_them_leaves_active(
     with running(CLIENT.replace("TARGET", "1.0"), tmp_path, handled=PATIENT) as system:
         system.wait_for_log("begin 1.0")
         assert peer.change("/client", "deactivate")
-        server = system.host._nodes["server"]._assembly.action_servers["navigate"]
+        server = system.host._crew.nodes["server"]._assembly.action_servers["navigate"]
         wait_until(lambda: not server._goals, "the goal has ended")
         assert peer.state("/server") == "active"
         assert system.summary("/client").errors == 0

@@ -115,7 +115,7 @@ def test_calls_and_sleeps_end_when_the_node_leaves_active(
         system.wait_for_log("resting")
         assert peer.change("/caller", "deactivate")
         assert peer.state("/caller") == "inactive"
-        core = system.host._nodes["caller"]._core
+        core = system.host._crew.nodes["caller"]._core
         wait_until(lambda: not core.tasks, "nothing runs any more")
         counted = system.summary("/caller")
     assert "cancelled: /caller is deactivating, not active" in system.log()

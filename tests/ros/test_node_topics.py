@@ -41,7 +41,7 @@ def test_nothing_gets_through_a_node_that_is_not_active(tmp_path: Path, peer: Pe
         assert peer.change("/relay", "deactivate")
         for number in range(5):
             source.publish(Int64(data=number))
-        wait_until(lambda: system.host._nodes["relay"].statistics.dropped == 5)
+        wait_until(lambda: system.host._crew.nodes["relay"].statistics.dropped == 5)
         assert peer.change("/relay", "activate")
         source.publish(Int64(data=6))
         wait_until(lambda: heard)
@@ -66,7 +66,7 @@ def test_what_is_latched_while_inactive_comes_with_the_activation(
         source = peer.publisher(String, "/mode", latched)
         source.publish(String(data="old"))
         source.publish(String(data="ready"))
-        port = system.host._nodes["listener"]._assembly.subscriptions["mode"]
+        port = system.host._crew.nodes["listener"]._assembly.subscriptions["mode"]
         wait_until(lambda: [message.data for message in port._latched or ()] == ["ready"])
         assert system.log() == []
         assert peer.change("/listener", "activate")
@@ -104,7 +104,7 @@ def test_a_node_has_a_first_and_a_last_word_but_none_when_it_is_not_active(
     with running(TALKATIVE, tmp_path, talkative=module) as system:
         assert peer.change("/talkative", "deactivate")
         heard = peer.listen(String, "/output")
-        publisher = system.host._nodes["talkative"]._assembly.publishers["output"]._publisher
+        publisher = system.host._crew.nodes["talkative"]._assembly.publishers["output"]._publisher
         wait_until(lambda: publisher.get_subscription_count() == 1)
         assert peer.change("/talkative", "activate")
         assert peer.change("/talkative", "deactivate")
@@ -205,7 +205,7 @@ def test_messages_wait_for_a_handler_that_awaits_and_the_oldest_makes_room(
         system.wait_for_log("begin 0")
         for number in range(1, 5):
             source.publish(Int64(data=number))
-            wait_until(lambda n=number: system.host._nodes["slow"].statistics.received == n + 1)
+            wait_until(lambda n=number: system.host._crew.nodes["slow"].statistics.received == n + 1)
         release.publish(Int64())
         system.wait_for_log("end 4")
         counted = system.summary("/slow")

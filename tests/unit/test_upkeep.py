@@ -96,6 +96,18 @@ def test_what_somebody_has_paused_by_hand_stays_paused() -> None:
     assert [step.node for step in up.steps] == ["sensor", "sensor", "planner"]
 
 
+def test_nobody_is_sent_up_before_what_somebody_keeps_low_by_hand() -> None:
+    system = robot()
+    upkeep = Upkeep(states("aiaaa"))
+    assert mend(system, upkeep, states("aiaaa"), "").steps == (), "nor is anybody taken down"
+    plan = mend(system, upkeep, states("aiuua"), "")
+    assert [f"{step.transition} {step.node}" for step in plan.steps] == [
+        "configure logger",
+        "configure motor",
+        "activate logger",
+    ]
+
+
 def test_a_second_fault_of_a_node_that_is_held_down_is_none() -> None:
     upkeep = Upkeep(states("aaaaa")).fail(fault("sensor"))
     assert judge(robot(), upkeep, fault("sensor")) is None

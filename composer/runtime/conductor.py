@@ -1,0 +1,197 @@
+"""Carries plans out, and decides nothing: it makes steps, waits, and tells what became of them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from composer.plan import Plan, Step
+from composer.runtime.crew import Crew
+from composer.runtime.inbox import Inbox
+from composer.runtime.interruption import running_callbacks
+from composer.runtime.lifecycle import Result
+from composer.runtime.tasks import Future
+
+#: A transition ends itself in time; only a callback that does not return outlasts it by this.
+_STUCK_AFTER_S = 1.0
+#: How long an interrupted callback may take to end.
+_INTERRUPTED_WITHIN_S = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class StepFailed:
+    """A step that did not get where it was to.
+
+    ``stuck`` is true when it had to be given up, or a callback in its way to be interrupted;
+    ``stack`` is where that was.
+    """
+
+    step: Step
+    reason: str
+    state: str
+    stuck: bool = False
+    stack: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How a plan is carried out.
+
+    When ``lenient``, every step that the states allow is made, whatever becomes of the others, and
+    they begin in the order of the plan; else the first failure ends it. When ``stoppable``, a
+    request to stop the system ends it. What is not through when ``time.monotonic()`` says ``end_s``
+    has failed; no step gets longer than ``share_s``.
+    """
+
+    lenient: bool = False
+    stoppable: bool = True
+    end_s: float = math.inf
+    share_s: float = math.inf
+
+
+@dataclass(slots=True)
+class _Running:
+    step: Step
+    future: Future[Result]
+    until_s: float
+
+
+@dataclass(slots=True)
+class _Phase:
+    """A phase that is being carried out."""
+
+    waiting: list[Step]
+    manner: Manner
+    running: list[_Running] = field(default_factory=list)
+    done: set[int] = field(default_factory=set)
+    failures: list[StepFailed] = field(default_factory=list)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing runs, and nothing more will be begun."""
+        return not self.running and (not self.waiting or self.given_up)
+
+    @property
+    def given_up(self) -> bool:
+        """Whether nothing more is to be begun."""
+        return bool(self.failures) and not self.manner.lenient
+
+    def take_ready(self) -> list[Step]:
+        """Take out the steps that wait for nothing more."""
+        if self.given_up:
+            return []
+        ready: list[Step] = []
+        left: list[Step] = []
+        for step in self.waiting:
+            in_turn = not (left and self.manner.lenient)
+            fit = in_turn and self.done.issuperset(step.after)
+            (ready if fit else left).append(step)
+        self.waiting = left
+        return ready
+
+
+class Conductor:
+    """Carries out plans, one at a time, on the main thread."""
+
+    def __init__(
+        self, crew: Crew, inbox: Inbox[object], tell_failed: Callable[[StepFailed], None]
+    ) -> None:
+        """``tell_failed`` is told of every step that failed, when it did."""
+        self._crew = crew
+        self._inbox = inbox
+        self._tell_failed = tell_failed
+        #: The nodes that are being moved now, by their keys.
+        self.moving: set[str] = set()
+
+    def carry_out(self, plan: Plan, manner: Manner | None = None) -> tuple[StepFailed, ...]:
+        """Make the steps of a plan; return those that failed, in the order of their ends."""
+        manner = manner or Manner()
+        failures: list[StepFailed] = []
+        for steps in plan.phases:
+            phase = _Phase(list(steps), manner)
+            self._carry_out(phase)
+            failures += phase.failures
+            if phase.given_up or self._is_called_off(manner):
+                break
+        return tuple(failures)
+
+    def _carry_out(self, phase: _Phase) -> None:
+        while not phase.is_over:
+            for step in phase.take_ready():
+                self._begin(step, phase)
+            if not phase.running:
+                continue
+            self._inbox.wait(
+                lambda: any(item.future.done() for item in phase.running),
+                min(item.until_s for item in phase.running),
+                stoppable=phase.manner.stoppable,
+            )
+            if self._is_called_off(phase.manner):
+                break
+            for item in tuple(phase.running):
+                if self._has_had_its_time(item):
+                    self._end(item, phase)
+        self.moving.clear()
+
+    def _is_called_off(self, manner: Manner) -> bool:
+        return self._inbox.closing and manner.stoppable
+
+    def _has_had_its_time(self, item: _Running) -> bool:
+        return item.future.done() or self._inbox.hurry or time.monotonic() >= item.until_s
+
+    def _begin(self, step: Step, phase: _Phase) -> None:
+        node = self._crew.nodes[step.node]
+        manner = phase.manner
+        now_s = time.monotonic()
+        if manner.lenient and (
+            self._crew.is_lost(step.node) or step.transition not in node.legal
+            or now_s >= manner.end_s
+        ):  # fmt: skip
+            phase.done.add(step.number)
+            return
+        limit_s = min(self._crew.timeout_s(step.node) + _STUCK_AFTER_S, manner.share_s)
+        self.moving.add(step.node)
+        future = node.loop.run_task(node.change(step.transition))
+        future.add_done_callback(lambda _: self._inbox.wake())
+        phase.running.append(_Running(step, future, min(now_s + limit_s, manner.end_s)))
+
+    def _end(self, item: _Running, phase: _Phase) -> None:
+        phase.running.remove(item)
+        phase.done.add(item.step.number)
+        self.moving.discard(item.step.node)
+        failure = self._failure(item)
+        if failure is not None:
+            phase.failures.append(failure)
+            self._tell_failed(failure)
+
+    def _failure(self, item: _Running) -> StepFailed | None:
+        """Return what went wrong with a step that is done or has had its time."""
+        node = self._crew.nodes[item.step.node]
+        stack = ""
+        if not item.future.done():
+            stack = node.loop.where()
+            if not self._crew.is_lost(item.step.node):
+                self._free(item)
+        if not item.future.done():
+            if stack:
+                self._crew.hung.add(node.loop.name)
+            return StepFailed(item.step, "it is stuck", node.state, stuck=True, stack=stack)
+        if item.future.cancelled():
+            return StepFailed(item.step, "its executor stops", node.state)
+        result = item.future.result()
+        if result.success and not stack:
+            return None
+        reason = result.reason or "a callback was in the way for too long"
+        return StepFailed(item.step, reason, result.state, stuck=bool(stack), stack=stack)
+
+    def _free(self, item: _Running) -> None:
+        """Interrupt the callback that a step hangs in, or that it waits for."""
+        node = self._crew.nodes[item.step.node]
+        found = list(running_callbacks(node.loop, self._crew.nodes.values()))
+        for callback in [one for one in found if one.node is node] or found:
+            callback.interrupt()
+        if found:
+            until_s = time.monotonic() + _INTERRUPTED_WITHIN_S
+            self._inbox.wait(item.future.done, until_s, stoppable=False)

@@ -1,0 +1,163 @@
+"""The nodes of a running system and the loops that run them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from composer.behavior import CallCancelled
+from composer.model import Executor, ExecutorKind, LogLevel, Node, PrimaryState, System
+from composer.runtime.executors import log_exception, make_loop
+from composer.runtime.log import describe
+from composer.runtime.loop import Loop
+from composer.runtime.node import Listener, NodeOptions, RunningNode
+from composer.runtime.parameters import ParameterError
+from composer.source import Located
+
+_PRIMARY = {state.value: state for state in PrimaryState}
+FINALIZED = "finalized"
+_LOOP_ENDS_WITHIN_S = 0.2
+_MADE_ANEW_WITHIN_S = 5.0
+
+
+class CreationFailed(Exception):
+    """A node cannot be created. ``node`` is its full name; the text says why."""
+
+    def __init__(self, node: str, reason: str) -> None:
+        super().__init__(reason)
+        self.node = node
+
+
+class Crew:
+    """Every node of one system, by its key, and every loop, by the name of its executor."""
+
+    def __init__(
+        self,
+        system: System,
+        listen: Callable[[str], Listener],
+        *,
+        log_level: LogLevel = LogLevel.INFO,
+        transition_timeout_s: float | None = None,
+    ) -> None:
+        """``listen(key)`` is who is told what a node does.
+
+        ``transition_timeout_s`` goes before what the system says.
+        """
+        self._system = system
+        self._listen = listen
+        self._log_level = log_level
+        self._transition_timeout_s = transition_timeout_s
+        self._executors = {executor.name.value: executor for executor in system.executors}
+        self.nodes: dict[str, RunningNode] = {}
+        self.loops: dict[str, Loop] = {}
+        #: The loops with a callback that does not return; nothing can be asked of their nodes.
+        self.hung: set[str] = set()
+
+    def create(self) -> None:
+        """Create all nodes and start their loops. Raises CreationFailed; nothing is started then.
+
+        A node that cannot be created leaves those before it to be closed.
+        """
+        for node in self._system.nodes:
+            try:
+                self.nodes[node.name.value] = self._make(node)
+            except ParameterError as error:
+                raise CreationFailed(node.full_name, str(error)) from error
+            except Exception as error:
+                reason = f"it cannot be created: {describe(error)}"
+                raise CreationFailed(node.full_name, reason) from error
+        for loop in self.loops.values():
+            loop.start()
+
+    def timeout_s(self, name: str) -> float:
+        """Return how long a transition of a node may take."""
+        return self._timeout_s(self.nodes[name].model)
+
+    def states(self) -> Mapping[str, PrimaryState]:
+        """Return the states of all nodes that can be moved, by their keys.
+
+        Nodes that are finalized, in mid-transition or on a hung loop are left out.
+        """
+        return {
+            name: _PRIMARY[node.state]
+            for name, node in self.nodes.items()
+            if node.loop.name not in self.hung and node.state in _PRIMARY
+        }
+
+    def is_lost(self, name: str) -> bool:
+        """Say whether nothing can be asked of the node, since its loop hangs."""
+        return self.nodes[name].loop.name in self.hung
+
+    def active(self) -> int:
+        """Return how many nodes are active."""
+        return sum(node.state == PrimaryState.ACTIVE.value for node in self.nodes.values())
+
+    def revive(self, name: str) -> None:
+        """Make a finalized node anew, unconfigured: there is no way back from *finalized*.
+
+        Raises CreationFailed.
+        """
+        old = self.nodes[name]
+        if old.state != FINALIZED:
+            return
+        try:
+            self.nodes[name] = old.loop.run(partial(self._remake, old), _MADE_ANEW_WITHIN_S)
+        except Exception as error:
+            reason = f"it cannot be made anew: {describe(error)}"
+            raise CreationFailed(old.full_name, reason) from error
+
+    def close(self, end_s: float) -> bool:
+        """Stop the loops and give the nodes back until ``time.monotonic()`` says ``end_s``.
+
+        False when something is left that only the end of the process removes: Fast DDS takes longer
+        for each endpoint the more there are, seconds for 100 nodes, and a hung loop never ends.
+        What there is no time for is missed by others when its lease ends.
+        """
+        for name, loop in self.loops.items():
+            if not loop.stop(_LOOP_ENDS_WITHIN_S):
+                self.hung.add(name)
+        complete = True
+        for name in reversed(self.nodes):
+            if self.is_lost(name) or time.monotonic() > end_s:
+                complete = False
+            else:
+                self.nodes[name].destroy()
+        return complete and not self.hung
+
+    def _remake(self, old: RunningNode) -> RunningNode:
+        old.destroy()
+        return self._make(old.model, old)
+
+    def _make(self, node: Node, before: RunningNode | None = None) -> RunningNode:
+        executor = self._executor_of(node)
+        name = executor.name.value
+        if name not in self.loops:
+            self.loops[name] = make_loop(executor, _take_exception)
+        options = NodeOptions(
+            parallel=executor.kind is ExecutorKind.MULTI_THREADED,
+            log_level=self._log_level,
+            transition_timeout_s=self._timeout_s(node),
+        )
+        statistics = None if before is None else before.statistics
+        return RunningNode(
+            node, self.loops[name], options, self._listen(node.name.value), statistics
+        )
+
+    def _timeout_s(self, node: Node) -> float:
+        limit_s = node.supervision.timeout_ms / 1000.0
+        return limit_s if self._transition_timeout_s is None else self._transition_timeout_s
+
+    def _executor_of(self, node: Node) -> Executor:
+        """Return the executor the node runs on; without one it is ``default``, an event loop."""
+        if node.executor is not None:
+            return self._executors[node.executor.value]
+        return self._executors.get("default") or Executor(
+            Located("default", node.span), ExecutorKind.EVENTS, node.span
+        )
+
+
+def _take_exception(what: str, error: BaseException) -> None:
+    """Log what leaves a callback; that a call ended with its node is nothing to tell."""
+    if not isinstance(error, CallCancelled):
+        log_exception(what, error)

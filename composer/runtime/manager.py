@@ -1,0 +1,221 @@
+"""The system's own node: what can be asked of the system as a whole, and how it is.
+
+Its services are those of nav2's lifecycle manager as far as both have them (std_srvs/srv/Trigger):
+``startup``, ``pause``, ``resume``, ``reset``, ``shutdown`` and ``is_active``. It tells the state of
+every node on ``/diagnostics`` (REP 107) and, latched, on ``state``: each second and on change.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_srvs.srv import Trigger
+
+from composer.names import join
+from composer.runtime.board import Board, NodeStatus, SystemStatus
+from composer.runtime.event_loop import EventLoop
+from composer.runtime.executors import log_exception
+from composer.runtime.loop import Reply
+
+NAME = "manager"
+COMMANDS = ("startup", "pause", "resume", "reset", "shutdown")
+IS_ACTIVE = "is_active"
+STATE_TOPIC = "state"
+#: Transient local: who comes late gets the last one at once.
+STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_DIAGNOSTICS = "/diagnostics"
+_PERIOD_S = 1.0
+#: Many changes at once, as in a bring-up, become one message.
+_TOGETHER_S = 0.05
+_ENDS_WITHIN_S = 0.2
+#: Composers that started within so short a time of each other are told apart by their names.
+_SAME_TIME_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """Somebody wants something of the system. ``answer(success, message)`` is called once."""
+
+    what: str  # one of COMMANDS
+    answer: Callable[[bool, str], None]
+
+
+def manager_namespace(namespace: str, system: str) -> str:
+    """Return the namespace of the manager node of a system in ``namespace``."""
+    return join(namespace, system)
+
+
+@dataclass(frozen=True, slots=True)
+class Office:
+    """Who is behind a manager; all of it is called on the manager's loop.
+
+    ``obey`` takes commands; ``measure`` works out rates; ``yield_to(host, pid)`` is called when a
+    composer that runs the same system was there first.
+    """
+
+    obey: Callable[[Command], None]
+    measure: Callable[[], None]
+    yield_to: Callable[[str, str], None]
+
+
+class Manager:
+    """The node, and the loop of its own that serves it whatever the others do."""
+
+    def __init__(self, namespace: str, board: Board, office: Office) -> None:
+        self._board = board
+        self._office = office
+        self._started_s = time.monotonic()
+        self._rivals: set[tuple[str, str]] = set()
+        self._loop = EventLoop(NAME, log_exception)
+        self._due = threading.Lock()  # held while a message that tells the changes is due
+        self._node = Node(
+            NAME,
+            namespace=namespace,
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+            parameter_overrides=[Parameter("start_type_description_service", value=False)],
+        )
+        self._diagnostics = self._node.create_publisher(DiagnosticArray, _DIAGNOSTICS, 10)
+        self._state = self._node.create_publisher(DiagnosticArray, f"~/{STATE_TOPIC}", STATE_QOS)
+        for what in COMMANDS:
+            self._serve(what, partial(self._take, what))
+        self._serve(IS_ACTIVE, self._tell_whether_active)
+        rivals = self._node.create_subscription(
+            DiagnosticArray, f"~/{STATE_TOPIC}", self._look_at_rival, STATE_QOS
+        )
+        self._loop.add_subscription(rivals, self._look_at_rival)
+        self._loop.start()
+        self._loop.call_every(_PERIOD_S, self._tick)
+        self._loop.call_soon(self._publish)
+        board.on_change(self._publish_soon)
+
+    def close(self) -> None:
+        """Tell the last state and leave."""
+        self._board.on_change(lambda: None)
+        self._loop.call_soon(self._publish)
+        self._loop.stop(_ENDS_WITHIN_S)
+        self._node.destroy_node()
+
+    def _serve(self, name: str, callback: Callable[[Any, Reply], None]) -> None:
+        service = self._node.create_service(Trigger, f"~/{name}", _never_called)
+        self._loop.add_service(service, callback)
+
+    def _take(self, what: str, _: Trigger.Request, reply: Reply) -> None:
+        def answer(success: bool, message: str) -> None:
+            self._loop.call_soon(lambda: reply(Trigger.Response(success=success, message=message)))
+
+        self._office.obey(Command(what, answer))
+
+    def _tell_whether_active(self, _: Trigger.Request, reply: Reply) -> None:
+        status = self._board.snapshot()
+        reply(Trigger.Response(success=status.is_active, message=status.summary))
+
+    def _tick(self) -> None:
+        self._office.measure()
+        self._publish()
+
+    def _publish_soon(self) -> None:
+        if self._due.acquire(blocking=False):
+            self._loop.call_later(_TOGETHER_S, self._publish_changes)
+
+    def _publish_changes(self) -> None:
+        self._due.release()
+        self._publish()
+
+    def _look_at_rival(self, message: DiagnosticArray) -> None:
+        """See whether another composer runs the same system, and for how long."""
+        values = {item.key: item.value for item in message.status[0].values}
+        rival = (values["host"], values["pid"])
+        status = self._board.snapshot()
+        own = (status.host, str(status.pid))
+        if rival == own:
+            return
+        if rival not in self._rivals:
+            self._rivals.add(rival)  # the first message was latched, who knows when
+            return
+        lead_s = float(values["uptime"]) - self._uptime_s
+        if lead_s > _SAME_TIME_S or (abs(lead_s) <= _SAME_TIME_S and rival < own):
+            self._office.yield_to(*rival)
+
+    @property
+    def _uptime_s(self) -> float:
+        # Not the time of day, on which two hosts may disagree.
+        return time.monotonic() - self._started_s
+
+    def _publish(self) -> None:
+        message = diagnostics(self._board.snapshot(), self._uptime_s)
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+        self._state.publish(message)
+
+
+def diagnostics(status: SystemStatus, uptime_s: float) -> DiagnosticArray:
+    """Return the state of a system and of its nodes; the system comes first."""
+    nodes = (_of_node(status.system, node) for node in status.nodes)
+    return DiagnosticArray(status=[_of_system(status, uptime_s), *nodes])
+
+
+def _of_system(status: SystemStatus, uptime_s: float) -> DiagnosticStatus:
+    level = DiagnosticStatus.OK
+    if status.failed:
+        level = DiagnosticStatus.ERROR
+    elif not status.is_active:
+        level = DiagnosticStatus.WARN
+    values = {
+        "activity": status.activity,
+        "active": str(status.is_active).lower(),
+        "host": status.host,
+        "pid": str(status.pid),
+        "started": f"{status.started_s:.3f}",
+        "uptime": f"{uptime_s:.3f}",
+    }
+    return _status(status.system, status.system, level, status.summary, values)
+
+
+def _of_node(system: str, node: NodeStatus) -> DiagnosticStatus:
+    level = DiagnosticStatus.OK
+    message = node.state
+    if node.held_down:
+        level = DiagnosticStatus.ERROR
+        message = f"{node.state}: {node.held_down}"
+    elif node.state != "active":
+        level = DiagnosticStatus.WARN
+    values = {
+        "state": node.state,
+        "wanted": node.wanted,
+        "since": f"{node.since_s:.3f}",
+        "restarts": str(node.restarts),
+        "errors": str(node.errors),
+        "last_error": node.last_error,
+        "held_down": node.held_down,
+        "sent_hz": f"{node.sent_hz:.1f}",
+        "received_hz": f"{node.received_hz:.1f}",
+    }
+    return _status(f"{system}: {node.node}", system, level, message, values)
+
+
+def _status(
+    name: str, system: str, level: bytes, message: str, values: dict[str, str]
+) -> DiagnosticStatus:
+    return DiagnosticStatus(
+        level=level,
+        name=name,
+        message=message,
+        hardware_id=system,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
+
+
+def _never_called(_: Any, response: Any) -> Any:
+    """Stand where rclpy wants a callback; the loop calls ours instead."""
+    return response

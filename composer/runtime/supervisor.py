@@ -1,0 +1,271 @@
+"""Keeps a system up: brings it up as a whole or not at all, deals with faults, obeys commands.
+
+What is to be done is decided in :mod:`composer.plan`; here it is done, on the main thread, one
+thing after the other.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from composer.model import OnFailure, PrimaryState, System
+from composer.plan import (
+    Fault,
+    FaultKind,
+    Plan,
+    Step,
+    Upkeep,
+    Verdict,
+    judge,
+    mend,
+    reach,
+    wanted,
+)
+from composer.runtime.board import Board
+from composer.runtime.conductor import Conductor, Manner, StepFailed
+from composer.runtime.crew import FINALIZED, CreationFailed, Crew
+from composer.runtime.events import (
+    NodeFailed,
+    Restarted,
+    RolledBack,
+    RollingBack,
+    Stuck,
+    TransitionRefused,
+)
+from composer.runtime.inbox import Inbox
+from composer.runtime.reporter import Reporter
+from composer.runtime.watch import Hanging, Returned
+
+_PRIMARY = {state.value: state for state in PrimaryState}
+_DOWN = (PrimaryState.UNCONFIGURED.value, FINALIZED)
+_LENIENT = Manner(lenient=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """Somebody outside has taken a node to another state. ``node`` is a key, ``state`` a label."""
+
+    node: str
+    state: str
+
+
+class Supervisor:
+    """What has to be kept up, and what was done about it so far."""
+
+    def __init__(
+        self, system: System, crew: Crew, inbox: Inbox[object], board: Board, reporter: Reporter
+    ) -> None:
+        self._system = system
+        self._crew = crew
+        self._inbox = inbox
+        self._board = board
+        self._reporter = reporter
+        self._conductor = Conductor(crew, inbox, self._tell_failed)
+        self._upkeep = Upkeep(dict.fromkeys(crew.nodes, PrimaryState.UNCONFIGURED))
+        self._due: list[tuple[float, str, int]] = []  # when to restart which node, what attempt
+        self._stranded: dict[str, set[str]] = {}  # by hung loop: nodes that did nothing wrong
+
+    @property
+    def moving(self) -> set[str]:
+        """The nodes that are being moved now; where they come to rest is no news."""
+        return self._conductor.moving
+
+    @property
+    def goals(self) -> Mapping[str, PrimaryState]:
+        """Where the nodes are wanted, by their keys."""
+        return self._upkeep.goals
+
+    @property
+    def has_failed_nodes(self) -> bool:
+        """Whether a node is held down, or gave the system up."""
+        return bool(self._upkeep.down)
+
+    # --- the whole system
+
+    def want(self, goals: Mapping[str, PrimaryState], *, forget: bool = False) -> None:
+        """Say where nodes are wanted from now on; with ``forget``, failures are history."""
+        self._upkeep = self._upkeep.want(goals)
+        if forget:
+            self._upkeep = Upkeep(self._upkeep.goals)
+            self._due.clear()
+        self._show()
+
+    def bring_up(self, plan: Plan, within_s: float = math.inf) -> str | None:
+        """Carry out a plan as a whole or not at all; return why it failed, or None.
+
+        What it had done by then is undone in reverse.
+        """
+        before = self._crew.states()
+        end_s = time.monotonic() + within_s
+        failures = self._conductor.carry_out(plan, Manner(end_s=end_s))
+        if not failures:
+            return None
+        step = failures[0].step
+        reason = f"it did not {step.transition}: {failures[0].reason}"
+        if time.monotonic() >= end_s:
+            reason = f"it did not {step.transition} in time: {within_s:g} s are over"
+        self._roll_back(before, step.full_name, reason)
+        return f"{step.full_name}: {reason}"
+
+    def mend(self, why: str) -> tuple[StepFailed, ...]:
+        """Take every node to where it is wanted now; failures on the way become faults."""
+        plan = mend(self._system, self._upkeep, self._crew.states(), why)
+        failures = self._conductor.carry_out(plan, _LENIENT)
+        for failure in failures:
+            if failure.step.node not in self._upkeep.down:
+                self._inbox.put(_fault_of(failure))
+        self._show()
+        return failures
+
+    def tear_down(self, steps: Plan, end_s: float, share_s: float) -> bool:
+        """Take everything down, whatever becomes of it; return whether nothing failed."""
+        manner = Manner(lenient=True, stoppable=False, end_s=end_s, share_s=share_s)
+        return not self._conductor.carry_out(steps, manner)
+
+    def _roll_back(self, before: Mapping[str, PrimaryState], node: str, reason: str) -> None:
+        tell = self._reporter.tell
+        tell(RollingBack(self._reporter.elapsed_s, node, reason))
+        causes = dict.fromkeys(self._crew.nodes, f"{node} failed")
+        plan = reach(self._system, self._crew.states(), before, causes)
+        self._conductor.carry_out(plan, _LENIENT)
+        undone = tuple(dict.fromkeys(step.full_name for step in plan.steps))
+        tell(RolledBack(self._reporter.elapsed_s, undone))
+
+    # --- what happens to nodes
+
+    def next_restart_s(self) -> float | None:
+        """Return when ``time.monotonic()`` says that a node is to be restarted; None: none is."""
+        return self._due[0][0] if self._due else None
+
+    def restart_due(self) -> None:
+        """Restart the node whose wait is over first."""
+        _, name, attempt = heapq.heappop(self._due)
+        if name not in self._upkeep.down:
+            return  # somebody else has brought it up
+        now_s = time.monotonic()
+        self._upkeep = self._upkeep.restart(name, now_s)
+        self._board.count_restart(name)
+        try:
+            self._crew.revive(name)
+        except CreationFailed as error:
+            self.take_fault(Fault(name, FaultKind.TRANSITION, str(error), now_s))
+            return
+        full_name = self._crew.nodes[name].full_name
+        if not self.mend(f"restart {attempt} of {full_name}") and not self._inbox.closing:
+            self._reporter.tell(Restarted(self._reporter.elapsed_s, full_name, attempt))
+
+    def take_fault(self, fault: Fault) -> None:
+        """Do what is to be done about a failed node."""
+        verdict = judge(self._system, self._upkeep, fault)
+        if verdict is None or self._is_overtaken(fault):
+            return
+        node = self._crew.nodes[fault.node]
+        self._board.set_error(fault.node, fault.text)
+        self._reporter.tell(
+            NodeFailed(
+                self._reporter.elapsed_s, node.full_name, fault.text, self._consequence(verdict)
+            )
+        )
+        self._upkeep = self._upkeep.fail(fault)
+        if fault.kind is FaultKind.LOST:
+            self._strand(fault.node)
+        if verdict.action is OnFailure.SHUTDOWN:
+            self._show()
+            self._inbox.ask(f"{node.full_name} failed: {verdict.reason}")
+            return
+        self.mend("")
+        self._force_down(fault.node)
+        if verdict.action is OnFailure.RESTART:
+            due_s = time.monotonic() + verdict.wait_s
+            heapq.heappush(self._due, (due_s, fault.node, verdict.attempt))
+
+    def take_move(self, moved: Moved) -> None:
+        """Accept that somebody outside wants a node elsewhere."""
+        was_down = moved.node in self._upkeep.down
+        state = _PRIMARY.get(moved.state, PrimaryState.UNCONFIGURED)
+        self._upkeep = self._upkeep.release(moved.node).want({moved.node: state})
+        if was_down:
+            self.mend(f"{moved.node} was brought up by hand")
+        self._show()
+
+    def take_hanging(self, hanging: Hanging) -> None:
+        """Tell of a callback that takes too long, and is being interrupted."""
+        full_name = self._crew.nodes[hanging.node].full_name
+        what = f"return from {hanging.callback} within {1000.0 * hanging.limit_s:g} ms"
+        self._reporter.tell(Stuck(self._reporter.elapsed_s, full_name, what, hanging.stack))
+
+    def take_return(self, returned: Returned) -> None:
+        """Go on with the nodes of a loop that had been given up."""
+        self._crew.hung.discard(returned.loop)
+        for name in self._stranded.pop(returned.loop, ()):
+            self._upkeep = self._upkeep.release(name)
+        self.mend(f"executor '{returned.loop}' goes on")
+
+    def _is_overtaken(self, fault: Fault) -> bool:
+        """Say whether somebody has taken the node elsewhere since it failed."""
+        state = self._crew.nodes[fault.node].state
+        match fault.kind:
+            case FaultKind.TRANSITION:
+                return state not in _DOWN
+            case FaultKind.SILENCE | FaultKind.ERRORS:
+                return state != PrimaryState.ACTIVE.value
+            case _:
+                return False
+
+    def _consequence(self, verdict: Verdict) -> str:
+        match verdict.action:
+            case OnFailure.RESTART:
+                return f"restart {verdict.attempt} in {verdict.wait_s:g} s"
+            case OnFailure.ISOLATE:
+                return "it is isolated"
+            case OnFailure.SHUTDOWN:
+                return "the system is given up"
+
+    def _strand(self, culprit: str) -> None:
+        """Give up the loop of a node, and with it all other nodes it runs."""
+        loop = self._crew.nodes[culprit].loop.name
+        self._crew.hung.add(loop)
+        full_name = self._crew.nodes[culprit].full_name
+        stranded = self._stranded.setdefault(loop, set())
+        for name, node in self._crew.nodes.items():
+            if node.loop.name == loop and name not in self._upkeep.down:
+                stranded.add(name)
+                text = f"its executor hangs in {full_name}"
+                fault = Fault(name, FaultKind.LOST, text, time.monotonic())
+                self._upkeep = self._upkeep.fail(fault)
+                self._board.set_error(name, text)
+
+    def _force_down(self, name: str) -> None:
+        """Shut down a failed node that refuses to go any other way."""
+        node = self._crew.nodes[name]
+        if node.state in _DOWN or self._crew.is_lost(name):
+            return
+        step = Step(1, "shutdown", name, node.full_name, "it would not go down")
+        self._conductor.carry_out(Plan((step,)), _LENIENT)
+
+    def _tell_failed(self, failure: StepFailed) -> None:
+        step = failure.step
+        at_s = self._reporter.elapsed_s
+        if failure.stuck:
+            event = Stuck(at_s, step.full_name, step.transition, failure.stack)
+            self._reporter.tell(event)
+        else:
+            self._reporter.tell(
+                TransitionRefused(
+                    at_s, step.full_name, step.transition, failure.state, failure.reason
+                )
+            )
+
+    def _show(self) -> None:
+        goals = wanted(self._system, self._upkeep)
+        states = {name: state.value for name, state in goals.items()}
+        self._board.set_wanted(states, self._upkeep.down)
+
+
+def _fault_of(failure: StepFailed) -> Fault:
+    text = f"it did not {failure.step.transition}: {failure.reason}"
+    return Fault(failure.step.node, FaultKind.STEP, text, time.monotonic())

@@ -1,0 +1,229 @@
+"""Watches nodes that raise nothing: silent ones, ones that hang, ones with too many errors."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from composer.model import PrimaryState
+from composer.plan import Fault, FaultKind
+from composer.runtime.crew import Crew
+from composer.runtime.interruption import RunningCallback, running_callbacks
+from composer.runtime.node import RunningNode
+
+_SHORTEST_PERIOD_S = 0.005
+_LONGEST_PERIOD_S = 1.0
+_LOOKS_PER_LIMIT = 5
+#: Handlers of transitions have a limit of their own, which ends those that await.
+_TRANSITION_MARGIN_S = 2.0
+#: How long an interrupted callback may take to end before its loop is given up.
+_ENDS_WITHIN_S = 1.0
+_ERRORS_SEEN_WITHIN_MS = 250.0
+
+
+@dataclass(frozen=True, slots=True)
+class Hanging:
+    """A callback takes too long. ``node`` is a key; ``stack`` is where it is."""
+
+    node: str
+    callback: str
+    limit_s: float
+    stack: str
+
+
+@dataclass(frozen=True, slots=True)
+class Returned:
+    """A callback whose loop was given up has ended after all. ``loop`` is its name."""
+
+    loop: str
+
+
+News = Fault | Hanging | Returned
+
+
+@dataclass(slots=True)
+class _Seen:
+    """A callback that was there when somebody looked. ``since_s`` is when that was first so."""
+
+    callback: RunningCallback
+    name: str  # the key of its node
+    since_s: float
+    interrupted_s: float | None = None
+    lost: bool = False
+
+
+class Watch:
+    """A thread that looks at the nodes of a crew again and again, and tells what it finds."""
+
+    def __init__(self, crew: Crew, tell: Callable[[News], None]) -> None:
+        self._crew = crew
+        self._tell = tell
+        self._end = threading.Event()
+        self._callbacks: dict[int, _Seen] = {}  # by thread
+        self._lost: list[_Seen] = []
+        self._nodes = {name: _NodeWatch(name, crew) for name in crew.nodes}
+        self._period_s = _period_s(crew)
+        self._thread = threading.Thread(target=self._run, name="composer watch", daemon=True)
+
+    def start(self) -> None:
+        """Begin to look."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Look no more."""
+        self._end.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _run(self) -> None:
+        while not self._end.wait(self._period_s):
+            now_s = time.monotonic()
+            self._look_at_callbacks(now_s)
+            for name, watch in self._nodes.items():
+                for fault in watch.look(now_s):
+                    if not self._crew.is_lost(name):
+                        self._tell(fault)
+
+    # --- callbacks
+
+    def _look_at_callbacks(self, now_s: float) -> None:
+        before, self._callbacks = self._callbacks, {}
+        names = {id(node): name for name, node in self._crew.nodes.items()}
+        for loop in tuple(self._crew.loops.values()):
+            for callback in running_callbacks(loop, self._crew.nodes.values()):
+                seen = before.pop(callback.thread, None)
+                name = names.get(id(callback.node))
+                if name is None:
+                    continue  # made anew just now
+                if seen is None or seen.callback != callback:
+                    if seen is not None:
+                        self._take_end(seen)
+                    seen = _Seen(callback, name, now_s)
+                self._callbacks[callback.thread] = seen
+                self._judge(seen, now_s)
+        for seen in before.values():
+            self._take_end(seen)
+
+    def _judge(self, seen: _Seen, now_s: float) -> None:
+        limit_s = self._limit_s(seen)
+        if now_s - seen.since_s < limit_s:
+            return
+        if seen.interrupted_s is None:
+            seen.interrupted_s = now_s
+            callback = seen.callback
+            self._tell(Hanging(seen.name, callback.name, limit_s, callback.stack()))
+            callback.interrupt()
+        elif not seen.lost and now_s - seen.interrupted_s > _ENDS_WITHIN_S:
+            seen.lost = True
+            self._tell(self._fault(seen, FaultKind.LOST, "does not return"))
+
+    def _take_end(self, seen: _Seen) -> None:
+        """Tell of the end of a callback that was interrupted."""
+        if seen.lost:
+            self._tell(Returned(seen.callback.node.loop.name))
+        elif seen.interrupted_s is not None and not seen.callback.in_transition:
+            took = f"took longer than {1000.0 * self._limit_s(seen):g} ms"
+            self._tell(self._fault(seen, FaultKind.CALLBACK, took))
+
+    def _limit_s(self, seen: _Seen) -> float:
+        """Return how long a callback may take; handlers of transitions have a limit of theirs."""
+        if seen.callback.in_transition:
+            return self._crew.timeout_s(seen.name) + _TRANSITION_MARGIN_S
+        limit = seen.callback.node.model.supervision.watch.callback_ms
+        return math.inf if limit is None else limit.value / 1000.0
+
+    def _fault(self, seen: _Seen, kind: FaultKind, what: str) -> Fault:
+        return Fault(seen.name, kind, f"{seen.callback.name} {what}", time.monotonic())
+
+
+class _NodeWatch:
+    """What one node has done while it was active."""
+
+    def __init__(self, name: str, crew: Crew) -> None:
+        self._name = name
+        self._crew = crew
+        supervision = crew.nodes[name].model.supervision
+        watch = supervision.watch
+        self._silences: list[_Silence] = []
+        if watch.silence_ms is not None:
+            self._silences.append(_Silence(None, watch.silence_ms.value / 1000.0))
+        for topic, limit in watch.topics:
+            self._silences.append(_Silence(topic.value, limit.value / 1000.0))
+        self._max_errors = math.inf if watch.max_errors is None else watch.max_errors.value
+        self._window_s = supervision.restart.window_ms / 1000.0
+        self._errors: deque[tuple[float, int]] = deque()  # when there were how many in all
+        self._has_failed = False
+
+    def look(self, now_s: float) -> Iterator[Fault]:
+        """Yield a fault when the node has failed; one at most until it is active anew."""
+        node = self._crew.nodes[self._name]
+        if node.state != PrimaryState.ACTIVE.value:
+            self._begin_anew()
+            return
+        if self._has_failed:
+            return
+        found = [silence.look(node, now_s) for silence in self._silences]
+        text = next(filter(None, found), None)
+        kind = FaultKind.SILENCE
+        if text is None:
+            kind, text = FaultKind.ERRORS, self._look_at_errors(node.statistics.errors, now_s)
+        if text is not None:
+            self._has_failed = True
+            yield Fault(self._name, kind, text, now_s)
+
+    def _begin_anew(self) -> None:
+        self._has_failed = False
+        self._errors.clear()
+        for silence in self._silences:
+            silence.begin_anew()
+
+    def _look_at_errors(self, errors: int, now_s: float) -> str | None:
+        if not self._errors or self._errors[-1][1] != errors:
+            self._errors.append((now_s, errors))
+        while len(self._errors) > 1 and self._errors[1][0] < now_s - self._window_s:
+            self._errors.popleft()
+        count = errors - self._errors[0][1]
+        if count <= self._max_errors:
+            return None
+        return f"{count} errors within {self._window_s:g} s"
+
+
+@dataclass(slots=True)
+class _Silence:
+    """How long one publisher, or all of a node's (None), have been silent."""
+
+    publisher: str | None
+    limit_s: float
+    sent: int = -1  # when it was last looked at; -1: not since the node is active
+    since_s: float = 0.0
+
+    def begin_anew(self) -> None:
+        """Forget what was seen."""
+        self.sent = -1
+
+    def look(self, node: RunningNode, now_s: float) -> str | None:
+        """Return how long there was nothing, if that is too long."""
+        sent = node.statistics.sent if self.publisher is None else node.sent(self.publisher)
+        if sent != self.sent:
+            self.sent, self.since_s = sent, now_s
+        if now_s - self.since_s <= self.limit_s:
+            return None
+        what = "silent" if self.publisher is None else f"silent on '{self.publisher}'"
+        return f"{what} for {1000.0 * self.limit_s:g} ms"
+
+
+def _period_s(crew: Crew) -> float:
+    """Return how often to look, so that each limit is kept with a fifth of it to spare."""
+    limits_ms: list[float] = []
+    for node in crew.nodes.values():
+        watch = node.model.supervision.watch
+        found = [watch.silence_ms, watch.callback_ms, *(limit for _, limit in watch.topics)]
+        limits_ms += [limit.value for limit in found if limit is not None]
+        if watch.max_errors is not None:
+            limits_ms.append(_ERRORS_SEEN_WITHIN_MS)
+    shortest_s = min(limits_ms, default=math.inf) / 1000.0 / _LOOKS_PER_LIMIT
+    return min(max(shortest_s, _SHORTEST_PERIOD_S), _LONGEST_PERIOD_S)

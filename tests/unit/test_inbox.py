@@ -1,0 +1,47 @@
+"""The main thread's inbox: nothing is lost, nothing waits longer than it may."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from composer.runtime.inbox import Inbox
+
+
+def test_items_come_in_the_order_they_were_put() -> None:
+    inbox: Inbox[int] = Inbox()
+    for number in range(3):
+        inbox.put(number)
+    assert [inbox.take(), inbox.take(), inbox.take()] == [0, 1, 2]
+    assert inbox.take(time.monotonic()) is None
+
+
+def test_what_comes_while_something_else_is_waited_for_is_kept() -> None:
+    inbox: Inbox[str] = Inbox()
+    inbox.put("later")
+    done = []
+    threading.Thread(target=lambda: (done.append(True), inbox.wake())).start()
+    assert inbox.wait(lambda: bool(done), time.monotonic() + 5.0, stoppable=True)
+    assert inbox.take(time.monotonic()) == "later"
+
+
+def test_a_wait_ends_in_time() -> None:
+    inbox: Inbox[str] = Inbox()
+    began_s = time.monotonic()
+    assert not inbox.wait(lambda: False, began_s + 0.05, stoppable=True)
+    assert inbox.take(began_s + 0.1) is None
+    assert 0.1 <= time.monotonic() - began_s < 1.0
+
+
+def test_a_request_to_stop_ends_what_may_be_stopped_and_a_second_one_hurries() -> None:
+    inbox: Inbox[str] = Inbox()
+    inbox.put("never dealt with")
+    inbox.ask("SIGINT")
+    assert inbox.closing
+    assert inbox.take() is None
+    assert not inbox.wait(lambda: False, time.monotonic() + 60.0, stoppable=True)
+    inbox.ask("SIGTERM")
+    assert (inbox.reason, inbox.hurry) == ("SIGINT", True)
+    began_s = time.monotonic()
+    assert not inbox.wait(lambda: False, began_s + 60.0, stoppable=False)
+    assert time.monotonic() - began_s < 1.0
