@@ -20,11 +20,13 @@ from composer.tree import Mapping, plain
 if TYPE_CHECKING:
     from jsonschema import Draft7Validator
 
-__all__ = ["KINDS", "SCHEMAS", "check_schema", "kind_of", "schema"]
+__all__ = ["KINDS", "REPORT", "SCHEMAS", "check_schema", "kind_of", "schema"]
 
 #: The kinds of file about nodes, each with a schema of that name; also the key that marks one.
 KINDS = ("system", "node")
 SCHEMAS = (*KINDS, "project")
+#: What is written, not read: the report of ``compose validate --format json``.
+REPORT = "report"
 
 _DEFINITIONS = "#/definitions/"
 
@@ -46,8 +48,8 @@ def check_schema(tree: Mapping, kind: str) -> list[Diagnostic]:
 
 
 def schema(name: str) -> dict[str, Any]:
-    """Return the JSON Schema (draft-07) called ``name``, one of SCHEMAS. Raises KeyError."""
-    if name not in SCHEMAS:
+    """Return the JSON Schema (draft-07) called ``name``, of SCHEMAS or REPORT. Raises KeyError."""
+    if name not in (*SCHEMAS, REPORT):
         raise KeyError(name)
     text = (schemas_folder() / f"{name}.schema.json").read_text(encoding="utf-8")
     content: dict[str, Any] = json.loads(text)

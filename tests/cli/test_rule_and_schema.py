@@ -27,7 +27,7 @@ def test_an_unknown_rule_gets_the_nearest() -> None:
     assert "did you mean 'unknown-node'?" in done.err
 
 
-@pytest.mark.parametrize("name", ["system", "node"])
+@pytest.mark.parametrize("name", ["system", "node", "project", "report"])
 def test_a_schema_is_printed_as_json(name: str) -> None:
     content = json.loads(compose("schema", name).out)
     assert "draft-07" in content["$schema"]

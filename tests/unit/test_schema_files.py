@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import runpy
 import time
 from collections.abc import Iterator
@@ -108,6 +109,17 @@ def test_shipped_file(path: Path) -> None:
     assert [item.message for item in (*findings, *check_schema(tree, kind))] == []
     # An editor has plain JSON Schema, without the composer's stricter idea of an integer.
     assert Draft7Validator(schema(kind)).is_valid(plain(tree))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.name)
+def test_an_editor_finds_the_schema_of_a_shipped_file(path: Path) -> None:
+    first = path.read_text(encoding="utf-8").splitlines()[0]
+    mark, _, reference = first.partition("=")
+    assert mark == "# yaml-language-server: $schema"
+    tree, _, _ = read_document(path)
+    assert tree is not None
+    found = json.loads((path.parent / reference).read_text(encoding="utf-8"))
+    assert found == schema(str(kind_of(tree)))
 
 
 def large_system(nodes: int) -> str:
