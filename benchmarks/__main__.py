@@ -46,10 +46,9 @@ def _run(names: list[str], *, long: bool) -> None:
     for name in names:
         purpose, measure = BENCHMARKS[name]
         print(f"==> {name}: {purpose}", flush=True)
-        rows += measure(long=long)
-    print()
-    print(table(rows))
-    print()
+        found = measure(long=long)
+        print(table(found), end="\n\n", flush=True)  # at once: an interrupted run tells this much
+        rows += found
     print("Medians of the rounds; a ratio is ours / theirs of one round, below 1 is less for ours.")
     print(
         f"Load of the machine: {load_before:.1f} before, {os.getloadavg()[0]:.1f} after;", end=" "
