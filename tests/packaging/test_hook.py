@@ -1,0 +1,101 @@
+"""The hook, run by pre-commit itself in a repository that uses it."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.packaging.installation import without_ros
+
+ROOT = Path(__file__).parents[2]
+PUBLISHED = (
+    ".pre-commit-hooks.yaml",
+    "LICENSE",
+    "README.md",
+    "composer",
+    "interfaces",
+    "nodes",
+    "pyproject.toml",
+    "schemas",
+    "systems",
+)
+HAS_PRE_COMMIT = importlib.util.find_spec("pre_commit") is not None
+pytestmark = pytest.mark.skipif(
+    not HAS_PRE_COMMIT and os.environ.get("CI") != "true", reason="pre-commit is not installed"
+)
+
+
+def git(folder: Path, *arguments: str) -> str:
+    who = ("-c", "user.name=Tester", "-c", "user.email=tester@example.org")
+    done = subprocess.run(
+        ["git", *who, *arguments], cwd=folder, capture_output=True, text=True, check=True
+    )
+    return done.stdout.strip()
+
+
+def committed(folder: Path) -> str:
+    """Make a repository of ``folder`` and return its commit."""
+    git(folder, "init", "--quiet")
+    git(folder, "add", "--all")
+    git(folder, "commit", "--quiet", "--message", "all")
+    return git(folder, "rev-parse", "HEAD")
+
+
+@pytest.fixture(scope="module")
+def user(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A repository whose configuration names this one, as it is now."""
+    published = tmp_path_factory.mktemp("published")
+    ignore = shutil.ignore_patterns("__pycache__", "*.egg-info", "build")
+    for name in PUBLISHED:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, published / name, ignore=ignore)
+        else:
+            shutil.copy(ROOT / name, published / name)
+    revision = committed(published)
+    folder = tmp_path_factory.mktemp("user")
+    configuration = f"""\
+repos:
+  - repo: {published}
+    rev: {revision}
+    hooks:
+      - id: compose-validate
+"""
+    (folder / ".pre-commit-config.yaml").write_text(configuration)
+    (folder / "nodes").mkdir()
+    (folder / "nodes" / "wheel.yaml").write_text("node: wheel\n")
+    (folder / "robot.yaml").write_text("system: robot\nnodes: {left: {type: wheel}}\n")
+    committed(folder)
+    return folder
+
+
+def run_hook(folder: Path, home: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "pre_commit", "run", "--all-files", "--color", "never"],
+        cwd=folder,
+        env=without_ros() | {"PRE_COMMIT_HOME": str(home), "GITHUB_ACTIONS": "false"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_pre_commit_passes_what_is_right_and_stops_what_is_wrong(
+    user: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    home = tmp_path_factory.mktemp("pre_commit")
+    done = run_hook(user, home)
+    assert done.returncode == 0, done.stdout
+    assert "compose validate" in done.stdout
+    assert "Passed" in done.stdout
+    (user / "nodes" / "wheel.yaml").rename(user / "nodes" / "wheels.yaml")
+    git(user, "add", "--all")
+    done = run_hook(user, home)
+    assert done.returncode == 1
+    assert "RC201 unknown-node-type" in done.stdout
+    assert " --> robot.yaml:2:" in done.stdout
