@@ -77,7 +77,12 @@ def run(
     ] = None,
     namespace: Annotated[
         str | None,
-        typer.Option(metavar="NAMESPACE", help="Instead of the system's.", show_default=False),
+        typer.Option(
+            "--namespace",
+            metavar="NAMESPACE",
+            help="Instead of the system's.",
+            show_default=False,
+        ),
     ] = None,
     autostart: Annotated[
         Autostart | None,

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from composer.catalog import Catalog
 from composer.model.dependencies import dependency_cycles
 from composer.plan import bring_up, tear_down
+from composer.project import Project
 from composer.resolve import read_overrides, resolve
 from composer.source import SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
@@ -70,7 +71,9 @@ def files(draw: st.DrawFn) -> Mapping:
 @given(tree=files(), text=st.sampled_from(TEXTS) | st.text(max_size=12))
 def test_every_tree_has_a_model_and_a_plan(tree: Mapping, text: str) -> None:
     overrides, _ = read_overrides([f"a.b={text}", text], text)
-    system, _ = resolve(tree, SOURCE, Catalog((FOLDER,)), folder=FOLDER, overrides=overrides)
+    system, _ = resolve(
+        tree, SOURCE, Catalog((FOLDER,), Project.at(FOLDER)), folder=FOLDER, overrides=overrides
+    )
     assert system is not None
     assert dependency_cycles(system) is not None
     assert len(tear_down(system).steps) == 3 * len(system.nodes)
