@@ -78,6 +78,7 @@ class RunningNode:
         """Join the ROS graph, unconfigured; count on from ``statistics``. Raises ParameterError."""
         self.model = model
         self.loop = loop
+        self.activations = 0  # how often it became active
         self.statistics = statistics or Statistics()
         self._listener = listener
         self._ros = RosNode(
@@ -171,6 +172,8 @@ class RunningNode:
 
     def on_rest(self, state: str, transition: str, cause: BaseException | None) -> None:
         """Open or shut everything as ``state`` wants it."""
+        if state == "active" and transition == "activate":
+            self.activations += 1
         _rest(self._core.gate, state, state == "active", self._assembly.gated)
         living = state in ("inactive", "active")
         _rest(self._standby.gate, state, living, self._assembly.always_on)
