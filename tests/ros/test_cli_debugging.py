@@ -262,9 +262,9 @@ def test_a_rejected_goal_is_told() -> None:
 
 
 def test_ctrl_c_cancels_a_goal() -> None:
+    goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: -1}", "--feedback", "--json")
     process = subprocess.Popen(
-        [*COMPOSE, "action", "send-goal", "/lab/navigate", "{max_velocity: -1}"]
-        + ["--feedback", "--json", "--timeout", "20"],
+        [*COMPOSE, *goal, "--timeout", "20"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
