@@ -1,0 +1,160 @@
+"""The schemas in the validator that editors use: it takes what is right, and refuses the rest."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from jsonschema import Draft7Validator
+
+from composer.document import parse_document, read_document
+from composer.report import json as report
+from composer.resources import nodes_folder, systems_folder
+from composer.schema import REPORT, SCHEMAS, check_schema, kind_of, schema
+from composer.source import SourceFile
+from composer.tree import plain
+from tests.properties.mutation import mutated
+
+HERE = Path(__file__).parent
+INSTALLED = HERE / "node_modules" / "ajv"
+NAMES = (*SCHEMAS, REPORT)
+Ajv = Callable[[list[tuple[str, Any]]], list[list[str]]]
+
+BAD = [
+    "nodes: {one: {}}",
+    "system: a",
+    "system: a\nnodes: {}",
+    "system: a\nnodes: [one]",
+    "system: a\nnods: {one: {}}\nnodes: {one: {}}",
+    "system: 5\nnodes: {one: {}}",
+    "system: a\nnodes: {one: 5}",
+    "system: a\nnodes: {one: {typ: relay}}",
+    "system: a\nnodes: {one: {type: relay, behavior: a:B}}",
+    "system: a\nnodes: {one: {type: 5}}",
+    "system: a\nnodes: {one: {namespace: [a]}}",
+    "system: a\nnodes: {one: {publishers: {p: {}}}}",
+    "system: a\nnodes: {one: {publishers: {p: {type: std_msgs/msg/String, service: /a}}}}",
+    "system: a\nnodes: {one: {publishers: {p: {type: std_msgs/msg/String, external: 'no'}}}}",
+    "system: a\nnodes: {one: {subscriptions: {s: {type: std_msgs/msg/String, wen: x}}}}",
+    "system: a\nnodes: {one: {subscriptions: {s: {type: std_msgs/msg/String, publish: [a]}}}}",
+    "system: a\nnodes: {one: {subscriptions: {s: {type: a/msg/B, log: {level: loud}}}}}",
+    "system: a\nnodes: {one: {services: {s: {type: std_srvs/srv/Trigger, when: x}}}}",
+    "system: a\nnodes: {one: {clients: {c: {type: std_srvs/srv/Trigger, timeout_ms: 0}}}}",
+    "system: a\nnodes: {one: {timers: {t: {log: x}}}}",
+    "system: a\nnodes: {one: {timers: {t: {rate_hz: 1, period_ms: 1, log: x}}}}",
+    "system: a\nnodes: {one: {timers: {t: {rate_hz: fast, log: x}}}}",
+    "system: a\nnodes: {one: {timers: {t: {period_ms: true, log: x}}}}",
+    "system: a\nnodes: {one: {parameters: {p: {type: float}}}}",
+    "system: a\nnodes: {one: {lifecycle: {depends_on: {b: running}}}}",
+    "system: a\nnodes: {one: {lifecycle: {autostart: yes}}}",
+    "system: a\nqos_profiles: {q: {depth: -1}}\nnodes: {one: {}}",
+    "system: a\nqos_profiles: {q: {reliability: perhaps}}\nnodes: {one: {}}",
+    "system: a\nqos_profiles: {q: {deadline: 10}}\nnodes: {one: {}}",
+    "system: a\nexecutors: {e: {kind: fast}}\nnodes: {one: {}}",
+    "system: a\nexecutors: {e: {threads: 0}}\nnodes: {one: {}}",
+    "system: a\nnodes: {one: {}}\nconnections: {topic: /a}",
+    "system: a\nnodes: {one: {}}\nconnections: [{from: one.a, to: one.b}]",
+    "system: a\nnodes: {one: {}}\nconnections: [{topic: /a, server: one.a}]",
+    "system: a\nnodes: {one: {}}\nconnections: [{topic: /a, service: /b, from: one.a}]",
+    "system: a\nnodes: {one: {}}\nconnections: [{topic: /a, from: []}]",
+    "node: 5",
+    "node: a\nnodes: {}",
+    "node: a\nvariables: [message_type]",
+    "node: a\nvariables: {message_type: {defalt: 5}}",
+    "node: a\npublishers: {p: {typ: std_msgs/msg/String}}",
+    "node: a\naction_servers: {s: {type: a/action/B, feedback: {count: 0, period_ms: 1}}}",
+]
+
+
+@pytest.fixture(scope="module")
+def ajv() -> Ajv:
+    node, npm = shutil.which("node"), shutil.which("npm")
+    if os.environ.get("CI") == "true" and npm is not None and not INSTALLED.exists():
+        subprocess.run([npm, "ci", "--silent"], cwd=HERE, check=True, stdin=subprocess.DEVNULL)
+    if node is None or not INSTALLED.exists():
+        pytest.skip("ajv is not installed: npm ci in tests/schema_ajv")
+
+    def check(documents: list[tuple[str, Any]]) -> list[list[str]]:
+        done = subprocess.run(
+            [str(node), "check.mjs"],
+            cwd=HERE,
+            input=json.dumps({"schemas": {name: schema(name) for name in NAMES},
+                              "documents": documents}),
+            capture_output=True,
+            text=True,
+            check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        found: list[list[str]] = json.loads(done.stdout)
+        return found
+
+    return check
+
+
+def document(text: str) -> tuple[str, Any]:
+    tree, findings = parse_document(SourceFile("f", text))
+    assert tree is not None
+    assert findings == []
+    return str(kind_of(tree) or "system"), plain(tree)
+
+
+def shipped() -> list[tuple[str, Any]]:
+    folders = (systems_folder(), nodes_folder())
+    paths = [path for folder in folders for path in sorted(folder.glob("*.yaml"))]
+    return [document(path.read_text(encoding="utf-8")) for path in paths]
+
+
+def test_shipped_files_are_right(ajv: Ajv) -> None:
+    assert ajv(shipped()) == [[]] * len(shipped())
+
+
+def test_what_we_write_is_what_its_schema_says(ajv: Ajv) -> None:
+    tree, _, findings = read_document(Path("/no/such/file"))
+    assert tree is None
+    assert ajv([(REPORT, json.loads(report.render(findings)))]) == [[]]
+    assert ajv([(REPORT, {"version": 1, "findings": []})]) != [[]]
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_what_we_refuse_is_bad(text: str) -> None:
+    tree, _ = parse_document(SourceFile("f", text))
+    assert tree is not None
+    assert check_schema(tree, document(text)[0]) != []
+
+
+def test_what_is_bad_is_refused(ajv: Ajv) -> None:
+    passed = [
+        text for text, found in zip(BAD, ajv(list(map(document, BAD))), strict=True) if not found
+    ]
+    assert passed == []
+
+
+def test_both_validators_have_one_opinion_of_files_with_mistakes(ajv: Ajv) -> None:
+    documents: list[tuple[str, Any]] = []
+
+    @settings(
+        max_examples=400,
+        deadline=None,
+        database=None,
+        derandomize=True,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(st.sampled_from(shipped()).flatmap(lambda it: st.tuples(st.just(it[0]), mutated(it[1]))))
+    def collect(made: tuple[str, Any]) -> None:
+        documents.append(made)
+
+    collect()
+    validators = {name: Draft7Validator(schema(name)) for name in SCHEMAS}
+    expected = [validators[name].is_valid(content) for name, content in documents]
+    found = [errors == [] for errors in ajv(documents)]
+    assert 0 < sum(expected) < len(expected)
+    assert found == expected
