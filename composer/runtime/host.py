@@ -167,6 +167,7 @@ class Host:
         watch.start()
         try:
             if self._bring_up():
+                watch.system_is_up()
                 self._keep_up()
         finally:
             watch.stop()

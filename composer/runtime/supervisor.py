@@ -10,7 +10,7 @@ import heapq
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from composer.model import OnFailure, PrimaryState, System
 from composer.plan import (
@@ -179,18 +179,18 @@ class Supervisor:
             return
         self.mend("")
         self._force_down(fault.node)
-        if verdict.action is OnFailure.RESTART:
+        if self._crew.is_lost(fault.node) and fault.kind is not FaultKind.LOST:
+            self._upkeep = self._upkeep.release(fault.node)
+            self.take_fault(replace(fault, kind=FaultKind.LOST))
+        elif verdict.action is OnFailure.RESTART:
             due_s = time.monotonic() + verdict.wait_s
             heapq.heappush(self._due, (due_s, fault.node, verdict.attempt))
 
     def take_move(self, moved: Moved) -> None:
         """Accept that somebody outside wants a node elsewhere."""
-        was_down = moved.node in self._upkeep.down
         state = _PRIMARY.get(moved.state, PrimaryState.UNCONFIGURED)
         self._upkeep = self._upkeep.release(moved.node).want({moved.node: state})
-        if was_down:
-            self.mend(f"{moved.node} was brought up by hand")
-        self._show()
+        self.mend(f"{moved.node} was moved by hand")
 
     def take_hanging(self, hanging: Hanging) -> None:
         """Tell of a callback that takes too long, and is being interrupted."""
@@ -200,6 +200,8 @@ class Supervisor:
 
     def take_return(self, returned: Returned) -> None:
         """Go on with the nodes of a loop that had been given up."""
+        if returned.loop not in self._crew.hung:
+            return
         self._crew.hung.discard(returned.loop)
         for name in self._stranded.pop(returned.loop, ()):
             self._upkeep = self._upkeep.release(name)

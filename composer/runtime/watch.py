@@ -22,6 +22,8 @@ _LOOKS_PER_LIMIT = 5
 _TRANSITION_MARGIN_S = 2.0
 #: How long an interrupted callback may take to end before its loop is given up.
 _ENDS_WITHIN_S = 1.0
+#: A loop whose callbacks all began so short a time ago does not hang.
+_GOES_ON_AFTER_S = 0.5
 _ERRORS_SEEN_WITHIN_MS = 250.0
 
 
@@ -53,7 +55,7 @@ class _Seen:
     name: str  # the key of its node
     since_s: float
     interrupted_s: float | None = None
-    lost: bool = False
+    given_up: bool = False
 
 
 class Watch:
@@ -67,11 +69,16 @@ class Watch:
         self._lost: list[_Seen] = []
         self._nodes = {name: _NodeWatch(name, crew) for name in crew.nodes}
         self._period_s = _period_s(crew)
+        self._system_is_up = False
         self._thread = threading.Thread(target=self._run, name="composer watch", daemon=True)
 
     def start(self) -> None:
         """Begin to look."""
         self._thread.start()
+
+    def system_is_up(self) -> None:
+        """Expect from now on what nodes do that are active: before, some wait for others."""
+        self._system_is_up = True
 
     def stop(self) -> None:
         """Look no more."""
@@ -83,10 +90,17 @@ class Watch:
         while not self._end.wait(self._period_s):
             now_s = time.monotonic()
             self._look_at_callbacks(now_s)
-            for name, watch in self._nodes.items():
+            self._look_at_hung_loops(now_s)
+            if self._system_is_up:
+                self._look_at_nodes(now_s)
+
+    def _look_at_nodes(self, now_s: float) -> None:
+        """Look at what nodes do; those of a loop that is blocked can do nothing."""
+        blocked = {seen.callback.node.loop.name for seen in self._interrupted()} | self._crew.hung
+        for name, watch in self._nodes.items():
+            if self._crew.nodes[name].loop.name not in blocked:
                 for fault in watch.look(now_s):
-                    if not self._crew.is_lost(name):
-                        self._tell(fault)
+                    self._tell(fault)
 
     # --- callbacks
 
@@ -117,17 +131,30 @@ class Watch:
             callback = seen.callback
             self._tell(Hanging(seen.name, callback.name, limit_s, callback.stack()))
             callback.interrupt()
-        elif not seen.lost and now_s - seen.interrupted_s > _ENDS_WITHIN_S:
-            seen.lost = True
+        elif not seen.given_up and now_s - seen.interrupted_s > _ENDS_WITHIN_S:
+            seen.given_up = True
             self._tell(self._fault(seen, FaultKind.LOST, "does not return"))
+
+    def _interrupted(self) -> list[_Seen]:
+        return [seen for seen in self._callbacks.values() if seen.interrupted_s is not None]
 
     def _take_end(self, seen: _Seen) -> None:
         """Tell of the end of a callback that was interrupted."""
-        if seen.lost:
-            self._tell(Returned(seen.callback.node.loop.name))
-        elif seen.interrupted_s is not None and not seen.callback.in_transition:
-            took = f"took longer than {1000.0 * self._limit_s(seen):g} ms"
-            self._tell(self._fault(seen, FaultKind.CALLBACK, took))
+        if seen.interrupted_s is None or seen.given_up or seen.callback.in_transition:
+            return
+        took = f"took longer than {1000.0 * self._limit_s(seen):g} ms"
+        self._tell(self._fault(seen, FaultKind.CALLBACK, took))
+
+    def _look_at_hung_loops(self, now_s: float) -> None:
+        """Tell of loops that were given up and go on; again and again, until somebody hears."""
+        for loop in tuple(self._crew.hung):
+            ages_s = [
+                now_s - seen.since_s
+                for seen in self._callbacks.values()
+                if seen.callback.node.loop.name == loop
+            ]
+            if max(ages_s, default=0.0) < _GOES_ON_AFTER_S:
+                self._tell(Returned(loop))
 
     def _limit_s(self, seen: _Seen) -> float:
         """Return how long a callback may take; handlers of transitions have a limit of theirs."""
@@ -157,14 +184,15 @@ class _NodeWatch:
         self._window_s = supervision.restart.window_ms / 1000.0
         self._errors: deque[tuple[float, int]] = deque()  # when there were how many in all
         self._has_failed = False
+        self._life: tuple[RunningNode, int] | None = None
 
     def look(self, now_s: float) -> Iterator[Fault]:
         """Yield a fault when the node has failed; one at most until it is active anew."""
         node = self._crew.nodes[self._name]
-        if node.state != PrimaryState.ACTIVE.value:
+        if self._life != (node, node.activations):
+            self._life = (node, node.activations)
             self._begin_anew()
-            return
-        if self._has_failed:
+        if self._has_failed or node.state != PrimaryState.ACTIVE.value:
             return
         found = [silence.look(node, now_s) for silence in self._silences]
         text = next(filter(None, found), None)
@@ -186,10 +214,9 @@ class _NodeWatch:
             self._errors.append((now_s, errors))
         while len(self._errors) > 1 and self._errors[1][0] < now_s - self._window_s:
             self._errors.popleft()
-        count = errors - self._errors[0][1]
-        if count <= self._max_errors:
+        if errors - self._errors[0][1] <= self._max_errors:
             return None
-        return f"{count} errors within {self._window_s:g} s"
+        return f"more than {self._max_errors:g} errors within {self._window_s:g} s"
 
 
 @dataclass(slots=True)
