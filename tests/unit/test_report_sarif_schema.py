@@ -1,7 +1,7 @@
 """SARIF held against the schema of OASIS, as the package pydantic-sarif has it.
 
-That package is made by a program from ``sarif-schema-2.1.0.json``: properties that must be there and
-none that the schema does not have, types, enumerations, least values. What a schema cannot say -
+That package is made by a program from ``sarif-schema-2.1.0.json``: properties that must be there,
+none that the schema does not have, types, enumerations, least values. What no schema can say -
 URIs, indexes into arrays - is in test_report_programs.py.
 """
 
