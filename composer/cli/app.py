@@ -17,6 +17,7 @@ COMMANDS = (
     "run",
     "validate",
     "graph",
+    "diff",
     "lifecycle",
     "node",
     "topic",

@@ -13,6 +13,8 @@ from composer.drift.report import Drift, DriftKind
 from composer.drift.snapshot import NodeSeen, Snapshot
 from composer.model import Node, PrimaryState, System
 
+_MANAGER = "manager"
+_MANAGER_SERVICE = "is_active"
 #: States in which a node has its ports.
 _WITH_PORTS = ("inactive", "active")
 
@@ -44,13 +46,21 @@ def _differences(
     for node in system.nodes:
         seen = snapshot.node(node.full_name)
         if seen is None:
-            yield _missing(node, others)
+            yield _missing(node, [other for other in others if not other.is_hidden])
         else:
             yield from _of_node(node, seen, states[node.name.value])
     for other in others:
         yield from conflicting_ends(system, other)
-        if not any(fnmatchcase(other.full_name, pattern) for pattern in ignored):
+        may_be_there = other.is_hidden or _is_manager(system, other)
+        if not may_be_there and not any(fnmatchcase(other.full_name, glob) for glob in ignored):
             yield Drift(DriftKind.EXTRA_NODE, other.full_name)
+
+
+def _is_manager(system: System, other: NodeSeen) -> bool:
+    """Say whether this is the node by which the composer lets the system itself be controlled."""
+    return other.full_name.endswith(f"/{system.name.value}/{_MANAGER}") and any(
+        end.name == f"{other.full_name}/{_MANAGER_SERVICE}" for end in other.ends
+    )
 
 
 def _missing(node: Node, others: Sequence[NodeSeen]) -> Drift:

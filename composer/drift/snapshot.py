@@ -74,10 +74,15 @@ class NodeSeen:
     parameters: Mapping[str, Plain] | None = field(default_factory=dict)
     count: int = 1
 
+    @property
+    def is_hidden(self) -> bool:
+        """True for nodes of tools: a part of their name begins with an underscore."""
+        return any(part.startswith("_") for part in self.full_name.split("/"))
+
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """The nodes of the graph; hidden ones, and what is for tools, are left out."""
+    """The nodes of the graph. Endpoints for tools are left out."""
 
     nodes: tuple[NodeSeen, ...]
 

@@ -25,7 +25,7 @@ def scene_of(snapshot: Snapshot, rates_hz: Mapping[str, float]) -> Scene:
     alone = {topic: rate for topic, rate in rates_hz.items() if publishers[topic] == 1}
     return Scene(
         title=_TITLE,
-        actors=tuple(_actor(node, alone) for node in snapshot.nodes),
+        actors=tuple(_actor(node, alone) for node in snapshot.nodes if not node.is_hidden),
         rates_hz={topic: rate for topic, rate in rates_hz.items() if topic not in alone},
     )
 

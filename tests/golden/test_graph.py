@@ -1,12 +1,11 @@
 """Diagrams, to the byte. ``graph/depot.<view>.<ending>`` is what is expected of ``depot.yaml``.
 
-After a change that is meant: ``UPDATE_GOLDEN=1 pytest tests/golden/test_graph.py``, then look at
+After a change that is meant: ``pytest tests/golden --update-golden``, then look at
 the difference, and at the pictures.
 """
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -22,13 +21,13 @@ ENDINGS = {Format.MERMAID: "mmd", Format.DOT: "dot", Format.JSON: "json", Format
 
 @pytest.mark.parametrize("view", list(View))
 @pytest.mark.parametrize("form", list(ENDINGS))
-def test_diagram(view: View, form: Format) -> None:
+def test_diagram(view: View, form: Format, request: pytest.FixtureRequest) -> None:
     loading = load(HERE / "depot.yaml", shown="depot.yaml")
     assert loading.system is not None
     graph = build_graph(scene_of([loading.system], loading.diagnostics), view)
     text = render([graph], form, Engine.BUNDLED).decode()
     expected = HERE / f"depot.{view}.{ENDINGS[form]}"
-    if os.environ.get("UPDATE_GOLDEN"):
+    if request.config.getoption("--update-golden"):
         expected.write_text(text, encoding="utf-8")
     assert text == expected.read_text(encoding="utf-8")
 
