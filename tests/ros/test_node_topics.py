@@ -205,7 +205,9 @@ def test_messages_wait_for_a_handler_that_awaits_and_the_oldest_makes_room(
         system.wait_for_log("begin 0")
         for number in range(1, 5):
             source.publish(Int64(data=number))
-            wait_until(lambda n=number: system.host._crew.nodes["slow"].statistics.received == n + 1)
+            wait_until(
+                lambda n=number: system.host._crew.nodes["slow"].statistics.received == n + 1
+            )
         release.publish(Int64())
         system.wait_for_log("end 4")
         counted = system.summary("/slow")
