@@ -119,6 +119,11 @@ class RunningNode:
         """The label of the lifecycle state, as ROS tools see it."""
         return self._lifecycle.state
 
+    def stand_still(self) -> None:
+        """Take nothing more in until it comes to rest anew, from any thread: it has failed."""
+        for core in self.cores:
+            core.gate.incoming = False
+
     def sent(self, publisher: str) -> int:
         """Return how many messages went through a publisher since the node was configured."""
         port = self._assembly.publishers.get(publisher)

@@ -130,6 +130,7 @@ class Watch:
             seen.interrupted_s = now_s
             callback = seen.callback
             self._tell(Hanging(seen.name, callback.name, limit_s, callback.stack()))
+            callback.node.stand_still()  # or the next callback hangs as soon as this one ends
             callback.interrupt()
         elif not seen.given_up and now_s - seen.interrupted_s > _ENDS_WITHIN_S:
             seen.given_up = True
