@@ -9,7 +9,8 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from composer.model import System
+from composer.model import PrimaryState, System
+from composer.plan import start_goals
 from composer.runtime.statistics import Statistics
 
 
@@ -18,11 +19,13 @@ class NodeStatus:
     """One node. ``since_s`` is when it came into its state, in seconds since 1970.
 
     ``held_down`` is why a failed node is kept down, and empty otherwise; ``wanted`` is the state
-    that it is to be in. Rates are in hertz, over the last second.
+    that it is to be in; ``starts_active`` is whether a start of the system makes it active. Rates
+    are in hertz, over the last second.
     """
 
     node: str
     wanted: str
+    starts_active: bool = True
     state: str = "unconfigured"
     since_s: float = 0.0
     restarts: int = 0
@@ -51,9 +54,8 @@ class SystemStatus:
 
     @property
     def is_active(self) -> bool:
-        """Whether every node that is to be active is, and there is one."""
-        wanted = [node for node in self.nodes if node.wanted == "active"]
-        return bool(wanted) and all(node.state == "active" for node in wanted)
+        """Whether every node that a start makes active is active."""
+        return all(node.state == "active" for node in self.nodes if node.starts_active)
 
     @property
     def summary(self) -> str:
@@ -73,7 +75,8 @@ class Board:
         self._changed: Callable[[], None] = lambda: None
         self._counters: dict[str, tuple[float, int, int]] = {}
         now_s = time.time()
-        self._full_names = {node.name.value: node.full_name for node in system.nodes}
+        full_names = {node.name.value: node.full_name for node in system.nodes}
+        goals = start_goals(system, PrimaryState.ACTIVE)
         self._status = SystemStatus(
             system=system.name.value,
             activity="starting",
@@ -83,7 +86,12 @@ class Board:
             started_s=now_s,
         )
         self._nodes = {
-            name: NodeStatus(self._full_names[name], "unconfigured", since_s=now_s)
+            name: NodeStatus(
+                full_names[name],
+                PrimaryState.UNCONFIGURED.value,
+                starts_active=goals[name] is PrimaryState.ACTIVE,
+                since_s=now_s,
+            )
             for name in order
         }
 
