@@ -19,7 +19,7 @@ from composer.document import parse_bytes, read_document
 from composer.expand import expand
 from composer.interfaces import Interfaces
 from composer.model import System
-from composer.project import Project, Settings
+from composer.project import SETTINGS_FILE, Project, Settings
 from composer.project.choices import told, wrong_choices
 from composer.resolve import Overrides, check_kind, read_overrides, resolve
 from composer.schema import check_schema, kind_of
@@ -67,6 +67,8 @@ def load(
     be given by who loads many files of one project: reading them is what takes time.
     """
     tree, source, findings = read_document(path, shown)
+    if path.name == SETTINGS_FILE:  # what is wrong with it is told of its project
+        tree, findings = None, []
     overrides, found = read_overrides(parameter_overrides, namespace)
     known = _Known.of(_real_folder(path), interfaces)
     return _load(tree, source, [*findings, *found], known, overrides)

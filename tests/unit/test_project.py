@@ -126,6 +126,14 @@ def test_a_wrong_setting_is_a_finding_at_its_place(
     assert str(found[0].primary).endswith(f"composer.yaml:{place[0]}:{place[1]}")
 
 
+def test_settings_may_be_looked_at_alone(tmp_path: Path) -> None:
+    path = tmp_path / "composer.yaml"
+    path.write_text("strict: true\nignore: [nothing-of-the-kind]\n")
+    assert told(load(path).diagnostics) == [(2, 10, "no rule is called 'nothing-of-the-kind'")]
+    path.write_text("strict: true\n")
+    assert load(path).diagnostics == []
+
+
 def test_a_table_beside_a_file_is_not_read(tmp_path: Path) -> None:
     (tmp_path / "composer.yaml").write_text("# nothing yet\n")
     (tmp_path / "pyproject.toml").write_text("[tool.composer]\nstrict = true\n")
