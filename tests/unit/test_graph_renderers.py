@@ -103,9 +103,7 @@ def check(form: str, text: str) -> None:
             frames = re.findall(r"^ *subgraph ", text, re.MULTILINE)
             assert len(frames) == len(re.findall(r"^ *end$", text, re.MULTILINE))
         case "dot" if shutil.which("dot") is not None:
-            subprocess.run(
-                ["dot", "-Tcanon"], input=text, text=True, check=True, capture_output=True
-            )
+            subprocess.run(["dot", "-Tsvg"], input=text, text=True, check=True, capture_output=True)
 
 
 @pytest.mark.parametrize(

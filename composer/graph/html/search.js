@@ -45,8 +45,8 @@ function createSearch(currentPicture, goTo) {
   }
 
   function tell(asked) {
-    const number = position < 0 ? `${matches.length}` : `${position + 1} of ${matches.length}`;
-    output.textContent = asked ? `${number} found` : "";
+    const where = position < 0 ? `${matches.length} found` : `${position + 1} of ${matches.length}`;
+    output.textContent = asked ? where : "";
   }
 
   function clear() {

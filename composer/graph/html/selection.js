@@ -117,7 +117,7 @@ function listenToThings(picture, selection, viewport) {
   const things = [...picture.things.values()];
   for (const thing of things) {
     thing.element.setAttribute("role", "button");
-    thing.element.setAttribute("aria-label", `${labelOf(thing)}, ${thing.words.slice(1).join(", ")}`);
+    thing.element.setAttribute("aria-label", [labelOf(thing), ...thing.words.slice(1)].join(", "));
     thing.element.setAttribute("tabindex", "-1");
   }
   things[0]?.element.setAttribute("tabindex", "0");
@@ -137,7 +137,8 @@ function listenToThings(picture, selection, viewport) {
     event.preventDefault();
   });
 
-  picture.svg.addEventListener("focusin", (event) => {
+  // Not on the SVG itself: Chromium makes that focusable, then.
+  picture.view.addEventListener("focusin", (event) => {
     const thing = picture.things.get(event.target.dataset?.key);
     if (thing && thing.element.matches(":focus-visible")) viewport.reveal(thing.element, boxOf(thing));
   });

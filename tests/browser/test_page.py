@@ -1,0 +1,305 @@
+"""The HTML page, in a real browser: it works without a network, by pointer and by keyboard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from composer.graph import View, build_graph, scene_of
+from composer.graph.output import Engine, Format, render
+from composer.loading import load
+from composer.resources import systems_folder
+from tests.browser.conftest import Opened
+from tests.unit.fleets import fleet
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+Open = Callable[..., Opened]
+NODES = "[data-view=nodes]"
+PLANNER = "node:/planning/planner"
+
+
+def written(folder: Path, name: str = "pipeline") -> Path:
+    """Write the page of an example system, or of a made-up one (``fleet_30``)."""
+    if name.startswith("fleet_"):
+        system, findings = fleet(int(name.removeprefix("fleet_")))
+        scene = scene_of([system], findings)
+    else:
+        loading = load(systems_folder() / f"{name}.yaml")
+        assert loading.system is not None
+        scene = scene_of([loading.system], loading.diagnostics)
+    path = folder / f"{name}.html"
+    graphs = [build_graph(scene, view) for view in View]
+    path.write_bytes(render(graphs, Format.HTML, Engine.BUNDLED))
+    return path
+
+
+@pytest.fixture
+def page(open_file: Open, tmp_path: Path) -> Page:
+    return open_file(written(tmp_path)).page
+
+
+def thing(key: str, view: str = "nodes") -> str:
+    return f'[data-view={view}] [data-key="{key}"]'
+
+
+def scale(page: Page, view: str = "nodes") -> float:
+    found = page.get_attribute(f"[data-view={view}] .picture", "data-scale")
+    assert found is not None
+    return float(found)
+
+
+def visible_keys(page: Page, view: str = "nodes") -> set[str]:
+    script = """view => [...document.querySelectorAll(`[data-view=${view}] [data-key]`)]
+        .filter(element => element.getBoundingClientRect().width > 0)
+        .map(element => element.dataset.key)"""
+    return set(page.evaluate(script, view))
+
+
+@pytest.mark.parametrize("name", [path.stem for path in sorted(systems_folder().glob("*.yaml"))])
+def test_every_example_opens_in_every_view(name: str, open_file: Open, tmp_path: Path) -> None:
+    page = open_file(written(tmp_path, name)).page
+    for view in View:
+        page.click(f"#tab-{view}")
+        assert page.is_visible(f"#view-{view} .picture")
+        assert page.locator(".picture:visible").count() == 1
+
+
+def test_a_click_shows_ports_parameters_qos_and_the_source_line(page: Page) -> None:
+    assert page.is_hidden("#details")
+    page.click(thing(PLANNER))
+    text = page.inner_text("#details")
+    for expected in (
+        "/planning/planner",
+        "nav_msgs/msg/Odometry",
+        "best_effort",
+        "max_velocity",
+        "composer_interfaces/srv/PlanTrajectory",
+        "planner.yaml:",
+        "pipeline.yaml:",
+    ):
+        assert expected in text
+    page.click("#close")
+    assert page.is_hidden("#details")
+
+
+def test_a_click_on_a_line_shows_the_port_behind_it(page: Page) -> None:
+    line = page.locator(
+        f'{NODES} [data-label="publisher:/perception/sensor_simulator.sensor_data"]'
+    )
+    line.click()
+    assert "nav_msgs/msg/Odometry" in page.inner_text("#about")
+
+
+def test_neighbours_are_a_click_away_and_the_rest_is_dimmed(page: Page) -> None:
+    page.click(thing(PLANNER))
+    assert page.locator(f"{NODES} .near").count() > 0
+    page.click("#neighbors button:has-text('/sensor_data')")
+    assert page.inner_text("#about h2") == "/sensor_data"
+    far = page.locator(thing("action:/navigate"))
+    assert float(far.evaluate("element => getComputedStyle(element).opacity")) < 0.5
+
+
+def test_search_finds_names_and_what_is_known_and_goes_from_one_to_the_next(page: Page) -> None:
+    page.keyboard.press("/")
+    page.keyboard.type("odometry")
+    assert page.inner_text("#matches") == "4 found"  # the topic, and who publishes or hears it
+    page.keyboard.press("Enter")
+    assert page.inner_text("#matches") == "1 of 4"
+    assert page.inner_text("#about h2") == "/sensor_data"  # names come first
+    page.keyboard.press("Shift+Enter")
+    assert page.inner_text("#matches") == "4 of 4"
+    page.keyboard.press("Escape")
+    assert page.input_value("#search") == ""
+    assert page.inner_text("#matches") == ""
+    assert page.locator(".searching").count() == 0
+
+
+def test_search_for_what_is_not_there_says_so(page: Page) -> None:
+    page.fill("#search", "unicorn")
+    assert page.inner_text("#matches") == "0 found"
+
+
+def test_filter_by_namespace_keeps_what_its_nodes_are_joined_to(page: Page) -> None:
+    page.click(".filter summary")
+    page.uncheck("input[name=namespace][value='/control']")
+    page.uncheck("input[name=namespace][value='/perception']")
+    assert visible_keys(page) == {PLANNER, "topic:/sensor_data", "service:/plan_trajectory"}
+    page.click("#everything")
+    assert "node:/control/motor_controller" in visible_keys(page)
+
+
+def test_filter_by_kind_takes_the_lines_with_it(page: Page) -> None:
+    page.click(".filter summary")
+    page.uncheck("input[name=kind][value='topic']")
+    assert not any(key.startswith("topic:") for key in visible_keys(page))
+    assert page.locator(f"{NODES} path.edge.topic:visible").count() == 0
+    assert page.locator(f"{NODES} path.edge.service:visible").count() == 2
+    assert page.locator(".filter.active").count() == 1
+
+
+def test_filters_hold_in_all_views(page: Page) -> None:
+    page.click(".filter summary")
+    page.uncheck("input[name=namespace][value='/control']")
+    page.keyboard.press("Escape")
+    page.click("#tab-connections")
+    assert page.is_hidden(thing("node:/control/motor_controller", "connections"))
+    assert page.is_visible(thing(PLANNER, "connections"))
+
+
+def test_zoom_by_buttons_keys_and_wheel_and_back(page: Page) -> None:
+    first = scale(page)
+    page.click("[data-zoom=in]")
+    assert scale(page) > first
+    page.keyboard.press("-")
+    assert scale(page) == pytest.approx(first, rel=0.01)
+    page.hover(thing(PLANNER))
+    before = page.locator(thing(PLANNER)).bounding_box()
+    page.mouse.wheel(0, -400)
+    page.wait_for_function(f"document.querySelector('{NODES} .picture').dataset.scale > {first}")
+    after = page.locator(thing(PLANNER)).bounding_box()
+    assert before is not None
+    assert after is not None
+    assert after["width"] > before["width"]
+    assert after["x"] < before["x"] < after["x"] + after["width"]  # the pointer stays on it
+    page.keyboard.press("0")
+    assert scale(page) == pytest.approx(first, rel=0.01)
+
+
+def test_dragging_moves_the_picture_and_is_no_click(page: Page) -> None:
+    box = page.locator(thing(PLANNER)).bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 5, box["y"] + 5)
+    page.mouse.down()
+    page.mouse.move(box["x"] - 95, box["y"] + 65, steps=5)
+    page.mouse.up()
+    moved = page.locator(thing(PLANNER)).bounding_box()
+    assert moved is not None
+    assert moved["x"] - box["x"] == pytest.approx(-100, abs=6)
+    assert moved["y"] - box["y"] == pytest.approx(60, abs=6)
+    assert page.is_hidden("#details")
+
+
+def test_the_keyboard_reaches_everything(page: Page) -> None:
+    page.focus("#appearance")
+    page.keyboard.press("Tab")
+    assert focused(page) == "node:/perception/sensor_simulator"
+    page.keyboard.press("ArrowRight")
+    reached = focused(page)
+    assert reached != "node:/perception/sensor_simulator"
+    page.keyboard.press("Enter")
+    assert page.is_visible("#details")
+    assert reached.endswith(page.inner_text("#about h2"))
+    page.keyboard.press("Escape")
+    assert page.is_hidden("#details")
+    page.focus("#tab-nodes")
+    page.keyboard.press("ArrowRight")
+    assert page.is_visible("#view-connections")
+
+
+def focused(page: Page) -> str:
+    found = page.evaluate("document.activeElement.dataset.key ?? ''")
+    assert isinstance(found, str)
+    return found
+
+
+def test_everything_that_can_be_used_has_a_name_for_screen_readers(page: Page) -> None:
+    page.click(".filter summary")
+    nameless = page.evaluate("""() => [...document.querySelectorAll(
+            "button, input, summary, [role=button], [role=tabpanel], svg:not([aria-hidden])")]
+        .filter(element => !(element.getAttribute("aria-label") || element.textContent.trim()
+            || element.closest("label")?.textContent.trim()))
+        .map(element => element.outerHTML)""")
+    assert nameless == []
+    label = page.get_attribute(thing(PLANNER), "aria-label")
+    assert label is not None
+    assert label.startswith("node planner")
+
+
+def test_light_dark_and_as_the_system_says(open_file: Open, tmp_path: Path) -> None:
+    path = written(tmp_path)
+    light = background(open_file(path, color_scheme="light").page)
+    opened = open_file(path, color_scheme="dark").page
+    dark = background(opened)
+    assert light == "rgb(255, 255, 255)"
+    assert dark != light
+    opened.click("#appearance")
+    assert opened.inner_text("#appearance") == "Theme: light"
+    assert background(opened) == light
+    opened.click("#appearance")
+    assert background(opened) == dark
+
+
+def background(page: Page) -> str:
+    found = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert isinstance(found, str)
+    return found
+
+
+def test_print_has_the_whole_picture_on_white_and_everything_as_text(
+    open_file: Open, tmp_path: Path
+) -> None:
+    page = open_file(written(tmp_path), color_scheme="dark").page
+    page.click("[data-zoom=in]")
+    page.emulate_media(media="print")
+    assert background(page) == "rgb(255, 255, 255)"
+    assert page.is_hidden(".tools")
+    assert page.is_visible(".listing")
+    transform = page.evaluate(
+        f"getComputedStyle(document.querySelector('{NODES} .world')).transform"
+    )
+    assert transform == "none"
+    assert "max_velocity" in page.inner_text(".listing")
+    assert page.pdf(prefer_css_page_size=True).startswith(b"%PDF")
+
+
+def test_a_page_with_findings_tells_them(open_file: Open, tmp_path: Path) -> None:
+    source = tmp_path / "broken.yaml"
+    source.write_text("system: broken\nnodes:\n  one: {lifecycle: {depends_on: [two]}}\n")
+    loading = load(source)
+    assert loading.system is not None
+    graph = build_graph(scene_of([loading.system], loading.diagnostics))
+    path = tmp_path / "broken.html"
+    path.write_bytes(render([graph], Format.HTML, Engine.BUNDLED))
+    page = open_file(path).page
+    assert page.locator("[role=tab]").count() == 0
+    page.click(thing("node:/one"))
+    assert "depends on 'two'" in page.inner_text("#details .finding")
+
+
+@pytest.mark.parametrize("count", [3, 30, 300])
+def test_texts_stay_in_their_boxes_with_the_fonts_of_the_browser(
+    count: int, open_file: Open, tmp_path: Path
+) -> None:
+    page = open_file(written(tmp_path, f"fleet_{count}")).page
+    for view in View:
+        page.click(f"#tab-{view}")
+        outside = page.evaluate(
+            """view => [...document.querySelectorAll(`[data-view=${view}] [data-key]`)]
+            .filter(element => {
+                const shape = element.querySelector(".shape").getBBox();
+                return [...element.querySelectorAll("text")].some(text => {
+                    const box = text.getBBox();
+                    return box.x < shape.x - 0.5 || box.x + box.width > shape.x + shape.width + 0.5;
+                });
+            })
+            .map(element => element.dataset.key)""",
+            view,
+        )
+        assert outside == []
+
+
+def test_three_hundred_nodes_are_quick_to_use(open_file: Open, tmp_path: Path) -> None:
+    page = open_file(written(tmp_path, "fleet_300")).page
+    page.fill("#search", "controller_17")
+    page.press("#search", "Enter")
+    assert page.inner_text("#about h2") == "/area17/act/controller_17"
+    box = page.locator(thing("node:/area17/act/controller_17")).bounding_box()
+    assert box is not None
+    assert box["width"] > 40  # it was brought near, and into sight
+    assert 0 < box["x"] < 1280
+    assert 0 < box["y"] < 800

@@ -1,0 +1,31 @@
+"""SVG pictures, in a real browser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from composer.graph import View, build_graph, scene_of
+from composer.graph.output import Engine, Format, render
+from composer.loading import load
+from composer.resources import systems_folder
+from tests.browser.conftest import Opened
+
+
+@pytest.mark.parametrize("name", [path.stem for path in sorted(systems_folder().glob("*.yaml"))])
+def test_every_example_is_shown_and_asks_for_nothing(
+    name: str, open_file: Callable[..., Opened], tmp_path: Path
+) -> None:
+    loading = load(systems_folder() / f"{name}.yaml")
+    assert loading.system is not None
+    scene = scene_of([loading.system], loading.diagnostics)
+    for view in View:
+        path = tmp_path / f"{name}.{view}.svg"
+        path.write_bytes(render([build_graph(scene, view)], Format.SVG, Engine.BUNDLED))
+        page = open_file(path).page
+        assert page.evaluate("document.documentElement.tagName") == "svg"
+        drawn = page.evaluate("document.documentElement.width.baseVal.value")
+        size = page.evaluate("document.documentElement.getBoundingClientRect().width")
+        assert size == pytest.approx(drawn, abs=0.5)

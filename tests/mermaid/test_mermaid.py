@@ -1,0 +1,92 @@
+"""Mermaid's own parser reads every diagram as it was meant.
+
+Needs Node.js and ``npm ci --prefix tests/mermaid``; is skipped where they are missing.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from composer.graph import View, build_graph, mermaid, scene_of
+from composer.graph.picture import Graph
+from composer.loading import load
+from composer.resources import systems_folder
+from tests.unit.fleets import fleet_graph
+from tests.unit.test_graph_renderers import EVIL, evil_graph
+
+HERE = Path(__file__).parent
+SYSTEMS = sorted(systems_folder().glob("*.yaml"))
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("node") is None or not (HERE / "node_modules" / "mermaid").is_dir(),
+    reason="Mermaid is not installed: npm ci --prefix tests/mermaid",
+)
+
+
+def read(graphs: Sequence[Graph]) -> list[dict[str, Any]]:
+    """Return what Mermaid finds in the diagrams; one process reads them all."""
+    done = subprocess.run(
+        ["node", "read.mjs"],
+        cwd=HERE,
+        input=json.dumps([mermaid.render(graph) for graph in graphs]),
+        capture_output=True,
+        check=True,
+        text=True,
+    )
+    found: list[dict[str, Any]] = json.loads(done.stdout)
+    return found
+
+
+def plain(text: str) -> str:
+    """Return what is shown of a text: Mermaid writes codes as ``ﬂ°°35¶ß`` until it draws them."""
+    return html.unescape(re.sub(r"ﬂ°°(\d+)¶ß", r"&#\1;", text))
+
+
+def check(graph: Graph, found: dict[str, Any]) -> None:
+    assert "error" not in found, found
+    assert found["type"] == "flowchart-v2"
+    numbers = {vertex.key: f"v{number}" for number, vertex in enumerate(graph.vertices, 1)}
+    assert {numbers[vertex.key]: vertex.lines for vertex in graph.vertices} == {
+        name: tuple(map(plain, re.split("<br ?/?>", text)))
+        for name, text in found["vertices"].items()
+    }
+    assert [[numbers[edge.source], numbers[edge.target], edge.lines] for edge in graph.edges] == [
+        [begin, end, tuple(map(plain, re.split("<br ?/?>", text))) if text else ()]
+        for begin, end, text in found["edges"]
+    ]
+    drawn = {vertex.cluster for vertex in graph.vertices}
+    titles = {plain(title) for title in found["frames"]}
+    assert {cluster.label for cluster in graph.clusters if cluster.key in drawn} <= titles
+
+
+def test_every_example_system_in_every_view() -> None:
+    graphs = []
+    for path in SYSTEMS:
+        loading = load(path)
+        assert loading.system is not None
+        scene = scene_of([loading.system], loading.diagnostics)
+        graphs += [build_graph(scene, view) for view in View]
+    for graph, found in zip(graphs, read(graphs), strict=True):
+        check(graph, found)
+
+
+def test_thirty_nodes() -> None:
+    graphs = [fleet_graph(30, view) for view in View]
+    for graph, found in zip(graphs, read(graphs), strict=True):
+        check(graph, found)
+
+
+def test_texts_that_look_like_syntax() -> None:
+    graph = evil_graph()
+    (found,) = read([graph])
+    check(graph, found)
+    assert plain(found["vertices"]["v1"]).startswith(EVIL)
