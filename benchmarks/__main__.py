@@ -11,12 +11,13 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from benchmarks import pipeline, start_up, systems
+from benchmarks import pipeline, start_up, systems, validation
 from benchmarks.figures import Row, as_json, table
 
 RESULTS = Path(__file__).parent / "results"
 BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
     "commands": ("wall time of commands that start nothing", start_up.measure),
+    "validation": ("growth of compose validate with the size of a system", validation.measure),
     "pipeline": ("CPU of systems/pipeline.yaml", pipeline.measure),
     "chain": ("CPU per message, start-up and memory of N nodes", systems.chain),
     "timers": ("jitter of a timer", systems.timers),

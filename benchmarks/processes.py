@@ -7,6 +7,8 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -31,6 +33,20 @@ def environment() -> Mapping[str, str]:
         "ROS_DOMAIN_ID": str(next(_domain_ids)),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     }
+
+
+def wall_time_s(*arguments: str, folder: Path) -> float:
+    """Return how long this Python takes with ``arguments``. Raises CalledProcessError.
+
+    Bytecode is kept, as it is where people install programs, also in environments that forbid it.
+    """
+    compiled = str(Path(tempfile.gettempdir()) / "composer-benchmarks-bytecode")
+    variables = {**os.environ, "PYTHONPYCACHEPREFIX": compiled}
+    variables.pop("PYTHONDONTWRITEBYTECODE", None)
+    command = [sys.executable, *arguments]
+    start_s = time.perf_counter()
+    subprocess.run(command, cwd=folder, env=variables, check=True, capture_output=True)
+    return time.perf_counter() - start_s
 
 
 def run_program(name: str, *arguments: str, timeout_s: float) -> dict[str, Any]:

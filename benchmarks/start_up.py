@@ -7,13 +7,8 @@ the machine does meets all of them alike.
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import time
-from collections.abc import Sequence
-
 from benchmarks.figures import Row
-from benchmarks.processes import ROOT
+from benchmarks.processes import ROOT, wall_time_s
 
 BASELINE = "importing yaml, jsonschema, typer"
 COMMANDS = {
@@ -24,19 +19,13 @@ COMMANDS = {
 }
 
 
-def _wall_time_ms(arguments: Sequence[str]) -> float:
-    start = time.perf_counter()
-    subprocess.run([sys.executable, *arguments], cwd=ROOT, check=True, capture_output=True)
-    return (time.perf_counter() - start) * 1000
-
-
 def measure(*, long: bool) -> list[Row]:
     """Let the commands take turns. Raises CalledProcessError when one fails."""
     turns = 15 if long else 4
     times_ms: dict[str, list[float]] = {name: [] for name in COMMANDS}
     for _ in range(turns + 1):
         for name, arguments in COMMANDS.items():
-            times_ms[name].append(_wall_time_ms(arguments))
+            times_ms[name].append(wall_time_s(*arguments, folder=ROOT) * 1000)
     # The first turn reads everything from the disk, which is not what is asked for.
     counted = {name: tuple(times[1:]) for name, times in times_ms.items()}
     theirs = counted.pop(BASELINE)

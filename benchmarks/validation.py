@@ -2,19 +2,18 @@
 
 Two systems, one ten times as large as the other, are made of nodes of one type with three
 publishers and three subscriptions each, joined by connections. They are validated in turns in fresh
-processes, so that nothing is remembered from one to the next.
+processes, so that nothing is remembered from one to the next. Ten times the size may take ten times
+the time, and a little more for what does not stay in the caches.
 """
 
 from __future__ import annotations
 
-import statistics
-import subprocess
-import sys
 import tempfile
-import time
 from pathlib import Path
 
-TURNS = 5
+from benchmarks.figures import Row
+from benchmarks.processes import wall_time_s
+
 SIZES = (200, 2000)
 ENDS_PER_NODE = 3
 
@@ -52,38 +51,20 @@ def system(nodes: int) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _seconds(path: Path) -> float:
-    start = time.perf_counter()
-    command = [sys.executable, "-m", "composer", "validate", path.name]
-    subprocess.run(command, cwd=path.parent, check=True, capture_output=True)
-    return time.perf_counter() - start
-
-
-def measure(turns: int = TURNS) -> dict[int, float]:
-    """Return the median of the wall time in seconds, by the number of nodes."""
+def measure(*, long: bool) -> list[Row]:
+    """Let the two systems take turns, in fresh processes."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "nodes").mkdir()
         (folder / "nodes" / "worker.yaml").write_text(NODE_TYPE, encoding="utf-8")
-        paths = {size: folder / f"system_{size}.yaml" for size in SIZES}
-        for size, path in paths.items():
+        paths = [folder / f"system_{size}.yaml" for size in SIZES]
+        for size, path in zip(SIZES, paths, strict=True):
             path.write_text(system(size), encoding="utf-8")
-        times: dict[int, list[float]] = {size: [] for size in SIZES}
-        for _ in range(turns):
-            for size, path in paths.items():
-                times[size].append(_seconds(path))
-    return {size: statistics.median(seconds) for size, seconds in times.items()}
+        turns = [[_wall_time_s(path) for path in paths] for _ in range(10 if long else 3)]
+    small, large = (f"{size} nodes, {size * ENDS_PER_NODE} connections" for size in SIZES)
+    theirs, ours = zip(*turns, strict=True)
+    return [Row(f"compose validate, {large}", "wall s", small, ours, theirs)]
 
 
-def main() -> None:
-    seconds = measure()
-    print(f"Validation: median wall time of {TURNS} turns")
-    for size, median_s in seconds.items():
-        connections = size * ENDS_PER_NODE
-        print(f"  {size:>5} nodes {connections:>6} connections {median_s:>8.2f} s")
-    small, large = (seconds[size] for size in SIZES)
-    print(f"  ten times the size, {large / small:.1f} times the time")
-
-
-if __name__ == "__main__":
-    main()
+def _wall_time_s(path: Path) -> float:
+    return wall_time_s("-m", "composer", "validate", path.name, folder=path.parent)
