@@ -14,8 +14,8 @@ SMALL, LARGE = 100, 800
 STRING = "type: std_msgs/msg/String"
 NODES = f"  node_#: {{publishers: {{a: {{{STRING}}}}}, subscriptions: {{x: {{{STRING}}}}}}}\n"
 
-#: By name: parts of a file, each a heading and a line that is there once for each number; and a rule
-#: that finds something in it.
+#: By name: parts of a file, each a heading and a line that is there once for every number; and a
+#: rule that finds something in it.
 SYSTEMS: dict[str, tuple[list[tuple[str, str]], str]] = {
     "nothing much": (
         [
