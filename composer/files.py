@@ -65,11 +65,11 @@ class _Search:
     def look_below(self, folder: Path) -> None:
         project = Project.at(folder)
         for path in sorted(_yaml_files(folder)):
-            if path.name == SETTINGS_FILE:
-                continue  # not looked at, but kept to
+            if path.name == SETTINGS_FILE or not _is_regular(path):
+                continue  # settings are not looked at, but kept to
             if path.is_symlink() and not project.holds(path):
                 self.findings.append(_stray(path))
-            elif _is_regular(path):
+            else:
                 (self.files if _is_ours(path) else self.foreign)[path] = None
 
 
