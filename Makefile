@@ -21,7 +21,7 @@ ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION
 endif
 
-.PHONY: help run test check lint format bench fuzz clean
+.PHONY: help run test check lint format pictures bench fuzz clean
 .NOTPARALLEL:
 
 help:
@@ -29,6 +29,7 @@ help:
 	@echo "make test     run the tests"
 	@echo "make check    run what CI runs: lint, types, layers, tests"
 	@echo "make format   format the Python code"
+	@echo "make pictures draw the pictures of the documentation"
 	@echo "make bench    measure"
 	@echo "make fuzz     look for files that validate cannot take (FUZZ_SECONDS=$(FUZZ_SECONDS))"
 	@echo "make clean    remove everything that was built or installed here"
@@ -54,6 +55,9 @@ lint: $(STAMPS)/composer $(STAMPS)/checks
 format: $(STAMPS)/checks
 	@$(BIN)/ruff check --quiet --fix
 	@$(BIN)/ruff format
+
+pictures: $(STAMPS)/composer
+	@$(BIN)/python tools/draw_pictures.py
 
 bench: $(STAMPS)/composer $(STAMPS)/interfaces
 	@$(BIN)/python -m benchmarks

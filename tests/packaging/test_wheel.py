@@ -19,6 +19,8 @@ def test_the_wheel_carries_everything_and_no_litter(wheel: Path) -> None:
         "composer/share/nodes/planner.yaml",
         "composer/share/schemas/system.schema.json",
         "composer/share/systems/pipeline.yaml",
+        "composer/graph/html/main.js",
+        "composer/graph/html/page.css",
     ):
         assert path in names
     assert [name for name in names if name.endswith("/licenses/LICENSE")]

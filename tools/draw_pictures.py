@@ -1,0 +1,50 @@
+"""Draw the pictures of docs/pictures: systems of this repository, by the composer itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from composer.graph import View, build_graph, scene_of
+from composer.graph.output import Engine, Format, render
+from composer.loading import load
+
+ROOT = Path(__file__).parents[1]
+FOLDER = ROOT / "docs" / "pictures"
+
+#: What is drawn of which system.
+PICTURES = (
+    ("talker_listener", View.NODES),
+    ("pipeline", View.NODES),
+    ("pipeline", View.CONNECTIONS),
+    ("pipeline", View.LIFECYCLE),
+    ("pipeline", View.STATES),
+    ("executors", View.DEPLOYMENT),
+    ("trajectory_service", View.NODES),
+    ("navigation", View.NODES),
+    ("qos_patterns", View.CONNECTIONS),
+)
+
+
+def pictures() -> dict[str, bytes]:
+    """Return all pictures by the name of their file, the same on every machine."""
+    return {f"{system}-{view}.svg": _drawn(system, view) for system, view in PICTURES}
+
+
+def _drawn(name: str, view: View) -> bytes:
+    path = ROOT / "systems" / f"{name}.yaml"
+    loading = load(path, shown=f"systems/{name}.yaml")
+    if loading.system is None:
+        raise SystemExit(f"{path} cannot be drawn")
+    graph = build_graph(scene_of([loading.system], loading.diagnostics), view)
+    return render([graph], Format.SVG, Engine.BUNDLED)
+
+
+def main() -> None:
+    """Draw them anew."""
+    FOLDER.mkdir(exist_ok=True)
+    for name, drawn in pictures().items():
+        (FOLDER / name).write_bytes(drawn)
+
+
+if __name__ == "__main__":
+    main()
