@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import importlib.util
 import os
+import signal
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -25,6 +26,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="write what the golden tests get as what they expect; read the difference then",
     )
+
+
+def pytest_configure() -> None:
+    # What is started in the background of a script ignores SIGINT, and so would all that the
+    # tests start: nobody could see whether they end at Ctrl-C.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _may_skip() -> bool:

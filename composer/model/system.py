@@ -65,10 +65,11 @@ class Dependency:
 
 @dataclass(frozen=True, slots=True)
 class BehaviorReference:
-    """``module:Class``: Python beside the YAML file, or installed."""
+    """``module:Class``: Python beside the YAML file, of the project's node types, or installed."""
 
     text: Located[str]
     folder: Path  # where the YAML file that names it lives; looked in first
+    node_folders: tuple[Path, ...] = ()  # where the project's node types are; looked in next
 
     @property
     def module(self) -> str:

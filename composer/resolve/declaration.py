@@ -15,6 +15,7 @@ from composer.model import (
     Timer,
     UnknownKey,
 )
+from composer.project import Project
 from composer.resolve.parameters import declarations
 from composer.resolve.ports import ports, timers
 from composer.resolve.qos import QosTable
@@ -42,13 +43,17 @@ def declare(tree: Mapping, folder: Path, qos: QosTable, findings: list[Diagnosti
     behavior = text(tree.get("behavior"))
     return Declaration(
         description=plain_text(tree.get("description")),
-        behavior=BehaviorReference(behavior, folder) if behavior is not None else None,
+        behavior=_behavior(behavior, folder) if behavior is not None else None,
         parameters=declarations(tree.get("parameters")),
         ports=ports(tree, qos, findings),
         timers=timers(tree, findings),
         state=tuple((key(entry), plain(entry.value)) for entry in entries(tree.get("state"))),
         reactions=node_reactions(tree, findings),
     )
+
+
+def _behavior(reference: Located[str], folder: Path) -> BehaviorReference:
+    return BehaviorReference(reference, folder, Project.at(folder).node_folders)
 
 
 _REFINED_SECTIONS = (*(kind.section for kind in PortKind), "timers")

@@ -135,7 +135,10 @@ def keeps_goals(server: ActionServer) -> bool:
 async def forget_expired_goals(server: ActionServer) -> None:
     """Drop the goals that ended longer ago than the server's result timeout."""
     with server._lock:
-        expired = server._handle.expire_goals(len(server._goal_handles))
+        kept = len(server._goal_handles)
+        if not kept:  # rcl takes room for no goal as an error
+            return
+        expired = server._handle.expire_goals(kept)
     await server._execute_expire_goals(expired)
 
 

@@ -27,8 +27,9 @@ class BehaviorError(Exception):
 def behavior_class(reference: BehaviorReference) -> type[Any]:
     """Return the class that ``module:Class`` names.
 
-    A module beside the YAML file is looked for first, then an installed one. Raises BehaviorError
-    when there is no such module or class, and whatever importing the module raises.
+    A module beside the YAML file is looked for first, then one among the project's node types,
+    then an installed one. Raises BehaviorError when there is no such module or class, and whatever
+    importing the module raises.
     """
     module = _module(reference)
     found = getattr(module, reference.class_name, None)
@@ -46,14 +47,17 @@ def method(behavior: object | None, name: str) -> Method | None:
 
 
 def _module(reference: BehaviorReference) -> ModuleType:
-    path = reference.folder.joinpath(*reference.module.split(".")).with_suffix(".py")
-    if path.is_file():
-        return _module_of_file(path)
+    parts = reference.module.split(".")
+    for folder in (reference.folder, *reference.node_folders):
+        path = folder.joinpath(*parts).with_suffix(".py")
+        if path.is_file():
+            return _module_of_file(path)
     try:
         return importlib.import_module(reference.module)
     except ModuleNotFoundError as error:
         raise BehaviorError(
-            f"behavior '{reference.text}': there is neither a file {path} nor an installed module"
+            f"behavior '{reference.text}': there is no '{parts[-1]}.py' in {reference.folder} "
+            "or among the project's node types, and no such installed module"
         ) from error
 
 

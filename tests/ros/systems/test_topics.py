@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 from rclpy.qos import DurabilityPolicy, QoSPresetProfiles, QoSProfile
 from std_msgs.msg import String
@@ -69,3 +70,17 @@ def test_control_stays_on_one_thread_and_perception_uses_several(outsider: Outsi
             )
         )
     assert len({message.data for message in cycles}) == 1
+
+
+def test_an_inline_node_takes_its_behaviour_from_the_projects_node_types(tmp_path: Path) -> None:
+    """Where validate finds it, run finds it too."""
+    system = tmp_path / "systems" / "greeting.yaml"
+    behavior = tmp_path / "nodes" / "greeter.py"
+    system.parent.mkdir()
+    behavior.parent.mkdir()
+    system.write_text("system: greeting\nnodes:\n  hello: {behavior: 'greeter:Greeter'}\n", "utf-8")
+    behavior.write_text(
+        "class Greeter:\n    def on_activate(self):\n        self.log.info('good day')\n", "utf-8"
+    )
+    with RunningSystem(str(system)) as running:
+        running.wait_for(r"hello.*good day")
