@@ -11,6 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from composer.behavior_source.modules import Unreadable, read_text
+from composer.behavior_source.publishing import Publishing, publishing_of
 from composer.source import SourceFile, Span
 
 #: Columns are not counted exactly in a line that nobody can read: it costs its square.
@@ -25,7 +26,7 @@ class Method:
 
     ``arguments`` are the names that can be given by position, without ``self``; the last
     ``optional`` of them have defaults. ``known`` is false when a decorator or an assignment hides
-    the signature.
+    the signature. ``publishing`` is what it publishes to.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Method:
     keywords: tuple[str, ...] = ()  # keyword-only arguments without a default
     is_async: bool = False
     known: bool = True
+    publishing: Publishing = field(default_factory=Publishing)
 
     def accepts(self, count: int) -> bool:
         """Say whether it can be called with ``count`` arguments by position."""
@@ -194,6 +196,7 @@ def _method(node: Function, source: SourceFile) -> Method:
         ),
         is_async=isinstance(node, ast.AsyncFunctionDef),
         known=decorators <= _TRANSPARENT and bool(positional or static),
+        publishing=publishing_of(node),
     )
 
 

@@ -180,7 +180,7 @@ def _live(timeout_s: float, measure_s: float) -> Scene:
 
 def _drawn(scene: Scene, form: Format, view: View, layout: Layout, *, live: bool) -> bytes:
     from composer import graph as graphs
-    from composer.graph import output
+    from composer.graph import mermaid, output
     from composer.graph.graphviz import GraphvizFailed
     from composer.graph.png import PngMissing
 
@@ -188,6 +188,8 @@ def _drawn(scene: Scene, form: Format, view: View, layout: Layout, *, live: bool
     if form is Format.HTML:
         views = [each for each in View if not (live and each in _DECLARED_ONLY)]
     pictures = [graphs.build_graph(scene, graphs.View(each.value)) for each in views]
+    if form is Format.MERMAID and mermaid.is_too_large(pictures[0]):
+        say("Mermaid's viewers refuse a diagram of this size; FILE.html and FILE.svg have no limit")
     target = (output.Format(form.value), output.Engine(layout.value))
     try:
         return output.render(pictures, *target, shown=views.index(view))

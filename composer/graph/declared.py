@@ -9,7 +9,7 @@ from composer.drift.expected import states_after_bring_up
 from composer.graph.facts import node_facts, port_facts
 from composer.graph.findings import Findings
 from composer.graph.labels import qos_label
-from composer.graph.rates import publishing_rate_hz
+from composer.graph.rates import publishing_rates_hz
 from composer.graph.scene import Actor, End, ExecutorGroup, Scene, Wait
 from composer.model import Executor, ExecutorKind, Node, Port, System
 from composer.model.dependencies import dependency_edges
@@ -60,6 +60,7 @@ def scene_of(systems: Sequence[System], findings: Findings) -> Scene:
 def _actor(
     node: Node, system: System, brought_up: _BroughtUp, findings: Findings, several: bool
 ) -> Actor:
+    rates_hz = publishing_rates_hz(node)
     return Actor(
         name=node.name.value,
         full_name=node.full_name,
@@ -68,8 +69,8 @@ def _actor(
         state=brought_up.states[node.name.value],
         steps=brought_up.steps.get(node.name.value, ""),
         executor=_executor_key(system, _executor_name(node)),
-        ends=tuple(_end(node, port, findings) for port in node.ports),
-        details=node_facts(node),
+        ends=tuple(_end(port, rates_hz.get(port.name.value), findings) for port in node.ports),
+        details=node_facts(node, rates_hz),
         wrong=findings.about_node(node),
     )
 
@@ -86,15 +87,15 @@ def _note(node: Node, system: System, several: bool) -> str:
     return " · ".join(filter(None, (said, system.name.value if several else "")))
 
 
-def _end(node: Node, port: Port, findings: Findings) -> End:
+def _end(port: Port, rate_hz: float | None, findings: Findings) -> End:
     return End(
         kind=port.kind,
         name=port.name.value,
         channel=port.full_name,
         interface=port.interface.value,
         qos=qos_label(port.qos.profile) if port.qos.explicit else "",
-        rate_hz=publishing_rate_hz(node, port),
-        details=port_facts(node, port),
+        rate_hz=rate_hz,
+        details=port_facts(port, rate_hz),
         wrong=findings.about_port(port),
     )
 

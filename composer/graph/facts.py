@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from composer.graph.labels import qos_facts
 from composer.graph.picture import Details
-from composer.graph.rates import publishing_rate_hz, timer_rate_hz
+from composer.graph.rates import timer_rate_hz
 from composer.graph.scene import Channel, Meeting
-from composer.model import ChannelKind, Node, Port, PortKind
+from composer.model import ChannelKind, Node, Port
 from composer.tree import Plain
 
 _SOURCES = {
@@ -21,8 +23,11 @@ _SINKS = {
 }
 
 
-def node_facts(node: Node) -> Details:
-    """Return what is worth knowing about a node, down to its ports and parameters."""
+def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
+    """Return what is worth knowing about a node, down to its ports and parameters.
+
+    ``rates_hz`` is how often it publishes, by port, where that is known.
+    """
     facts: dict[str, Plain] = {
         "full_name": node.full_name,
         "type": node.type_name.value if node.type_name is not None else None,
@@ -33,7 +38,7 @@ def node_facts(node: Node) -> Details:
         "depends_on": [
             f"{dependency.node.value} ({dependency.state})" for dependency in node.depends_on
         ],
-        "ports": [dict(port_facts(node, port)) for port in node.ports],
+        "ports": [dict(port_facts(port, rates_hz.get(port.name.value))) for port in node.ports],
         "timers": [
             {"name": timer.name.value, "rate_hz": timer_rate_hz(node, timer)}
             for timer in node.timers
@@ -46,7 +51,7 @@ def node_facts(node: Node) -> Details:
     return _said(facts)
 
 
-def port_facts(node: Node, port: Port) -> Details:
+def port_facts(port: Port, rate_hz: float | None) -> Details:
     """Return what is worth knowing about a port."""
     facts: dict[str, Plain] = {
         "port": port.name.value,
@@ -57,10 +62,9 @@ def port_facts(node: Node, port: Port) -> Details:
         "qos_explicit": port.qos.explicit,
         "timeout_ms": port.timeout_ms.value if port.timeout_ms is not None else None,
         "description": port.description or None,
+        "rate_hz": rate_hz,
         "declared_at": str(port.span),
     }
-    if port.kind is PortKind.PUBLISHER:
-        facts["rate_hz"] = publishing_rate_hz(node, port)
     return _said(facts)
 
 

@@ -6,6 +6,10 @@ from collections.abc import Iterator
 
 from composer.graph.picture import Cluster, Edge, Graph, Kind, Line, Vertex
 
+#: What Mermaid draws at most unless its host allows more (``maxTextSize``, ``maxEdges``).
+MOST_CHARACTERS = 50_000
+MOST_EDGES = 500
+
 #: What stands around a label decides the shape.
 _SHAPES = {
     Kind.NODE: ("[", "]"),
@@ -39,6 +43,11 @@ _STYLES = (
 def render(graph: Graph) -> str:
     """Return the graph as Mermaid text with a newline at the end."""
     return "\n".join(_lines(graph)) + "\n"
+
+
+def is_too_large(graph: Graph) -> bool:
+    """Say whether viewers refuse to draw the diagram: Mermaid has limits of its own."""
+    return len(graph.edges) > MOST_EDGES or len(render(graph)) > MOST_CHARACTERS
 
 
 def _lines(graph: Graph) -> Iterator[str]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from composer.behavior_source import Method, find_behavior
 from composer.expressions import EvaluationError, Expression
-from composer.model import Node, Period, Port, Timer
+from composer.model import Node, Period, PortKind, Timer
 
 
 def timer_rate_hz(node: Node, timer: Timer) -> float | None:
@@ -14,19 +17,50 @@ def timer_rate_hz(node: Node, timer: Timer) -> float | None:
     return 1.0 / timer.period.seconds(value)
 
 
-def publishing_rate_hz(node: Node, port: Port) -> float | None:
-    """Return the rate of the one timer that publishes to ``port`` each time it fires.
+def publishing_rates_hz(node: Node) -> dict[str, float]:
+    """Return, by port, the rate of the one timer that publishes to it each time it fires.
 
-    None where a behaviour decides, where it depends on a condition, or where several do.
+    What a behaviour does is read from its text. Ports are left out where it depends on a
+    condition, or where several timers or anything else publish to them.
     """
-    rates = [
-        timer_rate_hz(node, timer)
-        for timer in node.timers
-        if timer.reaction is not None
-        and timer.reaction.when is None
-        and any(send.port.value == port.name.value for send in timer.reaction.publish)
-    ]
-    return rates[0] if len(rates) == 1 else None
+    handlers = _handlers(node)
+    rates: dict[str, float] = {}
+    for port in node.ports_of(PortKind.PUBLISHER):
+        name = port.name.value
+        timers = [timer for timer in node.timers if _always_publishes(timer, name, handlers)]
+        elsewhere = sum(name in method.publishing.somewhere for method in handlers.values())
+        by_handler = sum(timer.reaction is None for timer in timers)
+        if len(timers) != 1 or elsewhere != by_handler or _is_answered_with(node, name):
+            continue
+        hertz = timer_rate_hz(node, timers[0])
+        if hertz is not None:
+            rates[name] = hertz
+    return rates
+
+
+def _is_answered_with(node: Node, port: str) -> bool:
+    """Say whether something that comes in makes the node publish to the port."""
+    return any(
+        send.port.value == port
+        for other in node.ports
+        for _, reaction in other.reactions
+        for send in reaction.publish
+    )
+
+
+def _handlers(node: Node) -> dict[str, Method]:
+    if node.behavior is None:
+        return {}
+    return {method.name: method for method in find_behavior(node.behavior).methods}
+
+
+def _always_publishes(timer: Timer, port: str, handlers: Mapping[str, Method]) -> bool:
+    if timer.reaction is not None:
+        return timer.reaction.when is None and any(
+            send.port.value == port for send in timer.reaction.publish
+        )
+    handler = handlers.get(f"on_{timer.name.value}")
+    return handler is not None and port in handler.publishing.always
 
 
 def _number(node: Node, period: Period) -> float | None:

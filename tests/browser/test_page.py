@@ -303,3 +303,32 @@ def test_three_hundred_nodes_are_quick_to_use(open_file: Open, tmp_path: Path) -
     assert box["width"] > 40  # it was brought near, and into sight
     assert 0 < box["x"] < 1280
     assert 0 < box["y"] < 800
+
+
+def test_a_namespace_takes_those_in_it_along(open_file: Open, tmp_path: Path) -> None:
+    page = open_file(written(tmp_path, "fleet_30")).page
+    page.click(".filter summary")
+    page.uncheck("input[name=namespace][value='/']")
+    assert visible_keys(page) == set()
+    page.check("input[name=namespace][value='/area2']")
+    nodes = {key for key in visible_keys(page) if key.startswith("node:")}
+    assert len(nodes) == 7
+    assert all(key.startswith("node:/area2/") for key in nodes)
+
+
+@pytest.mark.parametrize("width", [600, 1280])
+def test_the_details_do_not_hide_what_they_are_about(
+    width: int, open_file: Open, tmp_path: Path
+) -> None:
+    page = open_file(written(tmp_path)).page
+    page.set_viewport_size({"width": width, "height": 900})
+    page.click(thing(PLANNER))
+    box, panel = (
+        page.locator(thing(PLANNER)).bounding_box(),
+        page.locator("#details").bounding_box(),
+    )
+    assert box is not None
+    assert panel is not None
+    beside = box["x"] + box["width"] <= panel["x"]
+    above = box["y"] + box["height"] <= panel["y"]
+    assert beside or above

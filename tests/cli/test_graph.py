@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.compose import compose
+from tests.unit.fleets import fleet_text
 
 
 def test_the_default_is_mermaid_of_the_nodes_on_stdout() -> None:
@@ -79,3 +80,34 @@ def test_an_unknown_system_lists_the_examples() -> None:
     assert done.code == 2
     assert "did you mean 'pipeline'?" in done.err
     assert "talker_listener" in done.err
+
+
+def test_several_systems_make_one_picture() -> None:
+    done = compose("graph", "minimal", "talker_listener", "-f", "json")
+    data = json.loads(done.out)
+    assert data["title"] == "minimal + talker_listener"
+    assert {"node:/talker", "node:/listener"} <= {vertex["key"] for vertex in data["vertices"]}
+
+
+def test_something_must_be_named_to_be_drawn() -> None:
+    for arguments in ([], ["pipeline", "--live"]):
+        done = compose("graph", *arguments)
+        assert (done.code, done.out) == (2, "")
+        assert "--live" in done.err
+
+
+def test_graphviz_that_is_asked_for_and_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "/nowhere")
+    done = compose("graph", "pipeline", "-f", "svg", "--layout", "graphviz")
+    assert (done.code, done.out) == (1, "")
+    assert "Graphviz is not installed" in done.err
+    assert "--layout bundled" in done.err
+    assert compose("graph", "pipeline", "-f", "svg").out.startswith("<svg ")
+
+
+def test_a_diagram_that_mermaid_would_refuse_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "large.yaml"
+    path.write_text(fleet_text(300))
+    done = compose("graph", str(path))
+    assert done.code == 0
+    assert "Mermaid's viewers refuse a diagram of this size" in done.err

@@ -19,7 +19,21 @@ function createFilter(pictures) {
     for (const picture of pictures) applyTo(picture, hidden);
   }
 
-  for (const choice of choices) choice.addEventListener("change", apply);
+  /** A namespace stands for all that are in it, too. */
+  function spread(changed) {
+    if (changed.name !== "namespace") return;
+    for (const choice of choices) {
+      const inside = choice.name === "namespace" && isWithin(choice.value, changed.value);
+      if (inside) choice.checked = changed.checked;
+    }
+  }
+
+  for (const choice of choices) {
+    choice.addEventListener("change", () => {
+      spread(choice);
+      apply();
+    });
+  }
   document.getElementById("everything").addEventListener("click", () => {
     for (const choice of choices) choice.checked = true;
     apply();
@@ -72,5 +86,5 @@ function isNode(thing) {
 }
 
 function isWithin(namespace, around) {
-  return namespace === around || namespace.startsWith(`${around}/`);
+  return namespace === around || namespace.startsWith(around === "/" ? around : `${around}/`);
 }

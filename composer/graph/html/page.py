@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -122,16 +123,37 @@ def _filters(graphs: Sequence[Graph]) -> Iterator[str]:
     yield "<fieldset><legend>Kind</legend>"
     yield from (_choice("kind", kind.value, f"{kind.value}s") for kind in _KINDS if kind in kinds)
     yield "</fieldset><fieldset><legend>Namespace</legend>"
-    yield from (_choice("namespace", name, name) for name in sorted(namespaces))
+    yield from (
+        _choice("namespace", name, name, depth=name.rstrip("/").count("/"))
+        for name in sorted(_with_ancestors(namespaces), key=_natural)
+    )
     yield "</fieldset>"
     yield '<button type="button" id="everything">Show everything</button></div></details>'
 
 
-def _choice(group: str, value: str, label: str) -> str:
+def _choice(group: str, value: str, label: str, depth: int = 0) -> str:
     return (
-        f'<label><input type="checkbox" name="{group}" value="{text(value)}" checked>'
-        f" {text(label)}</label>"
+        f'<label style="padding-left:{depth * 16}px"><input type="checkbox" name="{group}"'
+        f' value="{text(value)}" checked> {text(label)}</label>'
     )
+
+
+def _with_ancestors(namespaces: set[str]) -> set[str]:
+    """Return the namespaces and those they lie in; the root where there is more than one."""
+    found = set(namespaces)
+    for name in namespaces:
+        levels = name.split("/")
+        found.update("/".join(levels[:depth]) for depth in range(2, len(levels)))
+    return found | {"/"} if len(found) > 1 else found
+
+
+def _natural(name: str) -> list[tuple[str, int]]:
+    """Return what sorts ``/area2`` before ``/area10``."""
+    return [
+        (words, int(digits or 0))
+        for words, digits in re.findall(r"(\D*)(\d*)", name)
+        if words or digits
+    ]
 
 
 def _view(graph: Graph, layout: Layout, *, shown: bool) -> Iterator[str]:

@@ -72,7 +72,7 @@ function createSelection(currentPicture, viewportOf) {
     neighbors.append(title, ...things.map((thing) => {
       const button = document.createElement("button");
       button.type = "button";
-      button.textContent = labelOf(thing);
+      button.textContent = thing.kind === "port" ? `${thing.words[1]} ${nameIn(thing.key)}` : labelOf(thing);
       button.addEventListener("click", () => goTo(thing));
       return button;
     }));

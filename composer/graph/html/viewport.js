@@ -13,6 +13,7 @@ const LEAST_PIXELS_A_UNIT = 0.3;
 /** What is gone to is shown at least this big. */
 const READABLE_PIXELS_A_UNIT = 1.1;
 const DRAG_BEGINS_PIXELS = 4;
+const CLEARANCE_PIXELS = 24;
 
 function createViewport(picture) {
   const { svg, world } = picture;
@@ -88,10 +89,15 @@ function createViewport(picture) {
     if (!seen) center(box);
   }
 
-  /** Move the picture so that an element is not behind a panel on the right. */
+  /** Move the picture so that an element is not behind a panel on the right, or at the bottom. */
   function uncover(element, panel) {
-    const hidden = element.getBoundingClientRect().right + 24 - panel.getBoundingClientRect().left;
-    if (hidden > 0 && panel.clientWidth < svg.clientWidth) pan(-hidden / pixelsPerUnit(), 0);
+    const place = element.getBoundingClientRect();
+    const cover = panel.getBoundingClientRect();
+    const isBelow = cover.width > svg.clientWidth / 2;
+    const hidden = isBelow ? place.bottom - cover.top : place.right - cover.left;
+    if (hidden + CLEARANCE_PIXELS < 0) return;
+    const units = -(hidden + CLEARANCE_PIXELS) / pixelsPerUnit();
+    pan(isBelow ? 0 : units, isBelow ? units : 0);
   }
 
   listenToWheel(svg, zoomAt, pointAt);
