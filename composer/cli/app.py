@@ -15,6 +15,12 @@ from composer.cli.terminal import write
 #: Each is a module here: with a function of its name and an EPILOG, or with an ``app`` of its own.
 COMMANDS = (
     "run",
+    "ps",
+    "up",
+    "down",
+    "pause",
+    "resume",
+    "reset",
     "validate",
     "graph",
     "diff",

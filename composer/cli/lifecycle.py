@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.cli.failure import FINDINGS, Failure, UsageFailure
 from composer.cli.help import examples
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
-from composer.cli.terminal import columns, write
+from composer.cli.terminal import columns, say, write
 
 if TYPE_CHECKING:
     from composer.runtime.control import Control
@@ -26,6 +28,7 @@ app = typer.Typer(
         "compose lifecycle get planner",
         "compose lifecycle list planner",
         "compose lifecycle set planner deactivate",
+        "compose lifecycle set --system pipeline --to inactive",
     ),
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -39,6 +42,7 @@ NodeName = Annotated[
         show_default=False,
     ),
 ]
+_HOW = "for example: compose lifecycle set planner deactivate"
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 
 
@@ -87,28 +91,87 @@ def list_transitions(
         write("\n".join(item.label for item in transitions))
 
 
+class State(StrEnum):
+    """The primary states."""
+
+    UNCONFIGURED = "unconfigured"
+    INACTIVE = "inactive"
+    ACTIVE = "active"
+    FINALIZED = "finalized"
+
+
 @app.command(
     "set",
     epilog=examples(
-        "compose lifecycle set planner deactivate", "compose lifecycle set planner activate"
+        "compose lifecycle set planner deactivate",
+        "compose lifecycle set planner camera activate      one after the other",
+        "compose lifecycle set '/perception/*' deactivate   whatever matches",
+        "compose lifecycle set planner --to active          by the legal way, in several steps",
+        "compose lifecycle set --system pipeline --to inactive",
     ),
 )
 def set_state(
-    node: NodeName,
-    transition: Annotated[
-        str,
+    words: Annotated[
+        list[str] | None,
         typer.Argument(
-            metavar="TRANSITION",
-            help="configure, activate, deactivate, cleanup or shutdown.",
+            metavar="TARGET... TRANSITION",
+            help="Nodes (full names, last parts, patterns), then configure, activate, deactivate, "
+            "cleanup or shutdown; with --to no transition.",
             show_default=False,
         ),
-    ],
+    ] = None,
+    *,
+    to: Annotated[
+        State | None,
+        typer.Option(
+            "--to", metavar="STATE", help="Go there by the legal way.", show_default=False
+        ),
+    ] = None,
+    system: Annotated[
+        str | None,
+        typer.Option(
+            "--system",
+            metavar="SYSTEM",
+            help="All nodes of a running system, in order.",
+            show_default=False,
+        ),
+    ] = None,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Take a node through a transition.
+    """Take nodes through a transition, or to a state.
 
-    What is not possible in the node's state is refused with exit code 1 and never sent.
+    What is not possible in a node's state is refused with exit code 1 and never sent; the other
+    nodes are dealt with all the same. The nodes of a system go up in the order of its bring-up and
+    down in reverse.
     """
-    with _control(timeout) as control:
-        change = control.change(control.find(node), transition)
-    write(f"{change.node}: {change.before} -> {change.after}")
+    targets, transition = _split(list(words or ()), to, system)
+    with ros_session("compose lifecycle set", timeout) as (session, deadline):
+        from composer.runtime.lifecycle_set import Wish, change_each, nodes_of_system
+
+        wish = Wish(transition, None if to is None else to.value)
+        nodes = None if system is None else nodes_of_system(session, deadline, system, wish)
+        failed = False
+        for outcome in change_each(session, deadline, targets if nodes is None else nodes, wish):
+            if outcome.error is None:
+                write(str(outcome.change))
+            else:
+                failed = True
+                say(Failure(str(outcome.error), hint=outcome.error.hint).text())
+    if failed:
+        raise typer.Exit(FINDINGS)
+
+
+def _split(words: list[str], to: State | None, system: str | None) -> tuple[list[str], str | None]:
+    """Return targets and transition. Raises UsageFailure."""
+    transition = None
+    if to is None:
+        if not words:
+            raise UsageFailure("say which transition, or --to which state", hint=_HOW)
+        transition = words.pop()
+    if system is None and not words:
+        raise UsageFailure("say which nodes, or --system which system", hint=_HOW)
+    if system is not None and words:
+        raise UsageFailure(
+            f"'{words[0]}' and --system: name nodes or a system, not both", hint=_HOW
+        )
+    return words, transition

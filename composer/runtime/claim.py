@@ -19,14 +19,14 @@ from typing import TextIO
 from composer.runtime.environment import StartRefused
 
 _DEFAULT_DOMAIN = "0"
+_SUFFIX = ".lock"
 
 
 def refusal(name: str, host: str, pid: str | int) -> StartRefused:
     """Return why the system cannot be run. ``name`` is its manager's namespace."""
-    domain = os.environ.get("ROS_DOMAIN_ID") or _DEFAULT_DOMAIN
     system = name.rpartition("/")[2]
     return StartRefused(
-        f"system '{system}' runs already in ROS domain {domain}: host {host}, process {pid}",
+        f"system '{system}' runs already in ROS domain {_domain()}: host {host}, process {pid}",
         f"end it with 'compose down {system}', or run this one with another ROS_DOMAIN_ID or"
         " --namespace",
     )
@@ -56,14 +56,41 @@ def claimed(name: str) -> Iterator[None]:
         yield
 
 
+def claims() -> dict[str, str]:
+    """Return the systems that composers of this user run on this host and in this domain.
+
+    By name, with the process. Their nodes may take seconds to be discovered; this is known at once.
+    """
+    found: dict[str, str] = {}
+    prefix = f"{_domain()}."
+    for path in sorted(_folder().glob(f"{prefix}*{_SUFFIX}")):
+        name = "/" + path.name.removeprefix(prefix).removesuffix(_SUFFIX).replace(".", "/")
+        lock = _open(name)
+        if lock is None:
+            continue
+        with lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                found[name] = _holder(lock)[1]
+    return found
+
+
+def _domain() -> str:
+    return os.environ.get("ROS_DOMAIN_ID") or _DEFAULT_DOMAIN
+
+
+def _folder() -> Path:
+    parent = os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()
+    return Path(parent, f"ros2-composer-{os.getuid()}")
+
+
 def _open(name: str) -> TextIO | None:
     """Open the lock file of a system; None where there can be none: then there is no such right."""
     if os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "OFF":
         return None  # nobody sees anybody
-    domain = os.environ.get("ROS_DOMAIN_ID") or _DEFAULT_DOMAIN
-    parent = os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()
-    folder = Path(parent, f"ros2-composer-{os.getuid()}")
-    path = folder / f"{domain}{name.replace('/', '.')}.lock"
+    folder = _folder()
+    path = folder / f"{_domain()}{name.replace('/', '.')}{_SUFFIX}"
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
         if folder.stat().st_uid != os.getuid():

@@ -7,16 +7,27 @@ end the process of a hand-written rclpy node.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from typing import Any
 
 from lifecycle_msgs.msg import Transition as TransitionMessage
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 
-from composer.runtime.finding import find_node
+from composer.runtime.finding import find_node, not_there
 from composer.runtime.session import Deadline, NoAnswer, RosError, Session
 
+PRIMARY_STATES = ("unconfigured", "inactive", "active", "finalized")
+_PATTERN = re.compile(r"[*?\[]")
+#: By goal and state: the next transition on the way.
+_WAYS = {
+    "unconfigured": {"inactive": "cleanup", "active": "deactivate"},
+    "inactive": {"unconfigured": "configure", "active": "deactivate"},
+    "active": {"unconfigured": "configure", "inactive": "activate"},
+    "finalized": dict.fromkeys(("unconfigured", "inactive", "active"), "shutdown"),
+}
 _STATE_SERVICE = "/get_state"
 _STATE_TYPE = "lifecycle_msgs/srv/GetState"
 
@@ -42,6 +53,9 @@ class Change:
     before: str
     after: str
 
+    def __str__(self) -> str:
+        return f"{self.node}: {self.before} -> {self.after}"
+
 
 class Control:
     """Asks lifecycle nodes things, all within one time limit."""
@@ -52,11 +66,29 @@ class Control:
 
     def nodes(self) -> tuple[str, ...]:
         """Return the full names of all lifecycle nodes, once discovery stands still."""
-        return self._session.wait_until_still(self._known, self._deadline)
+        return self._session.wait_until_still(self.known, self._deadline)
 
     def find(self, name: str) -> str:
         """Return the full name of the node that ``name`` means. Raises NotThere."""
-        return find_node(self._session, self._deadline, name, self._known, "lifecycle node")
+        return find_node(self._session, self._deadline, name, self.known, "lifecycle node")
+
+    def select(self, targets: Iterable[str]) -> tuple[str, ...]:
+        """Return the full names of all nodes that are meant, each once, in the targets' order.
+
+        A target is what :meth:`find` takes, or a pattern: ``/planning/*``, ``*_driver``; without a
+        slash it is held against the last parts of the names. Raises NotThere.
+        """
+        found: dict[str, None] = {}
+        for target in targets:
+            if not _PATTERN.search(target):
+                found[self.find(target)] = None
+                continue
+            known = self.nodes()
+            matches = [name for name in known if _matches(name, target)]
+            if not matches:
+                raise not_there("lifecycle node like", target, known)
+            found.update(dict.fromkeys(matches))
+        return tuple(found)
 
     def state(self, node: str) -> str:
         """Return the label of the node's state. Raises NoAnswer."""
@@ -91,7 +123,7 @@ class Control:
         wanted = next((transition for transition in legal if transition.label == label), None)
         if wanted is None:
             raise TransitionRefused(
-                f"'{label}' is not possible: {node} is {before}", _possible(legal)
+                f"'{label}' is not possible: {node} is {before}", _possible(before, legal)
             )
         # With the label, a state that has changed since is a refusal and not a fault in the node.
         message = TransitionMessage(id=wanted.id, label=wanted.label)
@@ -104,7 +136,27 @@ class Control:
             )
         return Change(node, before, after)
 
-    def _known(self) -> tuple[str, ...]:
+    def take(self, node: str, goal: str) -> Change:
+        """Take the node to a primary state by the legal way, which may be none or several steps.
+
+        Raises TransitionRefused where there is no way or a step is refused; NoAnswer.
+        """
+        before = state = self.state(node)
+        while state != goal:
+            label = _WAYS.get(goal, {}).get(state)
+            if label is None:
+                raise TransitionRefused(
+                    f"there is no way to '{goal}': {node} is {state}",
+                    _possible(state, self.transitions(node)),
+                )
+            reached = self.change(node, label).after
+            if reached == state:
+                raise TransitionRefused(f"{node} stays {state}: '{label}' led nowhere")
+            state = reached
+        return Change(node, before, state)
+
+    def known(self) -> tuple[str, ...]:
+        """Return the full names of the lifecycle nodes that are known now."""
         services = self._session.node.get_service_names_and_types()
         return tuple(
             sorted(
@@ -124,6 +176,12 @@ class Control:
             ) from error
 
 
-def _possible(legal: tuple[Transition, ...]) -> str:
+def _matches(node: str, pattern: str) -> bool:
+    return fnmatchcase(node if "/" in pattern else node.rpartition("/")[2], pattern)
+
+
+def _possible(state: str, legal: tuple[Transition, ...]) -> str:
+    if state not in PRIMARY_STATES:
+        return "it is in mid-transition: wait, or see its log for what it hangs in"
     names = ", ".join(dict.fromkeys(transition.label for transition in legal))
     return f"possible now: {names or 'nothing, this state is final'}"

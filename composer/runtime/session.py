@@ -71,14 +71,21 @@ class Session:
         for _ in range(_JOINS - 1):
             if self.wait_for(lambda: self.others() or None, Deadline(_MEET_WITHIN_S)):
                 break
-            self._leave()
-            self._join()
+            self.rejoin()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._leave()
+
+    def rejoin(self) -> None:
+        """Leave and join anew: another throw of the coin whether others are met at once.
+
+        Whatever was made with ``node`` is gone.
+        """
+        self._leave()
+        self._join()
 
     def _join(self) -> None:
         self._context = Context()

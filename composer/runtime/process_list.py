@@ -1,0 +1,47 @@
+"""What runs: systems as their managers tell, and lifecycle nodes that no composer runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from composer.runtime.claim import claims
+from composer.runtime.control import Control
+from composer.runtime.session import Deadline, Session
+from composer.runtime.systems import SystemReport, Systems
+
+#: Managers tell at once and again each second; who has not answered by then is said to be silent.
+_PATIENCE_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessList:
+    """Systems by the namespaces of their managers, and the states of other lifecycle nodes.
+
+    None stands for who did not answer.
+    """
+
+    systems: dict[str, SystemReport | None]
+    others: dict[str, str | None] = field(default_factory=dict)
+
+
+def list_processes(session: Session, deadline: Deadline) -> ProcessList:
+    """Return everything there is, once discovery stands still."""
+    systems = Systems(session, deadline)
+    control = Control(session, deadline)
+    names, nodes = session.wait_until_still(lambda: (systems.look(), control.known()), deadline)
+    reports = systems.reports(sorted({*names, *claims()}), _patience(deadline))
+    managed = {node.node for report in reports.values() if report for node in report.nodes}
+    others = [node for node in nodes if node not in managed]
+    patient = Control(session, _patience(deadline))
+    return ProcessList(reports, patient.states(others) if others else {})
+
+
+def list_one(session: Session, deadline: Deadline, name: str) -> ProcessList:
+    """Return one system. Raises NotThere and NoAnswer."""
+    systems = Systems(session, deadline)
+    found = systems.find(name)
+    return ProcessList({found: systems.report(found)})
+
+
+def _patience(deadline: Deadline) -> Deadline:
+    return Deadline(min(_PATIENCE_S, deadline.left_s))

@@ -1,0 +1,197 @@
+"""Running systems, asked from another process by way of their manager nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.subscription import Subscription
+from std_srvs.srv import Trigger
+
+from composer.runtime.claim import claims
+from composer.runtime.finding import NotThere, not_there
+from composer.runtime.manager import IS_ACTIVE, NAME, STATE_QOS, STATE_TOPIC
+from composer.runtime.session import MISSING_S, QUIET_S, Deadline, NoAnswer, Session
+
+_TRIGGER_TYPE = "std_srvs/srv/Trigger"
+_SERVICE = f"/{NAME}/{IS_ACTIVE}"
+#: Who was not met by then is often met at once by a participant that joins anew.
+_TURN_S = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class NodeReport:
+    """A node as its system's manager tells of it. ``since_s`` is in seconds since 1970."""
+
+    node: str
+    state: str
+    wanted: str
+    since_s: float
+    restarts: int
+    errors: int
+    last_error: str
+    held_down: str
+    sent_hz: float
+    received_hz: float
+
+
+@dataclass(frozen=True, slots=True)
+class SystemReport:
+    """A system as its manager tells of it. ``name`` is the namespace of that."""
+
+    name: str
+    activity: str
+    message: str
+    host: str
+    pid: str
+    nodes: tuple[NodeReport, ...]
+
+
+class Systems:
+    """Asks managers, all within one time limit."""
+
+    def __init__(self, session: Session, deadline: Deadline) -> None:
+        self._session = session
+        self._deadline = deadline
+        self._heard: dict[str, DiagnosticArray] = {}
+        self._subscriptions: dict[str, Subscription] = {}
+
+    def look(self) -> tuple[str, ...]:
+        """Return the names of all systems known now, and listen for what they tell.
+
+        The name is the namespace of the manager: ``/pipeline``, ``/robot1/pipeline``.
+        """
+        found = tuple(
+            sorted(
+                name.removesuffix(_SERVICE)
+                for name, types in self._session.node.get_service_names_and_types()
+                if name.endswith(_SERVICE) and _TRIGGER_TYPE in types
+            )
+        )
+        for name in found:
+            self._listen(name)
+        return found
+
+    def find(self, name: str) -> str:
+        """Return the full name of the running system that ``name`` means. Raises NotThere."""
+        here = _called(name, claims())
+        if not here:
+            patience = Deadline(min(QUIET_S, self._deadline.left_s))
+            found = self._session.wait_for(lambda: _called(name, self.look()) or None, patience)
+            absolute = f"/{name.strip('/')}"
+            if found is not None and absolute in found:
+                return absolute
+            known = self._session.wait_until_still(self.look, self._deadline)
+            here = _called(name, known)
+        if not here:
+            error = not_there("running system", name, (*claims(), *known))
+            start = f"start it with 'compose run {name.strip('/')}'"
+            raise NotThere(str(error), error.hint if known else start)
+        if len(here) > 1:
+            raise NotThere(f"'{name}' is more than one system", f"say which: {', '.join(here)}")
+        return here[0]
+
+    def report(self, name: str) -> SystemReport:
+        """Return what the manager of a system tells. Raises NoAnswer."""
+        found = self.reports([name], self._deadline)[name]
+        if found is None:
+            raise self._silent(name)
+        return found
+
+    def reports(self, names: Iterable[str], patience: Deadline) -> dict[str, SystemReport | None]:
+        """Return what the managers tell until then; None for one that tells nothing."""
+        wanted = tuple(names)
+        self._meet(wanted, patience, lambda name: name in self._heard)
+        return {
+            name: _report(name, self._heard[name]) if name in self._heard else None
+            for name in wanted
+        }
+
+    def command(self, name: str, what: str) -> tuple[bool, str]:
+        """Have a system do something, and return whether it did and what it says. Raises NoAnswer.
+
+        ``what`` is one of the services of :class:`composer.runtime.manager.Manager`.
+        """
+        meeting = Deadline(min(MISSING_S, self._deadline.left_s))
+        if not self._meet((name,), meeting, lambda name: name in self.look()):
+            raise self._silent(name)
+        service = f"{name}/{NAME}/{what}"
+        try:
+            answer = self._session.call(Trigger, service, Trigger.Request(), self._deadline)
+        except NoAnswer as error:
+            raise NoAnswer(
+                f"{name} did not {what} within {self._deadline.timeout_s:g} s",
+                "it may still be at it: 'compose ps' tells. --timeout waits longer",
+            ) from error
+        return bool(answer.success), str(answer.message)
+
+    def _meet(
+        self, names: tuple[str, ...], patience: Deadline, is_met: Callable[[str], bool]
+    ) -> bool:
+        """Wait until all managers are met; where that takes too long, join the graph anew."""
+        while True:
+            for name in names:
+                self._listen(name)
+            turn = Deadline(min(_TURN_S, patience.left_s))
+            if self._session.wait_for(lambda: all(map(is_met, names)) or None, turn):
+                return True
+            if patience.passed:
+                return False
+            self._subscriptions.clear()
+            self._session.rejoin()
+
+    def _silent(self, name: str) -> NoAnswer:
+        pid = claims().get(name)
+        where = "its process may be busy or gone" if pid is None else f"its process is {pid}"
+        return NoAnswer(
+            f"{name}/{NAME} did not answer within {self._deadline.timeout_s:g} s",
+            f"{where}. --timeout gives it longer",
+        )
+
+    def _listen(self, name: str) -> None:
+        if name not in self._subscriptions:
+            self._subscriptions[name] = self._session.node.create_subscription(
+                DiagnosticArray,
+                f"{name}/{NAME}/{STATE_TOPIC}",
+                lambda message: self._heard.__setitem__(name, message),
+                STATE_QOS,
+            )
+
+
+def _called(name: str, systems: Iterable[str]) -> list[str]:
+    """Return the systems that ``name`` may mean."""
+    return [system for system in systems if system == name or system.endswith(f"/{name}")]
+
+
+def _report(name: str, message: DiagnosticArray) -> SystemReport:
+    system, *nodes = message.status
+    values = _values(system)
+    return SystemReport(
+        name=name,
+        activity=values["activity"],
+        message=str(system.message),
+        host=values["host"],
+        pid=values["pid"],
+        nodes=tuple(map(_node_report, nodes)),
+    )
+
+
+def _node_report(status: DiagnosticStatus) -> NodeReport:
+    values = _values(status)
+    return NodeReport(
+        node=str(status.name).partition(": ")[2],
+        state=values["state"],
+        wanted=values["wanted"],
+        since_s=float(values["since"]),
+        restarts=int(values["restarts"]),
+        errors=int(values["errors"]),
+        last_error=values["last_error"],
+        held_down=values["held_down"],
+        sent_hz=float(values["sent_hz"]),
+        received_hz=float(values["received_hz"]),
+    )
+
+
+def _values(status: DiagnosticStatus) -> dict[str, str]:
+    return {item.key: item.value for item in status.values}
