@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from composer.model import Port
+from composer.runtime.budget import within_budget
 from composer.runtime.core import Core
 from composer.runtime.line import Line
 from composer.runtime.log import describe
@@ -57,7 +58,12 @@ class ServicePort:
         self._handler = handler
         self._open: set[Request] = set()
         # Whoever asks waits for an answer and gives up in time, so none is pushed out.
-        self._line = Line(core, self._work, depth=None, reentrant=port.reentrant)
+        self._line = Line(
+            core,
+            within_budget(core, f"service '{self._name}'", port.budget_ms, self._work),
+            depth=None,
+            reentrant=port.reentrant,
+        )
         self._service = core.node.create_service(
             self._type,
             port.full_name,

@@ -8,6 +8,7 @@ from typing import Any
 
 from composer.model import Port
 from composer.qos import Durability, History, QosProfile
+from composer.runtime.budget import within_budget
 from composer.runtime.core import Core
 from composer.runtime.line import Line
 from composer.runtime.messages import interface_class
@@ -37,7 +38,12 @@ class SubscriptionPort:
         self._reaction = reaction
         self._handler = handler
         depth = queue_depth(port.qos.profile)
-        self._line = Line(core, self._work, depth=depth, reentrant=port.reentrant)
+        self._line = Line(
+            core,
+            within_budget(core, f"subscription '{self._name}'", port.budget_ms, self._work),
+            depth=depth,
+            reentrant=port.reentrant,
+        )
         self._latched: deque[Any] | None = None
         if port.qos.profile.durability is Durability.TRANSIENT_LOCAL:
             self._latched = deque(maxlen=depth)

@@ -9,6 +9,7 @@ from typing import Any
 from composer.expressions import EvaluationError, Expression
 from composer.model import Period
 from composer.model import Timer as TimerModel
+from composer.runtime.budget import within_budget
 from composer.runtime.core import Core
 from composer.runtime.line import Line
 from composer.runtime.loop import Timer
@@ -54,7 +55,12 @@ class TimerPort:
         self._period_s = period_s(timer.period, core.names["parameters"])
         self._reaction = reaction
         self._handler = handler
-        self._line = Line(core, self._work, depth=0, reentrant=timer.reentrant)
+        self._line = Line(
+            core,
+            within_budget(core, f"timer '{self._name}'", timer.budget_ms, self._work),
+            depth=0,
+            reentrant=timer.reentrant,
+        )
         self._timer: Timer | None = None
 
     def follow_parameters(self) -> None:
