@@ -39,6 +39,7 @@ from composer.behavior import Behavior
 
 class Power(Behavior):
     async def on_ask(self, request, response):
+        self.log.info("asked")
         await self.clock.sleep(self.parameters.pause_s)
         response.success = True
         return response
@@ -87,8 +88,9 @@ def test_what_waits_in_a_port_that_is_always_on_ends_with_the_cleanup(
     tmp_path: Path, peer: Peer
 ) -> None:
     text = POWER.replace("KIND", "events").replace("pause_s: 0.01", "pause_s: 60.0")
-    with running(text, tmp_path, autostart=PrimaryState.INACTIVE, power=MODULE):
+    with running(text, tmp_path, autostart=PrimaryState.INACTIVE, power=MODULE) as system:
         answer = peer.client(Trigger, "/ask").call_async(Trigger.Request())
+        system.wait_for_log("asked")  # what begins while the node is active ends with that
         assert peer.change("/power", "activate")
         assert peer.change("/power", "deactivate")
         assert not answer.done()
