@@ -186,3 +186,18 @@ def _way_back(came_from: Mapping[str, str], start: str, last: str) -> tuple[str,
     while way[-1] != start:
         way.append(came_from[way[-1]])
     return tuple(reversed(way))
+
+
+def dependents(system: System, node: str) -> frozenset[str]:
+    """Return the keys of the nodes that need ``node``, directly or through others."""
+    needed_by: dict[str, list[str]] = {}
+    for edge in dependency_edges(system):
+        needed_by.setdefault(edge.on, []).append(edge.node)
+    found: set[str] = set()
+    open_ends = [node]
+    while open_ends:
+        for name in needed_by.get(open_ends.pop(), ()):
+            if name not in found:
+                found.add(name)
+                open_ends.append(name)
+    return frozenset(found - {node})

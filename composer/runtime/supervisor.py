@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from composer.model import OnFailure, PrimaryState, System
+from composer.model.dependencies import dependents
 from composer.plan import (
     Fault,
     FaultKind,
@@ -113,7 +114,12 @@ class Supervisor:
 
     def mend(self, why: str) -> tuple[StepFailed, ...]:
         """Take every node to where it is wanted now; failures on the way become faults."""
-        plan = mend(self._system, self._upkeep, self._crew.states(), why)
+        return self._reach(self._upkeep, self._crew.states(), why)
+
+    def _reach(
+        self, upkeep: Upkeep, states: Mapping[str, PrimaryState], why: str
+    ) -> tuple[StepFailed, ...]:
+        plan = mend(self._system, upkeep, states, why)
         failures = self._conductor.carry_out(plan, _LENIENT)
         for failure in failures:
             if failure.step.node not in self._upkeep.down:
@@ -187,10 +193,18 @@ class Supervisor:
             heapq.heappush(self._due, (due_s, fault.node, verdict.attempt))
 
     def take_move(self, moved: Moved) -> None:
-        """Accept that somebody outside wants a node elsewhere."""
+        """Accept that somebody outside wants a node elsewhere.
+
+        Moved because of that is only what needs the node: of others, news may be on its way, too.
+        """
+        if self._crew.nodes[moved.node].state != moved.state:
+            return  # it has gone on since, and that is news of its own
+        states = self._crew.states()
         state = _PRIMARY.get(moved.state, PrimaryState.UNCONFIGURED)
         self._upkeep = self._upkeep.release(moved.node).want({moved.node: state})
-        self.mend(f"{moved.node} was moved by hand")
+        needing = dependents(self._system, moved.node)
+        still = {name: at for name, at in states.items() if name not in needing}
+        self._reach(self._upkeep.want(still), states, f"{moved.node} was moved by hand")
 
     def take_hanging(self, hanging: Hanging) -> None:
         """Tell of a callback that takes too long, and is being interrupted."""
