@@ -175,7 +175,8 @@ def _live(timeout_s: float, measure_s: float) -> Scene:
         from composer.runtime.snapshot import Observer
 
         with Observer(session) as observer:
-            return live_scene_of(observer.look(deadline), observer.rates(deadline, measure_s))
+            snapshot = observer.look(deadline)
+            return live_scene_of(snapshot, observer.rates(deadline, measure_s))
 
 
 def _drawn(scene: Scene, form: Format, view: View, layout: Layout, *, live: bool) -> bytes:
