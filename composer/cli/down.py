@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from composer.cli.help import examples
-from composer.cli.ros import Timeout
-from composer.cli.system_commands import DEFAULT_TIMEOUT_S, command_system
-from composer.cli.system_name import RunningSystem
+from composer.cli.ros import Timeout, ros_session
+from composer.cli.system_commands import DEFAULT_TIMEOUT_S
+from composer.cli.system_name import RunningSystem, name_of_system
+from composer.cli.terminal import write
 
 EPILOG = examples(
     "compose down pipeline",
@@ -16,4 +17,11 @@ EPILOG = examples(
 
 def down(system: RunningSystem, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
     """End a running system: every node is taken down in reverse, and its process ends."""
-    command_system("down", "shutdown", system, timeout)
+    name = name_of_system(system)
+    with ros_session("compose down", timeout) as (session, deadline):
+        from composer.runtime.systems import Systems
+
+        systems = Systems(session, deadline)
+        found = systems.find(name)
+        message = systems.end(found)
+    write(f"{found}: {message}")

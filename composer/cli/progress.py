@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TextIO
 
+from composer.cli.background import tell_ready
 from composer.cli.terminal import columns, use_color
 from composer.runtime.events import (
     BroughtUp,
@@ -36,6 +37,8 @@ class Progress:
         """Print the event."""
         if isinstance(event, Fault):
             return
+        if isinstance(event, BroughtUp):
+            tell_ready(str(event))
         line = f"[{event.elapsed_s:.3f}] [{_severity(event)}] [compose] {event}"
         if isinstance(event, Logged):
             line = str(event)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from enum import StrEnum
@@ -29,6 +30,7 @@ EPILOG = examples(
     "compose run pipeline --set planner.max_velocity=0.5   another parameter value",
     "compose run pipeline --namespace /robot1",
     "compose run pipeline --autostart inactive             then: compose lifecycle set ...",
+    "compose run pipeline --wait --timeout 10              in the background, once it is up",
 )
 
 
@@ -89,11 +91,31 @@ def run(
         typer.Option(help="How far to bring the nodes up.", show_default="as the file says"),
     ] = None,
     log_level: Annotated[Level, typer.Option(help="What nodes log.")] = Level.INFO,
+    wait: Annotated[
+        bool,
+        typer.Option("--wait", help="Run in the background, and return once the system is up."),
+    ] = False,
+    timeout: Annotated[
+        float | None,
+        typer.Option(
+            "--timeout",
+            metavar="SECONDS",
+            min=0.0,
+            help="Take the system down again if it is not up by then.",
+            show_default="none",
+        ),
+    ] = None,
+    grace: Annotated[
+        float,
+        typer.Option(
+            "--grace", metavar="SECONDS", min=0.0, help="How long the end may take at the most."
+        ),
+    ] = 10.0,
 ) -> None:
     """Run a system: all nodes in this process, up in dependency order, down in reverse.
 
-    Ctrl-C stops it. Exit code 1 when the system has errors (nothing is started then) or a node
-    failed.
+    Ctrl-C stops it. Exit code 1 when the system has errors (nothing is started then), when it does
+    not come up (what was started is taken back then), or a node failed for good.
     """
     declared = _load(system, settings or [], namespace)
     from composer.model import PrimaryState
@@ -105,7 +127,14 @@ def run(
             write(str(plan))
         return
     require_ros("compose run")
-    outcome = _run(declared, plan, run_for, log_level)
+    if wait:
+        from composer.cli.background import run_in_background
+
+        given = _arguments(system, settings or [], namespace, autostart, log_level)
+        limits = _numbers({"--for": run_for, "--timeout": timeout, "--grace": grace})
+        write(run_in_background(declared.name.value, [*given, *limits]))
+        return
+    outcome = _run(declared, plan, _options(run_for, timeout, grace, log_level))
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
 
@@ -123,14 +152,37 @@ def _load(text: str, settings: list[str], namespace: str | None) -> System:
     return loading.system
 
 
-def _run(system: System, plan: Plan, run_for: float | None, level: Level) -> Outcome:
+def _arguments(
+    system: str,
+    settings: list[str],
+    namespace: str | None,
+    autostart: Autostart | None,
+    level: Level,
+) -> list[str]:
+    """Return the command line that says the same once more."""
+    arguments = [system, "--log-level", level.value]
+    for setting in settings:
+        arguments += ["--set", setting]
+    if namespace is not None:
+        arguments += ["--namespace", namespace]
+    if autostart is not None:
+        arguments += ["--autostart", autostart.value]
+    return arguments
+
+
+def _numbers(options: dict[str, float | None]) -> list[str]:
+    given = {name: value for name, value in options.items() if value is not None}
+    return [text for name, value in given.items() for text in (name, repr(value))]
+
+
+def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
     from composer.cli.progress import Progress, summary
     from composer.plan import tear_down
     from composer.runtime.environment import StartRefused
     from composer.runtime.host import Host
 
     progress = Progress(sys.stderr)
-    host = Host(system, plan, tear_down(system), _options(run_for, level), progress.show)
+    host = Host(system, plan, tear_down(system), options, progress.show)
     try:
         outcome = host.run()
     except StartRefused as refusal:
@@ -141,12 +193,16 @@ def _run(system: System, plan: Plan, run_for: float | None, level: Level) -> Out
     return outcome
 
 
-def _options(run_for: float | None, level: Level) -> HostOptions:
+def _options(
+    run_for: float | None, timeout: float | None, grace: float, level: Level
+) -> HostOptions:
     from composer.model import LogLevel
     from composer.runtime.host import HostOptions
 
     return HostOptions(
         run_for_s=run_for,
+        bring_up_within_s=math.inf if timeout is None else timeout,
+        grace_s=grace,
         log_level=LogLevel(level.value),
         hard_exit=lambda: _end_hard(FINDINGS),
     )

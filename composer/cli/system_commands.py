@@ -28,5 +28,5 @@ def command_system(command: str, service: str, text: str, timeout_s: float) -> N
     write(f"{found}: {message}")
 
 
-_VERBS = {"up": "come up", "down": "go down"}
+_VERBS = {"up": "come up"}
 _HINT = "its log says more; 'compose ps' shows every node"

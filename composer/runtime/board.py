@@ -125,6 +125,12 @@ class Board:
         """Say that a node has come to rest in a state."""
         self._change(name, state=state, since_s=time.time())
 
+    def see_states(self, states: Mapping[str, str]) -> None:
+        """Take over the states that nodes are seen in, of which some may be transitions."""
+        for name, state in states.items():
+            if self._nodes[name].state != state:
+                self.set_state(name, state)
+
     def set_error(self, name: str, text: str) -> None:
         """Say what went wrong with a node last."""
         self._change(name, last_error=text)

@@ -53,9 +53,17 @@ class Manner:
 
 @dataclass(slots=True)
 class _Running:
+    """A step under way: until when it may take, and until when anything may."""
+
     step: Step
     future: Future[Result]
-    until_s: float
+    limit_s: float
+    end_s: float
+
+    @property
+    def until_s(self) -> float:
+        """When to look what became of it."""
+        return min(self.limit_s, self.end_s)
 
 
 @dataclass(slots=True)
@@ -155,7 +163,7 @@ class Conductor:
         self.moving.add(step.node)
         future = node.loop.run_task(node.change(step.transition))
         future.add_done_callback(lambda _: self._inbox.wake())
-        phase.running.append(_Running(step, future, min(now_s + limit_s, manner.end_s)))
+        phase.running.append(_Running(step, future, now_s + limit_s, manner.end_s))
 
     def _end(self, item: _Running, phase: _Phase) -> None:
         phase.running.remove(item)
@@ -171,13 +179,13 @@ class Conductor:
         node = self._crew.nodes[item.step.node]
         stack = ""
         if not item.future.done():
-            stack = node.loop.where()
-            if not self._crew.is_lost(item.step.node):
-                self._free(item)
+            stack = self._free(item)
         if not item.future.done():
             if stack:
                 self._crew.hung.add(node.loop.name)
-            return StepFailed(item.step, "it is stuck", node.state, stuck=True, stack=stack)
+            stuck = bool(stack) or self._inbox.hurry or time.monotonic() >= item.limit_s
+            reason = "it is stuck" if stuck else "there was no time left for it"
+            return StepFailed(item.step, reason, node.state, stuck=stuck, stack=stack)
         if item.future.cancelled():
             return StepFailed(item.step, "its executor stops", node.state)
         result = item.future.result()
@@ -186,12 +194,22 @@ class Conductor:
         reason = result.reason or "a callback was in the way for too long"
         return StepFailed(item.step, reason, result.state, stuck=bool(stack), stack=stack)
 
-    def _free(self, item: _Running) -> None:
-        """Interrupt the callback that a step hangs in, or that it waits for."""
+    def _free(self, item: _Running) -> str:
+        """Interrupt the callback that a step hangs in, or waits for; return the stack of that.
+
+        Before the step's own time is over, that is only what the node itself does.
+        """
         node = self._crew.nodes[item.step.node]
+        if self._crew.is_lost(item.step.node):
+            return node.loop.where()
         found = list(running_callbacks(node.loop, self._crew.nodes.values()))
-        for callback in [one for one in found if one.node is node] or found:
+        own = [callback for callback in found if callback.node is node]
+        if not own and time.monotonic() < item.limit_s:
+            return ""
+        stack = node.loop.where()
+        for callback in own or found:
             callback.interrupt()
         if found:
             until_s = time.monotonic() + _INTERRUPTED_WITHIN_S
             self._inbox.wait(item.future.done, until_s, stoppable=False)
+        return stack

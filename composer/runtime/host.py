@@ -229,8 +229,9 @@ class Host:
             self._inbox.put(command)
 
     def _measure(self) -> None:
-        nodes = self._crew.nodes.items()
+        nodes = tuple(self._crew.nodes.items())
         self._board.measure({name: node.statistics for name, node in nodes})
+        self._board.see_states({name: node.state for name, node in nodes})
 
     def _yield_to(self, namespace: str, host: str, pid: str) -> None:
         if not self._inbox.closing:
@@ -273,7 +274,7 @@ class Host:
             end_s = min(end_s, time.monotonic() + _HURRY_S)
         self._remains = not self._crew.close(end_s)
         self._failed = self._failed or bool(self._crew.hung)
-        manager.close()
+        manager.close(linger=bool(self._farewells))
 
     def _outcome(self) -> Outcome:
         return Outcome(

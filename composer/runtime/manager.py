@@ -37,6 +37,7 @@ _PERIOD_S = 1.0
 #: Many changes at once, as in a bring-up, become one message.
 _TOGETHER_S = 0.05
 _ENDS_WITHIN_S = 0.2
+_ANSWERS_ARRIVE_WITHIN_S = 0.15
 #: Composers that started within so short a time of each other are told apart by their names.
 _SAME_TIME_S = 0.1
 
@@ -99,10 +100,15 @@ class Manager:
         self._loop.call_soon(self._publish)
         board.on_change(self._publish_soon)
 
-    def close(self) -> None:
-        """Tell the last state and leave."""
+    def close(self, *, linger: bool) -> None:
+        """Tell the last state and leave; with ``linger`` an answer that was given just now arrives.
+
+        With shared memory it would be gone with the node.
+        """
         self._board.on_change(lambda: None)
         self._loop.call_soon(self._publish)
+        if linger:
+            time.sleep(_ANSWERS_ARRIVE_WITHIN_S)
         self._loop.stop(_ENDS_WITHIN_S)
         self._node.destroy_node()
 

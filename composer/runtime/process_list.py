@@ -11,6 +11,7 @@ from composer.runtime.systems import SystemReport, Systems
 
 #: Managers tell at once and again each second; who has not answered by then is said to be silent.
 _PATIENCE_S = 2.0
+_STILL_WITHIN_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,12 +29,17 @@ def list_processes(session: Session, deadline: Deadline) -> ProcessList:
     """Return everything there is, once discovery stands still."""
     systems = Systems(session, deadline)
     control = Control(session, deadline)
-    names, nodes = session.wait_until_still(lambda: (systems.look(), control.known()), deadline)
-    reports = systems.reports(sorted({*names, *claims()}), _patience(deadline))
+    here = claims()
+    reports = systems.reports(sorted(here), _patience(deadline)) if here else {}
+    # Where a composer runs, there is no need to wait for the first of all nodes to be discovered.
+    rest = Deadline(min(_STILL_WITHIN_S, deadline.left_s)) if here else deadline
+    names, nodes = session.wait_until_still(lambda: (systems.look(), control.known()), rest)
+    found = [name for name in names if name not in reports]
+    reports |= systems.reports(found, _patience(deadline)) if found else {}
     managed = {node.node for report in reports.values() if report for node in report.nodes}
     others = [node for node in nodes if node not in managed]
     patient = Control(session, _patience(deadline))
-    return ProcessList(reports, patient.states(others) if others else {})
+    return ProcessList(dict(sorted(reports.items())), patient.states(others) if others else {})
 
 
 def list_one(session: Session, deadline: Deadline, name: str) -> ProcessList:

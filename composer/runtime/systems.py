@@ -114,7 +114,8 @@ class Systems:
         ``what`` is one of the services of :class:`composer.runtime.manager.Manager`.
         """
         meeting = Deadline(min(MISSING_S, self._deadline.left_s))
-        if not self._meet((name,), meeting, lambda name: name in self.look()):
+        # Who tells its state is alive: of a killed process, services are in the graph for a while.
+        if not self._meet((name,), meeting, lambda name: name in self._heard):
             raise self._silent(name)
         service = f"{name}/{NAME}/{what}"
         try:
@@ -125,6 +126,14 @@ class Systems:
                 "it may still be at it: 'compose ps' tells. --timeout waits longer",
             ) from error
         return bool(answer.success), str(answer.message)
+
+    def end(self, name: str) -> str:
+        """End a system and its process; return what it said. Raises NoAnswer."""
+        was_here = name in claims()
+        _, message = self.command(name, "shutdown")
+        if was_here:
+            self._session.wait_for(lambda: name not in claims() or None, self._deadline)
+        return message
 
     def _meet(
         self, names: tuple[str, ...], patience: Deadline, is_met: Callable[[str], bool]

@@ -1,0 +1,73 @@
+"""A system in the background: started, waited for, and left to itself."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+
+from composer.cli.failure import FINDINGS, Failure
+
+#: Names the file descriptor through which the process tells that the system is up.
+READY_VARIABLE = "COMPOSE_READY_FD"
+_LAST_LINES = 20
+
+
+def run_in_background(system: str, arguments: Sequence[str]) -> str:
+    """Start ``compose run`` with ``arguments``; return what it says once the system is up.
+
+    What it prints goes to a file in the folder of ROS's logs. Raises Failure, with the end of that,
+    when the process ends instead.
+    """
+    log = _log_path(system)
+    log.parent.mkdir(parents=True, exist_ok=True)
+    reading, writing = os.pipe()
+    with os.fdopen(reading, encoding="utf-8") as news, log.open("wb") as output:
+        try:
+            process = subprocess.Popen(  # noqa: S603 - this very program
+                [sys.executable, "-m", "composer", "run", *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                env={**os.environ, READY_VARIABLE: str(writing)},
+                pass_fds=(writing,),
+                start_new_session=True,  # neither Ctrl-C nor the terminal's end is meant for it
+            )
+        finally:
+            os.close(writing)
+        try:
+            told = news.read()
+        except KeyboardInterrupt:
+            process.terminate()
+            process.wait()
+            raise
+    if not told:
+        process.wait()
+        tail = log.read_text(encoding="utf-8", errors="replace").splitlines()[-_LAST_LINES:]
+        raise Failure(
+            f"the system did not come up (exit code {process.returncode}):",
+            hint="\n".join([*tail, f"all of it: {log}"]),
+            exit_code=FINDINGS,
+        )
+    return f"{told} (process {process.pid}, log {log})"
+
+
+def tell_ready(text: str) -> None:
+    """Tell whoever started this process in the background that the system is up, once."""
+    descriptor = os.environ.pop(READY_VARIABLE, None)
+    if descriptor is not None:
+        with os.fdopen(int(descriptor), "w", encoding="utf-8") as news:
+            news.write(text)
+
+
+def _log_path(system: str) -> Path:
+    """Return where to write; see https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Logging.html."""
+    folder = os.environ.get("ROS_LOG_DIR")
+    if not folder:
+        home = os.environ.get("ROS_HOME") or Path.home() / ".ros"
+        folder = str(Path(home, "log"))
+    now = datetime.now().astimezone().strftime("%Y-%m-%d-%H-%M-%S")
+    return Path(folder, f"{system}-{now}-{os.getpid()}.log")

@@ -1,0 +1,239 @@
+"""Running systems from another terminal: ps, up, down, pause, resume, reset, lifecycle set."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+COMPOSE = [sys.executable, "-m", "composer"]
+PATIENCE_S = 30.0
+ROBOT = """
+system: robot
+namespace: fleet
+nodes:
+  motor: {lifecycle: {depends_on: [planner]}, on_activate: {log: go}}
+  planner:
+    behavior: planner:Planner
+    parameters: {fault: {type: string, default: ""}}
+    publishers: {plan: {type: std_msgs/msg/String, qos: command, external: true}}
+    timers: {tick: {rate_hz: 20, publish: {plan: {data: "{count} steps"}}}}
+  camera: {lifecycle: {autostart: inactive}, on_activate: {log: go}}
+"""
+PLANNER = """
+import time
+from composer.behavior import Behavior
+
+class Planner(Behavior):
+    def on_configure(self):
+        if self.parameters.fault == "configure":
+            raise ValueError("no map")
+
+    def on_activate(self):
+        if self.parameters.fault == "hang":
+            time.sleep(60.0)
+"""
+
+
+def compose(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*COMPOSE, *map(str, arguments)],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+    )
+
+
+def said(*arguments: object) -> str:
+    """Run a command that has to succeed and return what it prints."""
+    done = compose(*arguments)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def refused(*arguments: object) -> str:
+    """Run a command that has to fail and return what it says."""
+    done = compose(*arguments)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+@pytest.fixture
+def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
+    file = tmp_path / "robot.yaml"
+    file.write_text(ROBOT, encoding="utf-8")
+    file.with_name("planner.py").write_text(PLANNER, encoding="utf-8")
+    return file
+
+
+class Robot:
+    """The system in the background."""
+
+    def __init__(self, path: Path, *options: object) -> None:
+        self.path = path
+        self.told = said("run", path, "--wait", "--timeout", 20, *options)
+        found = re.search(r"\(process (\d+), log (.*)\)", self.told)
+        assert found is not None
+        self.pid, self.log = int(found[1]), Path(found[2])
+
+    def states(self) -> dict[str, str]:
+        system = json.loads(said("ps", self.path, "--json"))["systems"][0]
+        return {node["node"]: node["state"] for node in system["nodes"]}
+
+    def kill(self, number: signal.Signals = signal.SIGKILL) -> None:
+        with suppress(ProcessLookupError):
+            os.kill(self.pid, number)
+
+    def is_alive(self) -> bool:
+        try:
+            os.kill(self.pid, 0)
+        except ProcessLookupError:
+            return False
+        return True
+
+
+@pytest.fixture
+def robot(path: Path) -> Iterator[Robot]:
+    running = Robot(path)
+    yield running
+    running.kill()
+
+
+def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None:
+    assert robot.told.startswith("2 of 3 nodes active after")
+    text = said("ps")
+    line, head, *rows = text.splitlines()
+    assert line.startswith("/fleet/robot: running, 2 of 3 nodes active (host ")
+    assert f"process {robot.pid})" in line
+    assert head.split()[:4] == ["node", "state", "since", "restarts"]
+    assert [row.split()[:2] for row in rows] == [
+        ["/fleet/planner", "active"],
+        ["/fleet/motor", "active"],
+        ["/fleet/camera", "inactive"],
+    ]
+    until_s = time.monotonic() + PATIENCE_S
+    while True:
+        (system,) = json.loads(said("ps", "--json"))["systems"]
+        if system["nodes"][0]["sent_hz"] > 0.0:
+            break
+        assert time.monotonic() < until_s
+    assert system["nodes"][0]["sent_hz"] == pytest.approx(20.0, abs=3.0)
+    assert time.time() - system["nodes"][0]["since_s"] < PATIENCE_S
+
+    refusal = refused("run", robot.path)
+    assert f"process {robot.pid}" in refusal
+    assert "runs already in ROS domain" in refusal
+
+    assert said("down", "robot").startswith("/fleet/robot: the system has stopped")
+    assert "ran for" in robot.log.read_text()
+    refusal = refused("down", robot.path)
+    assert refusal.startswith("compose: there is no running system 'robot'")
+    assert "compose run robot" in refusal
+
+
+def test_commands_to_a_whole_system(robot: Robot) -> None:
+    assert said("pause", "robot") == "/fleet/robot: 0 of 3 nodes active\n"
+    assert robot.states() == dict.fromkeys(robot.states(), "inactive")
+    assert said("resume", "/fleet/robot") == "/fleet/robot: 2 of 3 nodes active\n"
+    assert said("reset", robot.path) == "/fleet/robot: 0 of 3 nodes active\n"
+    assert robot.states() == dict.fromkeys(robot.states(), "unconfigured")
+
+    said("param", "set", "/fleet/planner", "fault", "configure")
+    refusal = refused("up", "robot")
+    assert refusal.startswith(
+        "compose: /fleet/robot did not come up: /fleet/planner: it did not configure: "
+        "ValueError: no map; what this had started is where it was before"
+    )
+    assert robot.states() == dict.fromkeys(robot.states(), "unconfigured")
+    said("param", "set", "/fleet/planner", "fault", "none")
+    assert said("up", "robot") == "/fleet/robot: 2 of 3 nodes active\n"
+    assert refused("up", "rowbot").splitlines()[1] == "  did you mean '/fleet/robot'?"
+
+
+def test_several_nodes_patterns_and_systems_are_moved_at_once(robot: Robot) -> None:
+    moved = said("lifecycle", "set", "motor", "planner", "deactivate")
+    assert moved == "/fleet/motor: active -> inactive\n/fleet/planner: active -> inactive\n"
+    moved = said("lifecycle", "set", "/fleet/[mp]*", "--to", "active")
+    assert moved == "/fleet/motor: inactive -> active\n/fleet/planner: inactive -> active\n"
+    moved = said("lifecycle", "set", "--system", "robot", "--to", "unconfigured")
+    assert moved.splitlines() == [
+        "/fleet/camera: inactive -> unconfigured",
+        "/fleet/motor: active -> unconfigured",
+        "/fleet/planner: active -> unconfigured",
+    ]
+    moved = said("lifecycle", "set", "--system", "robot", "configure")
+    assert [line.partition(":")[0] for line in moved.splitlines()] == [
+        "/fleet/planner",
+        "/fleet/motor",
+        "/fleet/camera",
+    ]
+    done = compose("lifecycle", "set", "camera", "planner", "cleanup")
+    assert done.returncode == 0
+    done = compose("lifecycle", "set", "camera", "motor", "cleanup")
+    assert (done.returncode, done.stdout) == (1, "/fleet/motor: inactive -> unconfigured\n")
+    assert "'cleanup' is not possible: /fleet/camera is unconfigured" in done.stderr
+    assert "possible now: configure, shutdown" in done.stderr
+    assert "there is no lifecycle node like 'x*'" in refused("lifecycle", "set", "x*", "cleanup")
+    said("lifecycle", "set", "camera", "--to", "finalized")
+    refusal = refused("lifecycle", "set", "camera", "--to", "active")
+    assert "there is no way to 'active': /fleet/camera is finalized" in refusal
+    for arguments in (["motor"], ["--to", "active"], ["--system", "robot", "motor", "activate"]):
+        assert compose("lifecycle", "set", *arguments).returncode in (1, 2)
+
+
+def test_what_does_not_answer_is_said_to_be_so_in_time(robot: Robot) -> None:
+    said("lifecycle", "set", "planner", "deactivate")
+    said("param", "set", "/fleet/planner", "fault", "hang")
+    refusal = refused("lifecycle", "set", "planner", "activate", "--timeout", 1.5)
+    assert "/fleet/planner did not answer within 1.5 s" in refusal
+    began_s = time.monotonic()
+    assert robot.states()["/fleet/planner"] == "activating"
+    assert time.monotonic() - began_s < 4.0
+
+    robot.kill(signal.SIGSTOP)
+    try:
+        refusal = refused("pause", "robot", "--timeout", 1.5)
+        assert f"its process is {robot.pid}" in refusal
+        began_s = time.monotonic()
+        assert "no answer, its process may be busy or gone" in said("ps")
+        assert time.monotonic() - began_s < 5.0
+    finally:
+        robot.kill(signal.SIGCONT)
+
+
+def test_a_system_that_does_not_come_up_is_no_background_process(path: Path) -> None:
+    refusal = refused("run", path, "--wait", "--set", "planner.fault=configure")
+    assert "the system did not come up (exit code 1):" in refusal
+    assert "/fleet/planner failed" in refusal
+    refusal = refused("run", path, "--timeout", 0.5, "--set", "planner.fault=hang", "--grace", 3)
+    assert "it did not activate in time: 0.5 s are over" in refusal
+
+
+def test_of_two_hosts_the_second_one_yields(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two hosts share no lock files; neither do two processes with runtime folders of their own."""
+    first_folder, second_folder = path.parent / "first", path.parent / "second"
+    for folder in (first_folder, second_folder):
+        folder.mkdir()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(first_folder))
+    first = Robot(path)
+    try:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", str(second_folder))
+        refusal = refused("run", path, "--for", PATIENCE_S)
+        assert "stopping: system 'robot' runs already in ROS domain" in refusal
+        assert f"process {first.pid}" in refusal
+        assert first.is_alive()
+        assert first.states()["/fleet/motor"] == "active"
+    finally:
+        first.kill()
