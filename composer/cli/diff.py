@@ -12,7 +12,7 @@ from composer.cli.failure import FINDINGS, Failure
 from composer.cli.files import system_file
 from composer.cli.help import examples
 from composer.cli.listing import Json
-from composer.cli.loaded import SystemName, load_system
+from composer.cli.loaded import Namespace, SystemName, load_system
 from composer.cli.ros import Timeout, ros_session
 from composer.cli.run import Autostart
 from composer.cli.terminal import say, write
@@ -51,15 +51,7 @@ def diff(
             show_default=False,
         ),
     ] = None,
-    namespace: Annotated[
-        str | None,
-        typer.Option(
-            "--namespace",
-            metavar="NAMESPACE",
-            help="Instead of the system's.",
-            show_default=False,
-        ),
-    ] = None,
+    namespace: Namespace = None,
     autostart: Annotated[
         Autostart | None,
         typer.Option(help="How far the nodes were brought up.", show_default="as the file says"),

@@ -46,6 +46,13 @@ SystemName = Annotated[
         autocompletion=complete_system,
     ),
 ]
+#: Spelled out, for typer takes a metavar that is the parameter's name in capitals for the name.
+Namespace = Annotated[
+    str | None,
+    typer.Option(
+        "--namespace", metavar="NAMESPACE", help="Instead of the system's.", show_default=False
+    ),
+]
 
 
 def load_system(

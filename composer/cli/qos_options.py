@@ -4,26 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from composer.qos import QosProfile
-
-
-class Reliability(StrEnum):
-    """Whether a lost message is sent again."""
-
-    RELIABLE = "reliable"
-    BEST_EFFORT = "best_effort"
-
-
-class Durability(StrEnum):
-    """Whether a late joiner gets what was published before."""
-
-    VOLATILE = "volatile"
-    TRANSIENT_LOCAL = "transient_local"
+from composer.qos import PRESETS, Durability, QosProfile, Reliability
 
 
 class Preset(StrEnum):
@@ -61,22 +46,9 @@ class QosWish:
 
     def applied_to(self, start: QosProfile) -> QosProfile:
         """Return ``start``, or the preset, with the policies that are given."""
-        return chosen_profile(start, self.preset, self.reliability, self.durability, self.depth)
-
-
-def chosen_profile(
-    start: QosProfile,
-    preset: Preset | None,
-    reliability: Reliability | None,
-    durability: Durability | None,
-    depth: int | None,
-) -> QosProfile:
-    """Return ``start``, or the preset, with the policies that are given."""
-    from composer import qos
-
-    profile = start if preset is None else qos.PRESETS[preset.value]
-    if reliability is not None:
-        profile = replace(profile, reliability=qos.Reliability(reliability.value))
-    if durability is not None:
-        profile = replace(profile, durability=qos.Durability(durability.value))
-    return profile if depth is None else replace(profile, depth=depth)
+        profile = start if self.preset is None else PRESETS[self.preset.value]
+        if self.reliability is not None:
+            profile = replace(profile, reliability=self.reliability)
+        if self.durability is not None:
+            profile = replace(profile, durability=self.durability)
+        return profile if self.depth is None else replace(profile, depth=self.depth)

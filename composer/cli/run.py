@@ -13,7 +13,7 @@ import typer
 from composer.cli.failure import FINDINGS, Failure
 from composer.cli.files import system_file
 from composer.cli.help import examples
-from composer.cli.loaded import SystemName, load_system
+from composer.cli.loaded import Namespace, SystemName, load_system
 from composer.cli.ros import require_ros
 from composer.cli.terminal import say, write
 
@@ -77,15 +77,7 @@ def run(
             show_default=False,
         ),
     ] = None,
-    namespace: Annotated[
-        str | None,
-        typer.Option(
-            "--namespace",
-            metavar="NAMESPACE",
-            help="Instead of the system's.",
-            show_default=False,
-        ),
-    ] = None,
+    namespace: Namespace = None,
     autostart: Annotated[
         Autostart | None,
         typer.Option(help="How far to bring the nodes up.", show_default="as the file says"),

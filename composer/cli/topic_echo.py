@@ -12,7 +12,7 @@ from composer.cli.qos_options import (
     QosDurability,
     QosPreset,
     QosReliability,
-    chosen_profile,
+    QosWish,
 )
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
 from composer.cli.terminal import write
@@ -67,9 +67,8 @@ def echo(
         topics = Topics(session, deadline)
         name = topic if topic.startswith("/") else f"/{topic}"
         found = type_name or topics.type_of(name)
-        profile = chosen_profile(
-            topics.matching(name), qos_profile, qos_reliability, qos_durability, qos_depth
-        )
+        wish = QosWish(qos_profile, qos_reliability, qos_durability, qos_depth)
+        profile = wish.applied_to(topics.matching(name))
         with Listener(session, name, found, profile) as listener:
             left = 1 if once else count
             for message in _messages(listener, name, silence):

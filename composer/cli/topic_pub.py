@@ -11,7 +11,7 @@ from composer.cli.qos_options import (
     QosDurability,
     QosPreset,
     QosReliability,
-    chosen_profile,
+    QosWish,
 )
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
 from composer.cli.terminal import say
@@ -64,9 +64,7 @@ def pub(
     """Publish messages on a topic."""
     from composer.qos import PRESETS
 
-    profile = chosen_profile(
-        PRESETS["command"], qos_profile, qos_reliability, qos_durability, qos_depth
-    )
+    wish = QosWish(qos_profile, qos_reliability, qos_durability, qos_depth)
     limit = 1 if once else times
     with ros_session("compose topic", timeout) as (session, deadline):
         from composer.runtime.inspect_publish import Publishing, publish
@@ -76,7 +74,7 @@ def pub(
             topic=topic if topic.startswith("/") else f"/{topic}",
             type_name=type_name,
             build=compile_content(content, class_of(type_name), "the message"),
-            qos=profile,
+            qos=wish.applied_to(PRESETS["command"]),
             rate_hz=rate,
             times=limit,
             wait_for=wait_for if wait_for is not None else int(limit is not None),
