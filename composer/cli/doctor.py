@@ -62,16 +62,18 @@ def _findings(timeout: float) -> Iterator[Finding]:
     from composer.report.tool import tool_version
     from composer.runtime.doctor.environment import discovery_range, look_at_environment
     from composer.runtime.doctor.finding import Level, note
-    from composer.runtime.doctor.network import SHARED_MEMORY, look_at_network
+    from composer.runtime.doctor.network import look_at_network
     from composer.runtime.doctor.versions import look_at_versions
+    from composer.runtime.shared_memory import SHARED_MEMORY
 
     yield from look_at_versions(tool_version())
     environment = list(look_at_environment(os.environ))
     yield from environment
-    uses_shared_memory = os.environ.get("FASTDDS_BUILTIN_TRANSPORTS", "DEFAULT") != "UDPv4"
-    yield from look_at_network(
-        discovery_range(os.environ), shared_memory=SHARED_MEMORY if uses_shared_memory else None
-    )
+    reach = discovery_range(os.environ)
+    # For LOCALHOST rmw_fastrtps chooses the transports itself, shared memory among them.
+    transports = os.environ.get("FASTDDS_BUILTIN_TRANSPORTS")
+    uses_shared_memory = reach == "LOCALHOST" or transports != "UDPv4"
+    yield from look_at_network(reach, shared_memory=SHARED_MEMORY if uses_shared_memory else None)
     yield from _interface_findings()
     if any(finding.level is Level.ERROR for finding in environment):
         yield note("graph", "not looked at: the environment does not let ROS start", _SEE_ABOVE)

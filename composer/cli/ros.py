@@ -34,7 +34,8 @@ def require_ros(command: str) -> None:
             hint='pip install "ros2-composer[ros]"   or: source /opt/ros/jazzy/setup.bash',
         )
     keep_stdout_for_data()
-    from composer.runtime.environment import StartRefused, prepare_environment
+    from composer.runtime.environment import prepare_environment
+    from composer.runtime.start_refused import StartRefused
 
     try:
         prepare_environment()

@@ -170,8 +170,8 @@ def _numbers(options: dict[str, float | None]) -> list[str]:
 def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
     from composer.cli.progress import Progress, summary
     from composer.plan import tear_down
-    from composer.runtime.environment import StartRefused
     from composer.runtime.host import Host
+    from composer.runtime.start_refused import StartRefused
 
     progress = Progress(sys.stderr)
     host = Host(system, plan, tear_down(system), options, progress.show)

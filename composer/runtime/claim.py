@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
-from composer.runtime.environment import StartRefused
+from composer.runtime.start_refused import StartRefused
 
 _DEFAULT_DOMAIN = "0"
 _SUFFIX = ".lock"

@@ -1,4 +1,4 @@
-"""The environment variables that ROS reads: checked before anything starts.
+"""What ROS finds when it starts: checked and put in order before.
 
 rclpy starts without complaint with a domain id of -1 or a discovery range nobody knows, and runs
 unsecured where security was asked for and is not there. We do not.
@@ -12,20 +12,14 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
 
 from composer.diagnostics import nearest
+from composer.runtime.shared_memory import remove_half_made_ports
+from composer.runtime.start_refused import StartRefused
 
 #: See rcl's domain_id.c; above 101 the ports of a participant may meet the ephemeral ones of Linux.
 HIGHEST_DOMAIN_ID = 232
 DISCOVERY_RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 #: Tokens: https://docs.ros.org/en/jazzy/Tutorials/Demos/Logging-and-logger-configuration.html
 CONSOLE_FORMAT = "[{severity}] [{name}] {message}"
-
-
-class StartRefused(Exception):
-    """The environment does not allow a start. ``hint`` says what to do."""
-
-    def __init__(self, message: str, hint: str) -> None:
-        super().__init__(message)
-        self.hint = hint
 
 
 def check_environment(environment: Mapping[str, str]) -> None:
@@ -51,13 +45,16 @@ def complete_environment(environment: MutableMapping[str, str]) -> None:
 
 
 def prepare_environment() -> None:
-    """Check and complete the environment of this process. Raises StartRefused.
+    """Check and complete the environment of this process, and what killed ones left to it.
+
+    Raises StartRefused.
 
     To be called before rclpy is imported: with a middleware that is not there, the import ends
     the process.
     """
     complete_environment(os.environ)
     check_environment(os.environ)
+    remove_half_made_ports()
 
 
 def _check_domain_id(environment: Mapping[str, str]) -> None:

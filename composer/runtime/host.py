@@ -2,8 +2,8 @@
 
 How a command uses it::
 
-    from composer.runtime.environment import StartRefused
     from composer.runtime.host import Host, HostOptions
+    from composer.runtime.start_refused import StartRefused
 
     host = Host(system, bring_up(system), tear_down(system), HostOptions(run_for_s=5.0), report)
     try:
@@ -39,7 +39,7 @@ from composer.runtime.board import Board
 from composer.runtime.claim import claimed, refusal
 from composer.runtime.commands import Commands
 from composer.runtime.crew import FINALIZED, CreationFailed, Crew
-from composer.runtime.environment import StartRefused, prepare_environment
+from composer.runtime.environment import prepare_environment
 from composer.runtime.events import NodeSummary, Outcome, Report
 from composer.runtime.inbox import Inbox
 from composer.runtime.log import describe
@@ -47,6 +47,7 @@ from composer.runtime.manager import Command, Manager, Office, manager_namespace
 from composer.runtime.node import Listener, RunningNode
 from composer.runtime.reporter import Reporter
 from composer.runtime.signals import stop_signals
+from composer.runtime.start_refused import StartRefused
 from composer.runtime.supervisor import Moved, Supervisor
 from composer.runtime.watch import Hanging, Returned, Watch
 

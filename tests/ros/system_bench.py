@@ -6,6 +6,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from textwrap import dedent
@@ -30,6 +31,7 @@ from composer.plan import bring_up, tear_down
 from composer.resolve import resolve
 from composer.runtime.events import BroughtUp, Event, Logged, NodeSummary, Outcome, StateChanged
 from composer.runtime.host import Host, HostOptions
+from composer.runtime.shared_memory import remove_half_made_ports
 
 PATIENCE_S = 20.0
 E = TypeVar("E", bound=Event)
@@ -70,11 +72,15 @@ class RunningSystem:
         self.events: list[Event] = []
         up = bring_up(system, autostart)
         self.host = Host(system, up, tear_down(system), options, self.events.append)
-        self._outcome: list[Outcome] = []
-        self._thread = threading.Thread(
-            target=lambda: self._outcome.append(self.host.run()), daemon=True
-        )
+        self._outcome: Future[Outcome] = Future()
+        self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            self._outcome.set_result(self.host.run())
+        except BaseException as error:
+            self._outcome.set_exception(error)
 
     def told(self, kind: type[E]) -> list[E]:
         return [event for event in tuple(self.events) if isinstance(event, kind)]
@@ -100,10 +106,10 @@ class RunningSystem:
         return self.end()
 
     def end(self) -> Outcome:
-        """Wait for the end and return how it was."""
+        """Wait for the end and return how it was. Raises what the host raised."""
         self._thread.join(PATIENCE_S)
-        assert self._outcome, "the host did not come to an end"
-        return self._outcome[0]
+        assert not self._thread.is_alive(), "the host did not come to an end"
+        return self._outcome.result()
 
     def summary(self, node: str) -> NodeSummary:
         """Stop and return what ``node`` did."""
@@ -132,6 +138,7 @@ class Peer:
     """A node as anybody would write it, in a participant of its own."""
 
     def __init__(self) -> None:
+        remove_half_made_ports()
         self.context = Context()
         self.context.init([])
         self.node = Node(f"peer_{os.getpid()}", context=self.context)

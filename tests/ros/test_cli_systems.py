@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+from composer.runtime.claim import claims
+
 COMPOSE = [sys.executable, "-m", "composer"]
 PATIENCE_S = 30.0
 ROBOT = """
@@ -67,6 +69,15 @@ def refused(*arguments: object) -> str:
     assert done.returncode == 1, done.stdout + done.stderr
     assert "Traceback" not in done.stderr
     return done.stderr
+
+
+@pytest.fixture(autouse=True)
+def nothing_stays_running() -> Iterator[None]:
+    """End what a failed test left in the background: it would hinder all that come after."""
+    yield
+    for pid in claims().values():
+        with suppress(ProcessLookupError, ValueError):
+            os.kill(int(pid), signal.SIGKILL)
 
 
 @pytest.fixture

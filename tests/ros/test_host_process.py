@@ -15,6 +15,7 @@ from textwrap import dedent
 import pytest
 
 from composer.resources import systems_folder
+from composer.runtime.shared_memory import SHARED_MEMORY
 
 COMPOSE = [sys.executable, "-m", "composer"]
 PATIENCE_S = 20.0
@@ -158,6 +159,32 @@ def test_an_environment_that_cannot_be_is_refused(
     assert words in run.text()
     assert "Traceback" not in run.text()
     assert "internal error" not in run.text()
+
+
+def half_made_ports(domain_id: int) -> Iterator[Path]:
+    """Leave what a process leaves that is killed while it makes a port in shared memory.
+
+    The numbers: DDS Interoperability Protocol, 9.6.1.1, metatraffic and user data by unicast.
+    """
+    for offset in range(10, 40):
+        port = SHARED_MEMORY / f"fastrtps_port{7400 + 250 * domain_id + offset}"
+        if not port.exists():
+            port.touch()
+            os.utime(port, (0, 0))
+            yield port
+
+
+def test_what_a_killed_process_left_half_made_hangs_nobody(
+    tmp_path: Path, ros_domain_id: int
+) -> None:
+    left = tuple(half_made_ports(ros_domain_id))
+    try:
+        with compose_run(tmp_path, pipeline(), "--for", 0.1) as run:
+            code, _ = run.end()
+        assert code == 0, run.text()
+    finally:
+        for port in left:
+            port.unlink(missing_ok=True)
 
 
 def test_node_logs_reach_the_terminal_at_their_level(tmp_path: Path) -> None:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.environment import StartRefused, check_environment, complete_environment
+from composer.runtime.environment import check_environment, complete_environment
+from composer.runtime.start_refused import StartRefused
 
 SECURE = {
     "ROS_SECURITY_ENABLE": "true",

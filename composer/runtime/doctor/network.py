@@ -10,10 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from composer.runtime.doctor.finding import Finding, fine, note, warning
+from composer.runtime.shared_memory import SHARED_MEMORY
 
 AREA = "network"
-#: Where Linux keeps it; shm_open(3).
-SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - it is looked at, and nothing is put there
 #: The flags of net/if.h.
 _UP, _LOOPBACK, _MULTICAST = 0x1, 0x8, 0x1000
 #: Where participants announce themselves. See the DDS Interoperability Protocol, 9.6.1.4.
