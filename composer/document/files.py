@@ -21,6 +21,7 @@ _KINDS = {
     stat.S_IFIFO: "a pipe",
     stat.S_IFSOCK: "a socket",
 }
+_LONGEST_PATH = 4096  # PATH_MAX of Linux
 _ENTRIES_FOR_HINT = 1000
 _WIDE_ENCODINGS = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
 
@@ -105,7 +106,10 @@ def _require_regular(mode: int) -> None:
 
 def _similar_name(path: Path) -> str | None:
     name = nearest(path.name, _names_beside(path))
-    return f"did you mean '{shown(path.with_name(name))}'?" if name is not None else None
+    if name is None:
+        return None
+    # Of a long path the end is what matters, and what differs.
+    return f"did you mean '{shown(path.with_name(name), limit=_LONGEST_PATH)}'?"
 
 
 def _names_beside(path: Path) -> Iterator[str]:

@@ -129,7 +129,7 @@ def test_a_process_with_a_hanging_callback_ends_in_time(tmp_path: Path, signals:
             run.wait_for("stopping: SIGINT")
         code, took_s = run.end()
     assert code == 1
-    assert took_s < (2.0 if signals == 1 else 1.0)
+    assert took_s < (2.0 if signals == 1 else 1.6)
     assert "/hanging is stuck and did not deactivate in" in run.text()
     assert "on_tick" in run.text()
 
