@@ -16,6 +16,7 @@ from composer.cli.terminal import write
 COMMANDS = (
     "run",
     "ps",
+    "top",
     "up",
     "down",
     "pause",

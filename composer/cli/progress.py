@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TextIO
 
 from composer.cli.background import tell_ready
+from composer.cli.callback_table import callback_table
 from composer.cli.terminal import columns, use_color
 from composer.runtime.events import (
     BroughtUp,
@@ -24,6 +25,7 @@ from composer.runtime.events import (
 )
 
 _GREEN, _YELLOW, _RED, _DIM = "32", "33", "31", "2"
+_CALLBACKS = 10  # of the busiest callbacks, in the summary
 
 
 class Progress:
@@ -71,10 +73,16 @@ def _code(event: Event) -> str:
 
 
 def summary(outcome: Outcome) -> str:
-    """Return the table that ends a run: what each node did."""
+    """Return what ends a run: a table of what each node did, and one of what its callbacks took."""
     head = ("node", "state", "received", "sent", "calls", "dropped", "errors")
     rows = [head, *map(_row, outcome.nodes)]
-    return f"ran for {outcome.elapsed_s:.1f} s: {outcome.reason}\n{columns(rows, numbers_from=2)}"
+    parts = [
+        f"ran for {outcome.elapsed_s:.1f} s: {outcome.reason}\n{columns(rows, numbers_from=2)}"
+    ]
+    called = [callback for callback in outcome.callbacks if callback.count or callback.dropped]
+    if called:
+        parts.append(callback_table(called, _CALLBACKS))
+    return "\n".join(parts)
 
 
 def _row(node: NodeSummary) -> tuple[str, ...]:

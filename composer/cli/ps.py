@@ -39,7 +39,8 @@ def ps(
 ) -> None:
     """List running systems: the state of each node, since when, its rates, what went wrong last.
 
-    Rates are of topic messages over the last second. Lifecycle nodes that no composer runs are
+    Rates are of topic messages over the last second. With --json what callbacks take is told, too;
+    'compose top' shows it. Lifecycle nodes that no composer runs are
     listed with their states. Who does not answer is said to be so.
     """
     name = None if system is None else name_of_system(system)
@@ -47,21 +48,35 @@ def ps(
         from composer.runtime.process_list import list_one, list_processes
 
         if name is None:
-            listed = list_processes(session, deadline)
+            listed = list_processes(session, deadline, callbacks=as_json)
         else:
-            listed = list_one(session, deadline, name)
+            listed = list_one(session, deadline, name, callbacks=as_json)
     write(_json(listed) if as_json else _text(listed))
 
 
 def _json(listed: ProcessList) -> str:
     content: dict[str, Any] = {
         "systems": [
-            {"name": name} | ({"answered": False} if report is None else asdict(report))
+            {"name": name} | ({"answered": False} if report is None else _report(report))
             for name, report in listed.systems.items()
         ],
         "nodes": [{"node": node, "state": state} for node, state in listed.others.items()],
     }
     return json.dumps(content, indent=2)
+
+
+def _report(report: SystemReport) -> dict[str, Any]:
+    """Return the report with the callbacks of each node where the node is."""
+    content = asdict(report)
+    content.pop("callbacks_at_s")
+    callbacks = content.pop("callbacks")
+    for node in content["nodes"]:
+        node["callbacks"] = [
+            {key: value for key, value in callback.items() if key != "node"}
+            for callback in callbacks
+            if callback["node"] == node["node"]
+        ]
+    return content
 
 
 def _text(listed: ProcessList) -> str:

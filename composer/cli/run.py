@@ -83,6 +83,13 @@ def run(
         typer.Option(help="How far to bring the nodes up.", show_default="as the file says"),
     ] = None,
     log_level: Annotated[Level, typer.Option(help="What nodes log.")] = Level.INFO,
+    tracing: Annotated[
+        bool,
+        typer.Option(
+            "--tracing/--no-tracing",
+            help="Take the times of callbacks, for 'compose top'. Off only to measure its cost.",
+        ),
+    ] = True,
     wait: Annotated[
         bool,
         typer.Option("--wait", help="Run in the background, and return once the system is up."),
@@ -123,10 +130,11 @@ def run(
         from composer.cli.background import run_in_background
 
         given = _arguments(system, settings or [], namespace, autostart, log_level)
+        given += [] if tracing else ["--no-tracing"]
         limits = _numbers({"--for": run_for, "--timeout": timeout, "--grace": grace})
         write(run_in_background(declared.name.value, [*given, *limits]))
         return
-    outcome = _run(declared, plan, _options(run_for, timeout, grace, log_level))
+    outcome = _run(declared, plan, _options(run_for, timeout, grace, log_level, tracing))
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
 
@@ -186,7 +194,7 @@ def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
 
 
 def _options(
-    run_for: float | None, timeout: float | None, grace: float, level: Level
+    run_for: float | None, timeout: float | None, grace: float, level: Level, tracing: bool
 ) -> HostOptions:
     from composer.model import LogLevel
     from composer.runtime.host import HostOptions
@@ -197,6 +205,7 @@ def _options(
         grace_s=grace,
         log_level=LogLevel(level.value),
         hard_exit=lambda: _end_hard(FINDINGS),
+        tracing=tracing,
     )
 
 

@@ -20,7 +20,9 @@ class NodeStatus:
 
     ``held_down`` is why a failed node is kept down, and empty otherwise; ``wanted`` is the state
     that it is to be in; ``starts_active`` is whether a start of the system makes it active. Rates
-    are in hertz, over the last second.
+    are in hertz, over the last second, as is ``busy``: the share of a thread that its callbacks
+    took. ``slowest`` is the callback that took longest at once so far, and how long; ``overruns``
+    are calls over their ``budget_ms``, ``queue_drops`` what full queues pushed out.
     """
 
     node: str
@@ -34,6 +36,10 @@ class NodeStatus:
     errors: int = 0
     sent_hz: float = 0.0
     received_hz: float = 0.0
+    busy: float = 0.0
+    slowest: str = ""
+    overruns: int = 0
+    queue_drops: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +79,7 @@ class Board:
         """``order`` has the keys of all nodes, in the order of the bring-up."""
         self._lock = threading.Lock()
         self._changed: Callable[[], None] = lambda: None
-        self._counters: dict[str, tuple[float, int, int]] = {}
+        self._counters: dict[str, tuple[float, int, int, float]] = {}
         now_s = time.time()
         full_names = {node.name.value: node.full_name for node in system.nodes}
         goals = start_goals(system, PrimaryState.ACTIVE)
@@ -148,8 +154,15 @@ class Board:
         with self._lock:
             for name, counted in statistics.items():
                 before = self._counters.get(name)
-                self._counters[name] = (now_s, counted.sent, counted.received)
-                node = replace(self._nodes[name], errors=counted.errors)
+                busy_s = counted.busy_s
+                self._counters[name] = (now_s, counted.sent, counted.received, busy_s)
+                node = replace(
+                    self._nodes[name],
+                    errors=counted.errors,
+                    slowest=counted.slowest,
+                    overruns=counted.overruns,
+                    queue_drops=counted.queue_drops,
+                )
                 if before is not None and now_s > before[0]:
                     passed_s = now_s - before[0]
                     # A node that was made anew counts from zero again.
@@ -157,6 +170,7 @@ class Board:
                         node,
                         sent_hz=max(0, counted.sent - before[1]) / passed_s,
                         received_hz=max(0, counted.received - before[2]) / passed_s,
+                        busy=max(0.0, busy_s - before[3]) / passed_s,
                     )
                 self._nodes[name] = node
 

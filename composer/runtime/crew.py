@@ -13,6 +13,7 @@ from composer.runtime.log import describe
 from composer.runtime.loop import Loop
 from composer.runtime.node import Listener, NodeOptions, RunningNode
 from composer.runtime.parameters import ParameterError
+from composer.runtime.statistics import Statistics
 from composer.source import Located
 
 _PRIMARY = {state.value: state for state in PrimaryState}
@@ -39,15 +40,18 @@ class Crew:
         *,
         log_level: LogLevel = LogLevel.INFO,
         transition_timeout_s: float | None = None,
+        tracing: bool = True,
     ) -> None:
         """``listen(key)`` is who is told what a node does.
 
-        ``transition_timeout_s`` goes before what the system says.
+        ``transition_timeout_s`` goes before what the system says; ``tracing`` is whether the times
+        of callbacks are taken.
         """
         self._system = system
         self._listen = listen
         self._log_level = log_level
         self._transition_timeout_s = transition_timeout_s
+        self._tracing = tracing
         self._executors = {executor.name.value: executor for executor in system.executors}
         self.nodes: dict[str, RunningNode] = {}
         self.loops: dict[str, Loop] = {}
@@ -139,7 +143,7 @@ class Crew:
             log_level=self._log_level,
             transition_timeout_s=self._timeout_s(node),
         )
-        statistics = None if before is None else before.statistics
+        statistics = Statistics(tracing=self._tracing) if before is None else before.statistics
         return RunningNode(
             node, self.loops[name], options, self._listen(node.name.value), statistics
         )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from composer.model import LogLevel
+from composer.runtime.figures import CallbackFigures
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,3 +203,4 @@ class Outcome:
     elapsed_s: float
     nodes: tuple[NodeSummary, ...]
     hung: bool = False
+    callbacks: tuple[CallbackFigures, ...] = ()

@@ -41,6 +41,7 @@ from composer.runtime.commands import Commands
 from composer.runtime.crew import FINALIZED, CreationFailed, Crew
 from composer.runtime.environment import prepare_environment
 from composer.runtime.events import NodeSummary, Outcome, Report
+from composer.runtime.figures import CallbackFigures, figures
 from composer.runtime.inbox import Inbox
 from composer.runtime.log import describe
 from composer.runtime.manager import Command, Manager, Office, manager_namespace
@@ -69,6 +70,7 @@ _HURRY_S = 0.2
 class HostOptions:
     """How a system is run.
 
+    ``tracing`` is whether the times of callbacks are taken, also of those without a ``budget_ms``.
     ``run_for_s`` ends it by itself; ``bring_up_within_s`` is the time for the whole bring-up;
     ``transition_timeout_s`` goes before what the system says; ``stop_within_s`` is the time for the
     whole tear-down. If the process still stands ``grace_s`` after the request to stop,
@@ -82,6 +84,7 @@ class HostOptions:
     stop_within_s: float = 2.0
     grace_s: float = 10.0
     hard_exit: Callable[[], None] | None = None
+    tracing: bool = True
 
 
 class Host:
@@ -108,6 +111,7 @@ class Host:
             self._listener,
             log_level=self._options.log_level,
             transition_timeout_s=self._options.transition_timeout_s,
+            tracing=self._options.tracing,
         )
         self._supervisor = Supervisor(system, self._crew, self._inbox, self._board, self._reporter)
         self._commands = Commands(system, self._crew, self._supervisor, self._board)
@@ -139,7 +143,10 @@ class Host:
 
     def _run(self, namespace: str) -> None:
         office = Office(
-            self._obey, self._measure, lambda host, pid: self._yield_to(namespace, host, pid)
+            self._obey,
+            self._measure,
+            self._callbacks,
+            lambda host, pid: self._yield_to(namespace, host, pid),
         )
         manager = Manager(namespace, self._board, office)
         try:
@@ -234,6 +241,13 @@ class Host:
         self._board.measure({name: node.statistics for name, node in nodes})
         self._board.see_states({name: node.state for name, node in nodes})
 
+    def _callbacks(self) -> tuple[CallbackFigures, ...]:
+        return tuple(
+            figures(node.full_name, callback)
+            for node in tuple(self._crew.nodes.values())
+            for callback in tuple(node.statistics.callbacks.values())
+        )
+
     def _yield_to(self, namespace: str, host: str, pid: str) -> None:
         if not self._inbox.closing:
             self._fail(str(refusal(namespace, host, pid)))
@@ -284,6 +298,7 @@ class Host:
             elapsed_s=self._reporter.elapsed_s,
             nodes=self._summary,
             hung=self._remains,
+            callbacks=self._callbacks(),
         )
 
     @property

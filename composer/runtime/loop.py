@@ -29,6 +29,10 @@ Reply = Callable[[Any], None]
 class Timer(Protocol):
     """Something that will be called. Cancelling twice is harmless."""
 
+    @property
+    def late_s(self) -> float:
+        """How long ago the call was due, in seconds. To be asked in that call."""
+
     def cancel(self) -> None:
         """Never call again."""
 

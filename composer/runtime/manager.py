@@ -2,7 +2,8 @@
 
 Its services are those of nav2's lifecycle manager as far as both have them (std_srvs/srv/Trigger):
 ``startup``, ``pause``, ``resume``, ``reset``, ``shutdown`` and ``is_active``. It tells the state of
-every node on ``/diagnostics`` (REP 107) and, latched, on ``state``: each second and on change.
+every node on ``/diagnostics`` (REP 107) and, latched, on ``state``: each second and on change. What
+the callbacks of the nodes take it tells on ``callbacks``, each second while somebody listens.
 """
 
 from __future__ import annotations
@@ -22,8 +23,10 @@ from std_srvs.srv import Trigger
 
 from composer.names import join
 from composer.runtime.board import Board, NodeStatus, SystemStatus
+from composer.runtime.callback_messages import to_message
 from composer.runtime.event_loop import EventLoop
 from composer.runtime.executors import log_exception
+from composer.runtime.figures import CallbackFigures
 from composer.runtime.loop import Reply
 
 NAME = "manager"
@@ -32,8 +35,12 @@ IS_ACTIVE = "is_active"
 STATE_TOPIC = "state"
 #: Transient local: who comes late gets the last one at once.
 STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+CALLBACKS_TOPIC = "callbacks"
+CALLBACKS_QOS = QoSProfile(depth=1)
 _DIAGNOSTICS = "/diagnostics"
 _PERIOD_S = 1.0
+#: How often it is seen whether somebody listens, who is then told at once.
+_LOOK_S = 0.25
 #: Many changes at once, as in a bring-up, become one message.
 _TOGETHER_S = 0.05
 _ENDS_WITHIN_S = 0.2
@@ -59,12 +66,13 @@ def manager_namespace(namespace: str, system: str) -> str:
 class Office:
     """Who is behind a manager; all of it is called on the manager's loop.
 
-    ``obey`` takes commands; ``measure`` works out rates; ``yield_to(host, pid)`` is called when a
-    composer that runs the same system was there first.
+    ``obey`` takes commands; ``measure`` works out rates; ``callbacks`` returns what these took;
+    ``yield_to(host, pid)`` is called when a composer that runs the same system was there first.
     """
 
     obey: Callable[[Command], None]
     measure: Callable[[], None]
+    callbacks: Callable[[], tuple[CallbackFigures, ...]]
     yield_to: Callable[[str, str], None]
 
 
@@ -88,6 +96,10 @@ class Manager:
         )
         self._diagnostics = self._node.create_publisher(DiagnosticArray, _DIAGNOSTICS, 10)
         self._state = self._node.create_publisher(DiagnosticArray, f"~/{STATE_TOPIC}", STATE_QOS)
+        self._callbacks = self._node.create_publisher(
+            DiagnosticArray, f"~/{CALLBACKS_TOPIC}", CALLBACKS_QOS
+        )
+        self._listeners = 0
         for what in COMMANDS:
             self._serve(what, partial(self._take, what))
         self._serve(IS_ACTIVE, self._tell_whether_active)
@@ -97,6 +109,7 @@ class Manager:
         self._loop.add_subscription(rivals, self._look_at_rival)
         self._loop.start()
         self._loop.call_every(_PERIOD_S, self._tick)
+        self._loop.call_every(_LOOK_S, self._look_for_listeners)
         self._loop.call_soon(self._publish)
         board.on_change(self._publish_soon)
 
@@ -129,6 +142,18 @@ class Manager:
     def _tick(self) -> None:
         self._office.measure()
         self._publish()
+        if self._listeners:
+            self._publish_callbacks()
+
+    def _look_for_listeners(self) -> None:
+        before, self._listeners = self._listeners, self._callbacks.get_subscription_count()
+        if self._listeners > before:
+            self._publish_callbacks()
+
+    def _publish_callbacks(self) -> None:
+        message = to_message(self._board.snapshot().system, self._office.callbacks())
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._callbacks.publish(message)
 
     def _publish_soon(self) -> None:
         if self._due.acquire(blocking=False):
@@ -206,6 +231,10 @@ def _of_node(system: str, node: NodeStatus) -> DiagnosticStatus:
         "held_down": node.held_down,
         "sent_hz": f"{node.sent_hz:.1f}",
         "received_hz": f"{node.received_hz:.1f}",
+        "busy": f"{node.busy:.4f}",
+        "slowest": node.slowest,
+        "overruns": str(node.overruns),
+        "queue_drops": str(node.queue_drops),
     }
     return _status(f"{system}: {node.node}", system, level, message, values)
 

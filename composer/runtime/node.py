@@ -79,7 +79,7 @@ class RunningNode:
         self.model = model
         self.loop = loop
         self.activations = 0  # how often it became active
-        self.statistics = statistics or Statistics()
+        self.statistics = Statistics() if statistics is None else statistics
         self._listener = listener
         self._ros = RosNode(
             model.name.value,

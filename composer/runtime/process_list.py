@@ -25,9 +25,9 @@ class ProcessList:
     others: dict[str, str | None] = field(default_factory=dict)
 
 
-def list_processes(session: Session, deadline: Deadline) -> ProcessList:
-    """Return everything there is, once discovery stands still."""
-    systems = Systems(session, deadline)
+def list_processes(session: Session, deadline: Deadline, *, callbacks: bool) -> ProcessList:
+    """Return everything there is, once discovery stands still; with or without callbacks."""
+    systems = Systems(session, deadline, callbacks=callbacks)
     control = Control(session, deadline)
     here = claims()
     reports = systems.reports(sorted(here), _patience(deadline)) if here else {}
@@ -42,9 +42,9 @@ def list_processes(session: Session, deadline: Deadline) -> ProcessList:
     return ProcessList(dict(sorted(reports.items())), patient.states(others) if others else {})
 
 
-def list_one(session: Session, deadline: Deadline, name: str) -> ProcessList:
+def list_one(session: Session, deadline: Deadline, name: str, *, callbacks: bool) -> ProcessList:
     """Return one system. Raises NotThere and NoAnswer."""
-    systems = Systems(session, deadline)
+    systems = Systems(session, deadline, callbacks=callbacks)
     found = systems.find(name)
     return ProcessList({found: systems.report(found)})
 

@@ -21,7 +21,7 @@ T = TypeVar("T")
 class Strand(Protocol):
     """Runs the callbacks of one node. Callbacks given to it must not raise."""
 
-    def post(self, call: Callable[[], None]) -> None:
+    def post(self, call: Callable[[], object]) -> None:
         """Run ``call`` now, or when those before it are through."""
 
     def wrap(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
@@ -31,7 +31,7 @@ class Strand(Protocol):
 class Direct:
     """The strand of a node whose loop has one thread, and of ports that may overlap."""
 
-    def post(self, call: Callable[[], None]) -> None:
+    def post(self, call: Callable[[], object]) -> None:
         """Run ``call`` now."""
         call()
 
@@ -43,14 +43,14 @@ class Direct:
 class Turns:
     """The strand of a node whose loop has several threads."""
 
-    def __init__(self, call_soon: Callable[[Callable[[], None]], None]) -> None:
+    def __init__(self, call_soon: Callable[[Callable[[], object]], None]) -> None:
         self._call_soon = call_soon
         self._lock = threading.Lock()
         self._taken = False
         # A waiting coroutine is a future: finishing it hands the turn over.
-        self._queue: deque[Callable[[], None] | Future[None]] = deque()
+        self._queue: deque[Callable[[], object] | Future[None]] = deque()
 
-    def post(self, call: Callable[[], None]) -> None:
+    def post(self, call: Callable[[], object]) -> None:
         """Run ``call`` now, or when those before it are through."""
         with self._lock:
             if self._taken:
@@ -61,7 +61,7 @@ class Turns:
 
     def wrap(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
         """Return a coroutine each step of which is a turn of its own."""
-        return _in_turns(self, coroutine)
+        return in_steps(self, coroutine)
 
     def enter(self) -> Future[None] | None:
         """Take the turn; where it is taken, return the future that will give it."""
@@ -88,30 +88,40 @@ class Turns:
             self._call_soon(partial(self._run, following))
             return
 
-    def _run(self, call: Callable[[], None]) -> None:
+    def _run(self, call: Callable[[], object]) -> None:
         try:
             call()
         finally:
             self.leave()
 
 
-async def _in_turns(turns: Turns, coroutine: Coroutine[Any, Any, T]) -> T:
-    return await _steps(turns, coroutine)
+class Around(Protocol):
+    """What is done before and after each step of a coroutine."""
+
+    def enter(self) -> Future[None] | None:
+        """Begin a step, or return the future that is done when it may begin."""
+
+    def leave(self) -> None:
+        """End the step."""
+
+
+async def in_steps(around: Around, coroutine: Coroutine[Any, Any, T]) -> T:
+    """Drive ``coroutine`` step by step, from one wait to the next."""
+    return await _steps(around, coroutine)
 
 
 @awaitable_generator
-def _steps(turns: Turns, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
-    """Drive ``coroutine``, taking a turn for every step of it."""
+def _steps(around: Around, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
     raised: BaseException | None = None
     try:
         while True:
-            yield from _entered(turns)
+            yield from _entered(around)
             try:
                 yielded = coroutine.send(None) if raised is None else coroutine.throw(raised)
             except StopIteration as stop:
                 return stop.value  # type: ignore[no-any-return]
             finally:
-                turns.leave()
+                around.leave()
             raised = None
             # rclpy's futures yield nothing and want to be polled: wait for them instead.
             foreign = awaited_rclpy_future(coroutine) if yielded is None else None
@@ -125,13 +135,13 @@ def _steps(turns: Turns, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, An
         coroutine.close()
 
 
-def _entered(turns: Turns) -> Generator[Any, Any, None]:
-    turn = turns.enter()
+def _entered(around: Around) -> Generator[Any, Any, None]:
+    turn = around.enter()
     if turn is None:
         return
     try:
         yield from turn.__await__()
     except BaseException:
         if not turn.cancel():  # the turn had come already
-            turns.leave()
+            around.leave()
         raise

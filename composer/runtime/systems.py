@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
+from composer.runtime.callback_messages import from_message
 from composer.runtime.claim import claims
+from composer.runtime.figures import CallbackFigures
 from composer.runtime.finding import NotThere, not_there
-from composer.runtime.manager import IS_ACTIVE, NAME, STATE_QOS, STATE_TOPIC
+from composer.runtime.manager import (
+    CALLBACKS_QOS,
+    CALLBACKS_TOPIC,
+    IS_ACTIVE,
+    NAME,
+    STATE_QOS,
+    STATE_TOPIC,
+)
 from composer.runtime.session import MISSING_S, QUIET_S, Deadline, NoAnswer, Session
 
 _TRIGGER_TYPE = "std_srvs/srv/Trigger"
@@ -34,11 +44,18 @@ class NodeReport:
     held_down: str
     sent_hz: float
     received_hz: float
+    busy: float
+    slowest: str
+    overruns: int
+    queue_drops: int
 
 
 @dataclass(frozen=True, slots=True)
 class SystemReport:
-    """A system as its manager tells of it. ``name`` is the namespace of that."""
+    """A system as its manager tells of it. ``name`` is the namespace of that.
+
+    ``callbacks`` is there where it was asked for, as it was at ``callbacks_at_s``.
+    """
 
     name: str
     activity: str
@@ -46,16 +63,20 @@ class SystemReport:
     host: str
     pid: str
     nodes: tuple[NodeReport, ...]
+    callbacks: tuple[CallbackFigures, ...] = ()
+    callbacks_at_s: float = 0.0
 
 
 class Systems:
-    """Asks managers, all within one time limit."""
+    """Asks managers, all within one time limit; ``callbacks`` says whether for those, too."""
 
-    def __init__(self, session: Session, deadline: Deadline) -> None:
+    def __init__(self, session: Session, deadline: Deadline, *, callbacks: bool = False) -> None:
         self._session = session
         self._deadline = deadline
+        self._wants_callbacks = callbacks
         self._heard: dict[str, DiagnosticArray] = {}
-        self._subscriptions: dict[str, Subscription] = {}
+        self._callbacks: dict[str, DiagnosticArray] = {}
+        self._subscriptions: dict[str, list[Subscription]] = {}
 
     def look(self) -> tuple[str, ...]:
         """Return the names of all systems known now, and listen for what they tell.
@@ -92,6 +113,15 @@ class Systems:
             raise NotThere(f"'{name}' is more than one system", f"say which: {', '.join(here)}")
         return here[0]
 
+    def only(self) -> str:
+        """Return the full name of the one system that runs. Raises NotThere."""
+        known = sorted(claims()) or self._session.wait_until_still(self.look, self._deadline)
+        if not known:
+            raise NotThere("no system is running", "start one with 'compose run'")
+        if len(known) > 1:
+            raise NotThere("there is more than one system", f"say which: {', '.join(known)}")
+        return known[0]
+
     def report(self, name: str) -> SystemReport:
         """Return what the manager of a system tells. Raises NoAnswer."""
         found = self.reports([name], self._deadline)[name]
@@ -102,11 +132,14 @@ class Systems:
     def reports(self, names: Iterable[str], patience: Deadline) -> dict[str, SystemReport | None]:
         """Return what the managers tell until then; None for one that tells nothing."""
         wanted = tuple(names)
-        self._meet(wanted, patience, lambda name: name in self._heard)
-        return {
-            name: _report(name, self._heard[name]) if name in self._heard else None
-            for name in wanted
-        }
+        self._meet(wanted, patience, self._has_told)
+        return {name: self._report(name) if name in self._heard else None for name in wanted}
+
+    def newer(self, name: str, than_s: float) -> SystemReport | None:
+        """Return the report of a system, if its callbacks are known as they were after a time."""
+        if _time_s(self._callbacks[name]) <= than_s:
+            return None
+        return self._report(name)
 
     def command(self, name: str, what: str) -> tuple[bool, str]:
         """Have a system do something, and return whether it did and what it says. Raises NoAnswer.
@@ -115,7 +148,7 @@ class Systems:
         """
         meeting = Deadline(min(MISSING_S, self._deadline.left_s))
         # Who tells its state is alive: of a killed process, services are in the graph for a while.
-        if not self._meet((name,), meeting, lambda name: name in self._heard):
+        if not self._meet((name,), meeting, self._has_told):
             raise self._silent(name)
         service = f"{name}/{NAME}/{what}"
         try:
@@ -158,14 +191,40 @@ class Systems:
             f"{where}. --timeout gives it longer",
         )
 
+    def _has_told(self, name: str) -> bool:
+        return name in self._heard and (not self._wants_callbacks or name in self._callbacks)
+
+    def _report(self, name: str) -> SystemReport:
+        report = _report(name, self._heard[name])
+        callbacks = self._callbacks.get(name)
+        if callbacks is None:
+            return report
+        at_s = _time_s(callbacks)
+        return replace(report, callbacks=from_message(callbacks), callbacks_at_s=at_s)
+
     def _listen(self, name: str) -> None:
-        if name not in self._subscriptions:
-            self._subscriptions[name] = self._session.node.create_subscription(
-                DiagnosticArray,
-                f"{name}/{NAME}/{STATE_TOPIC}",
-                lambda message: self._heard.__setitem__(name, message),
-                STATE_QOS,
+        if name in self._subscriptions:
+            return
+        self._subscriptions[name] = [self._heard_of(name, STATE_TOPIC, STATE_QOS, self._heard)]
+        if self._wants_callbacks:
+            self._subscriptions[name].append(
+                self._heard_of(name, CALLBACKS_TOPIC, CALLBACKS_QOS, self._callbacks)
             )
+
+    def _heard_of(
+        self, name: str, topic: str, qos: QoSProfile, heard: dict[str, DiagnosticArray]
+    ) -> Subscription:
+        return self._session.node.create_subscription(
+            DiagnosticArray,
+            f"{name}/{NAME}/{topic}",
+            lambda message: heard.__setitem__(name, message),
+            qos,
+        )
+
+
+def _time_s(message: DiagnosticArray) -> float:
+    stamp = message.header.stamp
+    return float(stamp.sec + stamp.nanosec * 1e-9)
 
 
 def _called(name: str, systems: Iterable[str]) -> list[str]:
@@ -199,6 +258,10 @@ def _node_report(status: DiagnosticStatus) -> NodeReport:
         held_down=values["held_down"],
         sent_hz=float(values["sent_hz"]),
         received_hz=float(values["received_hz"]),
+        busy=float(values["busy"]),
+        slowest=values["slowest"],
+        overruns=int(values["overruns"]),
+        queue_drops=int(values["queue_drops"]),
     )
 
 

@@ -29,6 +29,11 @@ class ScheduledCall:
         self.callback = callback
         self.cancelled = False
 
+    @property
+    def late_s(self) -> float:
+        """How long ago the call was due, in seconds."""
+        return monotonic() - self.due_s
+
     def cancel(self) -> None:
         """Never call again."""
         self.cancelled = True

@@ -140,15 +140,30 @@ def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None
         if system["nodes"][0]["sent_hz"] > 0.0:
             break
         assert time.monotonic() < until_s
-    assert system["nodes"][0]["sent_hz"] == pytest.approx(20.0, abs=3.0)
-    assert time.time() - system["nodes"][0]["since_s"] < PATIENCE_S
+    planner = system["nodes"][0]
+    assert planner["sent_hz"] == pytest.approx(20.0, abs=3.0)
+    assert planner["slowest"].startswith("timer 'tick' ")
+    (tick,) = planner["callbacks"]
+    assert (tick["kind"], tick["name"]) == ("timer", "tick")
+    assert 0.0 < tick["mean_ms"] <= tick["longest_ms"]
+    assert tick["late_longest_ms"] > 0.0
+
+    (shown,) = said("top", "--once", "--json").splitlines()
+    (callback,) = json.loads(shown)["callbacks"]
+    assert callback["node"] == "/fleet/planner"
+    assert callback["calls_hz"] == pytest.approx(20.0, abs=5.0)
+    assert 0.0 < callback["busy"] < 1.0
+    assert callback["count"] > tick["count"]
+    assert time.time() - planner["since_s"] < PATIENCE_S
 
     refusal = refused("run", robot.path)
     assert f"process {robot.pid}" in refusal
     assert "runs already in ROS domain" in refusal
 
     assert said("down", "robot").startswith("/fleet/robot: the system has stopped")
-    assert "ran for" in robot.log.read_text()
+    assert re.search(
+        r"ran for .*\n/fleet/planner +timer 'tick' +\d+", robot.log.read_text(), re.DOTALL
+    )
     refusal = refused("down", robot.path)
     assert refusal.startswith("compose: there is no running system 'robot'")
     assert "compose run robot" in refusal

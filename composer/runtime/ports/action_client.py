@@ -20,6 +20,7 @@ from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.ports.waiting import Waiting
 from composer.runtime.reactions import RunningReaction
 from composer.runtime.tasks import Future, wrap_rclpy_future
+from composer.runtime.tracing import CallbackTimer
 
 OnFeedback = Callable[[Any], Any]
 
@@ -72,7 +73,11 @@ class ActionClientPort:
         self.action_type: Any = interface_class(port.interface.value)
         self._reactions: dict[Event, RunningReaction] = {}
         self._under_way: dict[bytes, Any] = {}
-        self._feedback = Line(core, self._take_feedback, depth=None, reentrant=port.reentrant)
+        traced = core.statistics.callback(port.kind.value, self._name)
+        timer = CallbackTimer(core, traced, port.budget_ms)
+        take = timer.around(self._take_feedback)
+        self._feedback = Line(core, take, depth=None, reentrant=port.reentrant)
+        self._run = timer.around(self._carry_out)
         profile = rclpy_profile(port.qos.profile)
         self._client = ActionClient(
             core.node,
@@ -203,7 +208,7 @@ class ActionClientPort:
         goal, on_feedback, feedback = item
         reaction = self._reactions.get(Event.FEEDBACK)
         if reaction is not None:
-            self._run(reaction, Event.FEEDBACK, {"feedback": feedback, "goal": goal})
+            self._carry_out((reaction, Event.FEEDBACK, {"feedback": feedback, "goal": goal}))
         if on_feedback is None:
             return None
         return self._core.call(f"feedback of '{self._name}'", on_feedback, feedback)
@@ -211,9 +216,10 @@ class ActionClientPort:
     def _react(self, event: Event, **values: Any) -> None:
         reaction = self._reactions.get(event)
         if reaction is not None and self._core.gate.incoming:
-            self._core.strand.post(lambda: self._run(reaction, event, values))
+            self._core.strand.post(lambda: self._run((reaction, event, values)))
 
-    def _run(self, reaction: RunningReaction, event: Event, values: dict[str, Any]) -> None:
+    def _carry_out(self, item: tuple[RunningReaction, Event, dict[str, Any]]) -> None:
+        reaction, event, values = item
         try:
             reaction.run(**values)
         except Exception as error:

@@ -19,6 +19,7 @@ from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.ports.subscription import queue_depth
 from composer.runtime.reactions import RunningReaction
 from composer.runtime.tasks import Cancelled, Future, sleep, within
+from composer.runtime.tracing import CallbackTimer
 
 #: How long handlers may take to end their goals once the node leaves *active*.
 CANCEL_LIMIT_S = 1.0
@@ -58,6 +59,8 @@ class ActionServerPort:
         self._goals: dict[bytes, RunningGoal] = {}
         self._limit = None if port.reentrant else queue_depth(port.qos.profile)
         self._count = 0
+        traced = core.statistics.callback(port.kind.value, self._name)
+        self._timer = CallbackTimer(core, traced, port.budget_ms)
         self._line = Line(core, self._run, depth=None, reentrant=port.reentrant)
         profile = rclpy_profile(port.qos.profile)
         self._server = ActionServer(
@@ -149,7 +152,7 @@ class ActionServerPort:
         if not goal.is_open:
             return None  # canceled while it waited
         goal.execute()
-        goal.task = self._core.spawn(self._core.strand.wrap(self._work(goal)))
+        goal.task = self._core.spawn(self._core.strand.wrap(self._timer.steps(self._work(goal))))
         return self._follow(goal, goal.task)
 
     async def _follow(self, goal: RunningGoal, task: Future[Any]) -> None:

@@ -12,6 +12,7 @@ from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.ports.waiting import Waiting
 from composer.runtime.reactions import RunningReaction
 from composer.runtime.tasks import Future, wrap_rclpy_future
+from composer.runtime.tracing import CallbackTimer
 
 #: The limit of a call when the YAML names none.
 DEFAULT_TIMEOUT_MS = 5000.0
@@ -27,6 +28,8 @@ class ClientPort:
         self._what = f"service '{port.full_name}'"
         self.service_type: Any = interface_class(port.interface.value)
         self._reactions: dict[Event, RunningReaction] = {}
+        traced = core.statistics.callback(port.kind.value, self._name)
+        self._run = CallbackTimer(core, traced, port.budget_ms).around(self._carry_out)
         self._client = core.node.create_client(
             self.service_type,
             port.full_name,
@@ -98,9 +101,10 @@ class ClientPort:
         reaction = self._reactions.get(event)
         if reaction is None or not self._core.gate.incoming:
             return
-        self._core.strand.post(lambda: self._run(reaction, event, values))
+        self._core.strand.post(lambda: self._run((reaction, event, values)))
 
-    def _run(self, reaction: RunningReaction, event: Event, values: dict[str, Any]) -> None:
+    def _carry_out(self, item: tuple[RunningReaction, Event, dict[str, Any]]) -> None:
+        reaction, event, values = item
         try:
             reaction.run(**values)
         except Exception as error:

@@ -6,7 +6,6 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from composer.model import Port
-from composer.runtime.budget import within_budget
 from composer.runtime.core import Core
 from composer.runtime.line import Line
 from composer.runtime.log import describe
@@ -16,6 +15,7 @@ from composer.runtime.ports.port import callback_group
 from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.reactions import RunningReaction
 from composer.runtime.tasks import Cancelled
+from composer.runtime.tracing import CallbackTimer
 
 Handler = Callable[[Any, Any], Any]
 
@@ -58,9 +58,10 @@ class ServicePort:
         self._handler = handler
         self._open: set[Request] = set()
         # Whoever asks waits for an answer and gives up in time, so none is pushed out.
+        traced = core.statistics.callback(port.kind.value, self._name)
         self._line = Line(
             core,
-            within_budget(core, f"service '{self._name}'", port.budget_ms, self._work),
+            CallbackTimer(core, traced, port.budget_ms).around(self._work),
             depth=None,
             reentrant=port.reentrant,
         )

@@ -8,13 +8,13 @@ from typing import Any
 
 from composer.model import Port
 from composer.qos import Durability, History, QosProfile
-from composer.runtime.budget import within_budget
 from composer.runtime.core import Core
 from composer.runtime.line import Line
 from composer.runtime.messages import interface_class
 from composer.runtime.ports.port import callback_group
 from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.reactions import RunningReaction
+from composer.runtime.tracing import CallbackTimer
 
 
 class SubscriptionPort:
@@ -38,9 +38,11 @@ class SubscriptionPort:
         self._reaction = reaction
         self._handler = handler
         depth = queue_depth(port.qos.profile)
+        self._traced = core.statistics.callback(port.kind.value, self._name)
+        timer = CallbackTimer(core, self._traced, port.budget_ms)
         self._line = Line(
             core,
-            within_budget(core, f"subscription '{self._name}'", port.budget_ms, self._work),
+            timer.around(self._work),
             depth=depth,
             reentrant=port.reentrant,
         )
@@ -67,6 +69,7 @@ class SubscriptionPort:
         self._statistics.received += 1
         if self._line.put(message) is not None:
             self._statistics.dropped += 1
+            self._traced.dropped += 1
 
     def activate(self) -> None:
         """Take what was latched meanwhile."""

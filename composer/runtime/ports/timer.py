@@ -9,11 +9,11 @@ from typing import Any
 from composer.expressions import EvaluationError, Expression
 from composer.model import Period
 from composer.model import Timer as TimerModel
-from composer.runtime.budget import within_budget
 from composer.runtime.core import Core
 from composer.runtime.line import Line
 from composer.runtime.loop import Timer
 from composer.runtime.reactions import RunningReaction
+from composer.runtime.tracing import CallbackTimer
 
 
 class PeriodError(Exception):
@@ -55,9 +55,10 @@ class TimerPort:
         self._period_s = period_s(timer.period, core.names["parameters"])
         self._reaction = reaction
         self._handler = handler
+        self._traced = core.statistics.callback("timer", self._name)
         self._line = Line(
             core,
-            within_budget(core, f"timer '{self._name}'", timer.budget_ms, self._work),
+            CallbackTimer(core, self._traced, timer.budget_ms).around(self._work),
             depth=0,
             reentrant=timer.reentrant,
         )
@@ -88,8 +89,13 @@ class TimerPort:
         self.deactivate()
 
     def _tick(self) -> None:
-        if self._core.gate.incoming and self._line.put(True) is not None:
+        if not self._core.gate.incoming:
+            return
+        if self._timer is not None and self._core.statistics.tracing:
+            self._traced.lateness.take(self._timer.late_s)
+        if self._line.put(True) is not None:
             self._core.statistics.skipped += 1
+            self._traced.dropped += 1
 
     def _work(self, _: bool) -> Coroutine[Any, Any, None] | None:
         if self._reaction is not None:

@@ -1,0 +1,141 @@
+"""The histogram of times, what is made of it, and how it is shown."""
+
+from __future__ import annotations
+
+from random import Random
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from composer.cli.callback_table import callback_table
+from composer.cli.top_table import Sorting, as_json, sorted_rates, table
+from composer.runtime.durations import Durations
+from composer.runtime.figures import CallbackFigures, figures, rates
+from composer.runtime.statistics import CallbackStatistics, Statistics
+
+
+def counted(*times_s: float) -> Durations:
+    durations = Durations()
+    for time_s in times_s:
+        durations.take(time_s)
+    return durations
+
+
+@pytest.mark.parametrize("scale_s", [2e-7, 1e-6, 3e-4, 0.05, 4.0])
+def test_a_percentile_is_right_within_a_tenth(scale_s: float) -> None:
+    random = Random(7)
+    times_s = sorted(random.uniform(0.5, 1.5) * scale_s for _ in range(1000))
+    durations = counted(*times_s)
+    for share in (0.01, 0.5, 0.9, 0.99, 1.0):
+        exact_s = times_s[max(0, round(share * 1000) - 1)]
+        assert durations.percentile_s(share) == pytest.approx(exact_s, rel=0.11)
+    assert durations.count == 1000
+    assert durations.mean_s == pytest.approx(sum(times_s) / 1000)
+    assert durations.longest_s == times_s[-1]
+
+
+def test_the_ends_of_the_scale_are_no_limits() -> None:
+    durations = counted(0.0, 1e-9, 5000.0)
+    assert durations.count == 3
+    assert durations.percentile_s(1.0) == durations.longest_s == 5000.0
+    assert durations.percentile_s(0.5) <= 1e-7
+
+
+def test_nothing_counted_is_zero() -> None:
+    durations = counted()
+    assert (durations.count, durations.mean_s, durations.percentile_s(0.99)) == (0, 0.0, 0.0)
+
+
+def test_a_callback_is_counted_on_after_its_node_was_configured_anew() -> None:
+    statistics = Statistics()
+    statistics.callback("timer", "tick").times.take(0.25)
+    statistics.callback("timer", "tick").times.take(0.5)
+    statistics.callback("subscription", "tick").dropped += 3
+    assert statistics.busy_s == 0.75
+    assert statistics.slowest == "timer 'tick' 500.0 ms"
+    assert statistics.queue_drops == 3
+    assert Statistics().slowest == ""
+
+
+def test_figures_are_in_milliseconds() -> None:
+    callback = CallbackStatistics("timer", "tick", counted(0.002, 0.004), counted(0.001), 1, 2)
+    found = figures("/a/b", callback)
+    assert (found.callback, found.count, found.overruns, found.dropped) == ("timer 'tick'", 2, 1, 2)
+    assert found.mean_ms == pytest.approx(3.0)
+    assert (found.longest_ms, found.late_longest_ms) == (4.0, 1.0)
+
+
+def test_rates_are_those_between_two_looks() -> None:
+    before = [CallbackFigures("/a", "timer", "tick", count=10, total_ms=100.0)]
+    now = [
+        CallbackFigures("/a", "timer", "tick", count=30, total_ms=500.0),
+        CallbackFigures("/new", "timer", "tick", count=7, total_ms=500.0),
+    ]
+    found = rates(before, now, 2.0)
+    assert [(item.calls_hz, item.busy) for item in found] == [(10.0, 0.2), (0.0, 0.0)]
+    assert [item.calls_hz for item in rates(before, now, 0.0)] == [0.0, 0.0]
+    assert rates(now, before, 1.0)[0].busy == 0.0  # a node that was made anew
+
+
+def report(at_s: float, *callbacks: CallbackFigures) -> Any:
+    return SimpleNamespace(
+        name="/robot",
+        activity="running",
+        message="2 of 2 nodes active",
+        host="robot1",
+        pid="12",
+        callbacks=callbacks,
+        callbacks_at_s=at_s,
+    )
+
+
+def two_reports() -> tuple[Any, Any]:
+    before = report(
+        1.0, CallbackFigures("/a", "timer", "tick"), CallbackFigures("/b", "subscription", "scan")
+    )
+    now = report(
+        2.0,
+        CallbackFigures("/a", "timer", "tick", 50, 100.0, 2.0, 3.0, 4.0, 0.5, 1.0, 6, 0),
+        CallbackFigures("/b", "subscription", "scan", 10, 200.0, 20.0, 2.0, 30.0, dropped=8),
+    )
+    return before, now
+
+
+@pytest.mark.parametrize(
+    ("sorting", "first"),
+    [
+        (Sorting.BUSY, "/b"),
+        (Sorting.CALLS, "/a"),
+        (Sorting.MEAN, "/b"),
+        (Sorting.P99, "/a"),
+        (Sorting.MAX, "/b"),
+        (Sorting.LATE, "/a"),
+        (Sorting.DROPPED, "/b"),
+        (Sorting.NODE, "/a"),
+    ],
+)
+def test_top_puts_first_what_is_asked_for(sorting: Sorting, first: str) -> None:
+    assert sorted_rates(*two_reports(), sorting)[0].figures.node == first
+
+
+def test_top_shows_a_line_a_callback_and_no_more_than_there_is_room_for() -> None:
+    before, now = two_reports()
+    found = sorted_rates(before, now, Sorting.NODE)
+    assert table(now, found) == (
+        "/robot: running, 2 of 2 nodes active (host robot1, process 12), callbacks 30.0 % busy\n"
+        "node  callback             calls/s  busy %  mean ms  p99 ms  max ms  late ms  over  "
+        "dropped\n"
+        "/a    timer 'tick'            50.0   10.00    2.000   3.000   4.000    0.500     6\n"
+        "/b    subscription 'scan'     10.0   20.00   20.000   2.000  30.000                 "
+        "      8"
+    )
+    assert table(now, found, 3).splitlines()[2:] == ["2 more"]
+    assert as_json(now, found)["callbacks"][0]["calls_hz"] == 50.0
+
+
+def test_the_summary_shows_what_took_most_time() -> None:
+    _, now = two_reports()
+    lines = callback_table(now.callbacks, 1).splitlines()
+    assert lines[1].split()[0] == "/b"
+    assert lines[2] == "1 more callbacks took less time"
