@@ -81,17 +81,29 @@ def send_goal(
         bool, typer.Option("--feedback", "-f", help="Print what is told on the way.")
     ] = False,
     json: Json = False,
+    result_timeout: Annotated[
+        float | None,
+        typer.Option(
+            "--result-timeout",
+            metavar="SECONDS",
+            min=0.0,
+            help="Cancel the goal unless it has ended by then.",
+            show_default="waits for ever",
+        ),
+    ] = None,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """Send a goal and wait for its end; Ctrl-C cancels it.
 
-    The time limit is for the server and its acceptance. Exit code 1 unless the goal succeeded.
+    The time limit (--timeout) is for the server and its acceptance. Exit code 1 unless the goal
+    succeeded.
     """
     type_name, goal = split_values(values or [])
     with ros_session("compose action", timeout) as (session, deadline):
         from composer.runtime.inspect_calls import Sending, sent_goal
         from composer.runtime.inspect_names import Names
         from composer.runtime.inspect_values import to_plain
+        from composer.runtime.session import Deadline
 
         name = action if action.startswith("/") else f"/{action}"
         found = type_name or one_type(Names(session, deadline), "action", name)
@@ -105,7 +117,8 @@ def send_goal(
             sent_goal(session, deadline, Sending(name, found, goal, show, interrupted)) as sent,
         ):
             say("goal accepted, Ctrl-C cancels it")
-            outcome = sent.result(interrupted)
+            limit = Deadline(float("inf") if result_timeout is None else result_timeout)
+            outcome = sent.result(lambda: interrupted() or limit.passed)
             if outcome is None:
                 say("canceling")
                 outcome = sent.cancel()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,10 +14,11 @@ from composer.cli.failure import Failure, UsageFailure
 from composer.cli.help import examples
 from composer.cli.listing import Json
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
-from composer.cli.terminal import columns, say, write
+from composer.cli.terminal import columns, say, use_color, write
 from composer.cli.values import as_json, as_yaml
 
 if TYPE_CHECKING:
+    from composer.resolve.parameter_files import ParameterFiles
     from composer.runtime.inspect_parameters import Description, Parameters
 
 app = typer.Typer(
@@ -97,13 +99,14 @@ def set_value(
     name: Name,
     value: Annotated[str, typer.Argument(metavar="VALUE", help="As in YAML.")],
     *,
+    json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """Set a parameter. A value that the node refuses is told with its reason, exit code 1."""
     with _parameters(node, timeout) as parameters:
         (described,) = parameters.describe([name])
-        parameters.set({name: value if described.type == "string" else _yaml(value)})
-    write(f"{parameters.node} {name}: {value}")
+        taken = parameters.set({name: value if described.type == "string" else _yaml(value)})
+    _print_taken(parameters.node, taken, json)
 
 
 @app.command("describe", epilog=examples("compose param describe planner max_velocity"))
@@ -141,14 +144,28 @@ def load(
     node: Node,
     file: Annotated[Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False)],
     *,
+    json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Set the parameters that a ROS parameter file has for a node."""
-    content = _yaml(file.read_text(encoding="utf-8"))
+    """Set the parameters that a ROS parameter file has for a node, by its name or by wildcards."""
+    sections = _read(file)
     with _parameters(node, timeout) as parameters:
-        values = _section(content, parameters.node, file)
-        parameters.set(values)
-    write("\n".join(f"{parameters.node} {name}: {value}" for name, value in values.items()))
+        values = _values_for(parameters.node, sections, parameters.names())
+        if not values:
+            raise Failure(
+                f"'{file}' has nothing for {parameters.node}",
+                hint=f"it would stand under '{parameters.node}: ros__parameters:'",
+            )
+        taken = parameters.load(values)
+    _print_taken(parameters.node, taken, json)
+
+
+def _print_taken(node: str, taken: dict[str, Any], json: bool) -> None:
+    """Print what a node has taken; the JSON is a ROS parameter file, as that of ``dump``."""
+    if json:
+        write(as_json({node: {"ros__parameters": taken}}, indent=2))
+    else:
+        write("\n".join(f"{node} {name}: {as_json(value)}" for name, value in taken.items()))
 
 
 def _yaml(text: str) -> Any:
@@ -160,17 +177,23 @@ def _yaml(text: str) -> Any:
         raise UsageFailure(f"'{text:.40}' is not YAML: {error}") from error
 
 
-def _section(content: Any, node: str, file: Path) -> dict[str, Any]:
-    """Return the part of a parameter file that is for ``node``, by its name or ``/**``."""
-    if isinstance(content, dict):
-        for name in (node, node.lstrip("/"), "/**"):
-            section = content.get(name)
-            if isinstance(section, dict) and isinstance(section.get("ros__parameters"), dict):
-                found: dict[str, Any] = section["ros__parameters"]
-                return found
-    raise Failure(
-        f"'{file}' has nothing for {node}", hint=f"it would stand under '{node}: ros__parameters:'"
-    )
+def _read(file: Path) -> ParameterFiles:
+    from composer.report.text import render
+    from composer.resolve.parameter_files import ParameterFiles, read_parameter_file
+
+    sections = ParameterFiles()
+    findings = read_parameter_file(file, sections)
+    if findings:
+        say(render(findings, color=use_color(sys.stderr)))
+        raise Failure(f"'{file}' is not a ROS parameter file")
+    return sections
+
+
+def _values_for(node: str, sections: ParameterFiles, declared: Iterable[str]) -> dict[str, Any]:
+    from composer.tree import plain
+
+    given = sections.given(node, frozenset(declared))
+    return {name: plain(entry.value) for name, entry in given.items()}
 
 
 def _facts(found: Description) -> dict[str, Any]:

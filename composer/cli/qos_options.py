@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from composer.qos import PRESETS, Durability, QosProfile, Reliability
+from composer.cli.option_groups import option_group
+from composer.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
 
 
 class Preset(StrEnum):
@@ -22,33 +23,41 @@ class Preset(StrEnum):
     SYSTEM_DEFAULT = "system_default"
 
 
-QosPreset = Annotated[
-    Preset | None, typer.Option("--qos-profile", help="A preset.", show_default=False)
-]
-QosReliability = Annotated[
-    Reliability | None, typer.Option("--qos-reliability", show_default=False)
-]
-QosDurability = Annotated[Durability | None, typer.Option("--qos-durability", show_default=False)]
-QosDepth = Annotated[
-    int | None,
-    typer.Option("--qos-depth", min=1, metavar="N", help="Messages kept.", show_default=False),
-]
-
-
 @dataclass(frozen=True, slots=True)
 class QosWish:
-    """What the options say of a profile; None where they say nothing."""
+    """What the options say of a profile; None where they say nothing.
 
-    preset: Preset | None
-    reliability: Reliability | None
-    durability: Durability | None
-    depth: int | None
+    Each field is the option ``--qos-<field>``.
+    """
+
+    profile: Annotated[Preset | None, typer.Option(help="A preset.")] = None
+    history: Annotated[History | None, typer.Option()] = None
+    depth: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="How many messages are kept.")
+    ] = None
+    reliability: Annotated[Reliability | None, typer.Option()] = None
+    durability: Annotated[Durability | None, typer.Option()] = None
+    liveliness: Annotated[Liveliness | None, typer.Option()] = None
+    liveliness_lease_duration_seconds: Annotated[
+        float | None, typer.Option(min=0.0, metavar="SECONDS")
+    ] = None
 
     def applied_to(self, start: QosProfile) -> QosProfile:
         """Return ``start``, or the preset, with the policies that are given."""
-        profile = start if self.preset is None else PRESETS[self.preset.value]
-        if self.reliability is not None:
-            profile = replace(profile, reliability=self.reliability)
-        if self.durability is not None:
-            profile = replace(profile, durability=self.durability)
-        return profile if self.depth is None else replace(profile, depth=self.depth)
+        lease_s = self.liveliness_lease_duration_seconds
+        policies = {
+            "history": self.history,
+            "depth": self.depth,
+            "reliability": self.reliability,
+            "durability": self.durability,
+            "liveliness": self.liveliness,
+            "liveliness_lease_duration_ms": None if lease_s is None else lease_s * 1000.0,
+        }
+        given: dict[str, Any] = {
+            name: value for name, value in policies.items() if value is not None
+        }
+        return replace(start if self.profile is None else PRESETS[self.profile.value], **given)
+
+
+#: For commands with a parameter ``qos``, which is a QosWish.
+takes_qos_options = option_group("qos", QosWish, prefix="qos_")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from composer.cli.qos_options import QosWish
 from composer.cli.ros import ros_session
 from composer.cli.terminal import say, write
+from composer.cli.wanted_messages import message_timeout_s, topic_timeout_s
 
 if TYPE_CHECKING:
     from composer.runtime.inspect_topics import Received
@@ -35,25 +36,25 @@ class Measuring:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """When measuring ends. The time limit is for finding the topic, silence for what comes."""
+    """When measuring ends: after ``count`` messages, or when one is waited for for too long."""
 
-    timeout_s: float
+    topic_timeout_s: float
+    message_timeout_s: float
     count: int
-    silence_s: float
 
     @classmethod
-    def given(cls, timeout: float, count: int | None, silence: float | None) -> Limits:
+    def given(cls, timeout: float | None, count: int | None) -> Limits:
         """Return the limits of the options; what is not given never ends anything."""
         return cls(
-            timeout,
+            topic_timeout_s(timeout),
+            message_timeout_s(timeout),
             sys.maxsize if count is None else count,
-            float("inf") if silence is None else silence,
         )
 
 
 def measure(topic: str, measuring: Measuring, qos: QosWish, limits: Limits) -> None:
     """Take what comes up to the limits; print reports every second and at the end."""
-    with ros_session("compose topic", limits.timeout_s) as (session, deadline):
+    with ros_session("compose topic", limits.topic_timeout_s) as (session, deadline):
         from composer.runtime.inspect_topics import Listener, Topics
         from composer.runtime.session import Deadline, NoAnswer
 
@@ -63,7 +64,7 @@ def measure(topic: str, measuring: Measuring, qos: QosWish, limits: Limits) -> N
         profile = qos.applied_to(topics.matching(name))
         seen = before = 0
         with Listener(session, name, type_name, profile, raw=measuring.raw) as listener:
-            tick, patience = Deadline(_REPORT_EVERY_S), Deadline(limits.silence_s)
+            tick, patience = Deadline(_REPORT_EVERY_S), Deadline(limits.message_timeout_s)
             while seen < limits.count:
                 next_s = Deadline(min(tick.left_s, patience.left_s))
                 wanted = [item for item in listener.take(next_s) if _is_wanted(measuring, item)]
@@ -71,9 +72,9 @@ def measure(topic: str, measuring: Measuring, qos: QosWish, limits: Limits) -> N
                     measuring.take(item)
                     seen += 1
                 if wanted:
-                    patience = Deadline(limits.silence_s)
+                    patience = Deadline(limits.message_timeout_s)
                 elif patience.passed:
-                    raise NoAnswer(f"nothing came over '{name}' for {limits.silence_s:g} s")
+                    raise NoAnswer(f"nothing came over '{name}' for {limits.message_timeout_s:g} s")
                 if tick.passed:
                     _tell(measuring.report(time.monotonic()) if seen > before else None, name)
                     before, tick = seen, Deadline(_REPORT_EVERY_S)

@@ -6,17 +6,14 @@ from typing import Annotated
 
 import typer
 
-from composer.cli.qos_options import (
-    QosDepth,
-    QosDurability,
-    QosPreset,
-    QosReliability,
-    QosWish,
-)
+from composer.cli.listing import Json
+from composer.cli.qos_options import QosWish, takes_qos_options
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
-from composer.cli.terminal import say
+from composer.cli.terminal import say, write
+from composer.cli.values import as_json
 
 
+@takes_qos_options
 def pub(
     topic: Annotated[str, typer.Argument(metavar="TOPIC")],
     type_name: Annotated[str, typer.Argument(metavar="TYPE", help="std_msgs/msg/String")],
@@ -55,29 +52,38 @@ def pub(
             show_default="1 with --once or --times",
         ),
     ] = None,
-    qos_profile: QosPreset = None,
-    qos_reliability: QosReliability = None,
-    qos_durability: QosDurability = None,
-    qos_depth: QosDepth = None,
+    every: Annotated[
+        int, typer.Option("--print", "-p", min=1, metavar="N", help="Tell of every Nth message.")
+    ] = 1,
+    json: Json = False,
+    qos: QosWish,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Publish messages on a topic."""
+    """Publish messages on a topic.
+
+    The time limit is for the subscriptions that are waited for. With --json each message is
+    printed, as it was published, as one JSON object a line.
+    """
     from composer.qos import PRESETS
 
-    wish = QosWish(qos_profile, qos_reliability, qos_durability, qos_depth)
     limit = 1 if once else times
     with ros_session("compose topic", timeout) as (session, deadline):
         from composer.runtime.inspect_publish import Publishing, publish
-        from composer.runtime.inspect_values import class_of, compile_content
+        from composer.runtime.inspect_values import class_of, compile_content, to_plain
 
         publishing = Publishing(
             topic=topic if topic.startswith("/") else f"/{topic}",
             type_name=type_name,
             build=compile_content(content, class_of(type_name), "the message"),
-            qos=wish.applied_to(PRESETS["command"]),
+            qos=qos.applied_to(PRESETS["command"]),
             rate_hz=rate,
             times=limit,
             wait_for=wait_for if wait_for is not None else int(limit is not None),
         )
         for number, message in enumerate(publish(session, deadline, publishing), 1):
-            say(f"published #{number}: {message}")
+            if number % every:
+                continue
+            if json:
+                write(as_json(to_plain(message)))
+            else:
+                say(f"published #{number}: {message}")

@@ -8,17 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.listing import Json
-from composer.cli.qos_options import (
-    QosDepth,
-    QosDurability,
-    QosPreset,
-    QosReliability,
-    QosWish,
-)
-from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout
+from composer.cli.qos_options import QosWish, takes_qos_options
 from composer.cli.topic_measure import Limits, Measuring, measure
 from composer.cli.values import as_json
-from composer.cli.wanted_messages import Filter, Silence, compiled_filter, is_wanted
+from composer.cli.wanted_messages import Filter, Patience, compiled_filter, is_wanted
 
 if TYPE_CHECKING:
     from composer.runtime.inspect_rates import Bandwidth, Delay, Rate
@@ -36,6 +29,7 @@ Count = Annotated[
 ]
 
 
+@takes_qos_options
 def hz(
     topic: Topic,
     *,
@@ -43,12 +37,8 @@ def hz(
     count: Count = None,
     condition: Filter = None,
     json: Json = False,
-    silence: Silence = None,
-    qos_profile: QosPreset = None,
-    qos_reliability: QosReliability = None,
-    qos_durability: QosDurability = None,
-    qos_depth: QosDepth = None,
-    timeout: Timeout = DEFAULT_TIMEOUT_S,
+    qos: QosWish,
+    timeout: Patience = None,
 ) -> None:
     """Print how often messages come, once a second, until Ctrl-C."""
     from composer.runtime.inspect_rates import RateWindow
@@ -68,22 +58,18 @@ def hz(
         raw=wanted is None,
         is_wanted=None if wanted is None else lambda message: is_wanted(wanted, message),
     )
-    qos = QosWish(qos_profile, qos_reliability, qos_durability, qos_depth)
-    measure(topic, measuring, qos, Limits.given(timeout, count, silence))
+    measure(topic, measuring, qos, Limits.given(timeout, count))
 
 
+@takes_qos_options
 def bw(
     topic: Topic,
     *,
     window: Window = 100,
     count: Count = None,
     json: Json = False,
-    silence: Silence = None,
-    qos_profile: QosPreset = None,
-    qos_reliability: QosReliability = None,
-    qos_durability: QosDurability = None,
-    qos_depth: QosDepth = None,
-    timeout: Timeout = DEFAULT_TIMEOUT_S,
+    qos: QosWish,
+    timeout: Patience = None,
 ) -> None:
     """Print how much comes, once a second, until Ctrl-C. Sizes are those of serialized messages."""
     from composer.runtime.inspect_rates import BandwidthWindow
@@ -99,10 +85,10 @@ def bw(
     measuring = Measuring(
         take=lambda item: sizes.add(item.at_s, len(item.content)), report=report, raw=True
     )
-    qos = QosWish(qos_profile, qos_reliability, qos_durability, qos_depth)
-    measure(topic, measuring, qos, Limits.given(timeout, count, silence))
+    measure(topic, measuring, qos, Limits.given(timeout, count))
 
 
+@takes_qos_options
 def delay(
     topic: Topic,
     *,
@@ -110,12 +96,8 @@ def delay(
     count: Count = None,
     condition: Filter = None,
     json: Json = False,
-    silence: Silence = None,
-    qos_profile: QosPreset = None,
-    qos_reliability: QosReliability = None,
-    qos_durability: QosDurability = None,
-    qos_depth: QosDepth = None,
-    timeout: Timeout = DEFAULT_TIMEOUT_S,
+    qos: QosWish,
+    timeout: Patience = None,
 ) -> None:
     """Print how old messages are when they come, once a second, until Ctrl-C.
 
@@ -142,8 +124,7 @@ def delay(
         report=report,
         is_wanted=None if wanted is None else lambda message: is_wanted(wanted, message),
     )
-    qos = QosWish(qos_profile, qos_reliability, qos_durability, qos_depth)
-    measure(topic, measuring, qos, Limits.given(timeout, count, silence))
+    measure(topic, measuring, qos, Limits.given(timeout, count))
 
 
 def _rate_text(rate: Rate) -> str:

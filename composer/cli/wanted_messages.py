@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from composer.cli.failure import UsageFailure
+from composer.cli.ros import DEFAULT_TIMEOUT_S
 
 if TYPE_CHECKING:
     from composer.expressions import Expression
@@ -21,14 +22,27 @@ Filter = Annotated[
     ),
 ]
 
-Silence = Annotated[
+#: Who says how long, says it of both; who does not, may start before what is slow to come.
+Patience = Annotated[
     float | None,
     typer.Option(
+        "--timeout",
         metavar="SECONDS",
-        help="Fail when no message comes for so long.",
-        show_default="wait for ever",
+        min=0.0,
+        help="How long to wait for the topic, and then for each message.",
+        show_default=f"{DEFAULT_TIMEOUT_S} for the topic, for ever for messages",
     ),
 ]
+
+
+def topic_timeout_s(timeout: float | None) -> float:
+    """Return how long the topic itself is waited for."""
+    return DEFAULT_TIMEOUT_S if timeout is None else timeout
+
+
+def message_timeout_s(timeout: float | None) -> float:
+    """Return how long each message is waited for."""
+    return float("inf") if timeout is None else timeout
 
 
 def compiled_filter(condition: str | None) -> Expression | None:

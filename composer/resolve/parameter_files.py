@@ -91,7 +91,8 @@ class ParameterFiles:
     def given(self, full_name: str, declared: frozenset[str]) -> dict[str, Entry]:
         """Return the values for the node that ROS calls ``full_name``, by parameter.
 
-        Under a name with wildcards it finds what it declares; the rest is for other nodes.
+        Under a name with wildcards it finds what it declares; the rest is for other nodes. So is
+        what every ROS node has, unless this one tells of it.
         """
         found = [*self._named.get(full_name, ()), *self._matching(full_name)]
         given: dict[str, Entry] = {}
@@ -99,7 +100,7 @@ class ParameterFiles:
             given.update(
                 (name, entry)
                 for name, entry in section.values.items()
-                if not section.is_pattern or name in declared
+                if name in declared or not (section.is_pattern or _EVERY_NODE.fullmatch(name))
             )
         return given
 
@@ -135,11 +136,16 @@ def read_parameter_files(
             message = f"there is no parameter file '{shown(name.value)}'"
             findings.append(Diagnostic(RULE, message, name.span))
         else:
-            content, _, found = read_document(path, shown_path(path))
-            findings.extend(found)
-            if content is not None:
-                _read(content, "/", files, findings)
+            findings.extend(read_parameter_file(path, files))
     return files
+
+
+def read_parameter_file(path: Path, files: ParameterFiles) -> list[Diagnostic]:
+    """Add what is in the file at ``path``; return what is wrong with it."""
+    content, _, findings = read_document(path, shown_path(path))
+    if content is not None:
+        _read(content, "/", files, findings)
+    return findings
 
 
 def _read(tree: Mapping, namespace: str, files: ParameterFiles, findings: list[Diagnostic]) -> None:
@@ -166,7 +172,7 @@ def _flat(tree: Mapping, prefix: str) -> Iterator[Entry]:
         name = f"{prefix}{entry.name}"
         if isinstance(entry.value, Mapping):
             yield from _flat(entry.value, f"{name}.")
-        elif not _EVERY_NODE.fullmatch(name):
+        else:
             yield Entry(Scalar(name, entry.key.span, verbatim=False), entry.value)
 
 

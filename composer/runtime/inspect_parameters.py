@@ -89,10 +89,11 @@ class Parameters:
         response = self._call(DescribeParameters, "describe_parameters", request)
         return tuple(map(_description, response.descriptors))
 
-    def set(self, values: Mapping[str, Any]) -> None:
-        """Set parameters. Raises UnknownParameter, ParameterRefused with the node's reason.
+    def set(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Set parameters and return what the node took.
 
-        A whole number becomes a double where the node has one.
+        A whole number becomes a double where the node has one. Raises UnknownParameter,
+        ParameterRefused with the node's reason.
         """
         types = {item.name: item.type for item in self.describe(values)}
         request = SetParameters.Request(
@@ -106,6 +107,22 @@ class Parameters:
         ]
         if refused:
             raise ParameterRefused(f"{self.node} refused " + "; ".join(refused))
+        return {sent.name: plain_value(sent.value) for sent in request.parameters}
+
+    def load(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Set the parameters of a file; what is read-only and has its value already is left alone.
+
+        Like :meth:`set` otherwise. ROS nodes have such parameters, and dump them with the others.
+        """
+        present = self.values(values)
+        fixed = {item.name for item in self.describe(values) if item.read_only}
+        return self.set(
+            {
+                name: value
+                for name, value in values.items()
+                if name not in fixed or value != present[name]
+            }
+        )
 
     def _check_known(self, names: Iterable[str]) -> None:
         known = self.names()

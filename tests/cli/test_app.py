@@ -46,6 +46,15 @@ def test_every_help_page_ends_with_examples_of_that_command(command: list[str]) 
     assert all(words in line for line in shown)
 
 
+@pytest.mark.parametrize("group", ["node", "topic", "service", "action", "param"])
+def test_whatever_looks_into_the_ros_graph_has_a_time_limit_and_prints_json(group: str) -> None:
+    pages = [compose(*words, "--help").out for words in commands() if words[:-1] == [group]]
+    assert len(pages) > 1
+    for page in pages:
+        assert "--timeout" in page
+        assert "--json" in page
+
+
 @pytest.mark.parametrize(
     "arguments", [["--bogus"], ["nothing"], ["run"], ["graph", "-f", "x", "y"]]
 )

@@ -47,6 +47,19 @@ def out(*arguments: str) -> str:
     return compose(*arguments).stdout
 
 
+def start(*arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [*COMPOSE, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def finished(process: subprocess.Popen[str]) -> str:
+    """Return what a process that was started has printed, once it has ended well."""
+    output, error = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0, error
+    return output
+
+
 def listed(*arguments: str) -> str:
     """Ask again while nothing is found: on a busy machine discovery outlasts a command."""
     until_s = time.monotonic() + PATIENCE_S
@@ -132,18 +145,12 @@ def test_echo_filters_by_an_expression() -> None:
 def test_echo_says_what_is_wrong_with_names_and_fields() -> None:
     assert "did you mean '/lab/count'?" in error("topic", "echo", "/lab/cuont", "--once")
     assert "valid here: data" in error("topic", "echo", "/lab/count", "--once", "--field", "odd")
-    assert "nothing came over '/lab/in' for 0.3 s" in error(
-        "topic", "echo", "/lab/in", "--silence", "0.3"
-    )
+    silent = ("topic", "echo", "/lab/in", "std_msgs/msg/String", "--timeout", "0.3")
+    assert "nothing came over '/lab/in' for 0.3 s" in error(*silent)
 
 
 def test_echo_ends_quietly_at_ctrl_c() -> None:
-    process = subprocess.Popen(
-        [*COMPOSE, "topic", "echo", "/lab/count"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = start("topic", "echo", "/lab/count")
     assert process.stdout is not None
     assert process.stdout.readline().startswith("data: ")
     process.send_signal(signal.SIGINT)
@@ -152,31 +159,39 @@ def test_echo_ends_quietly_at_ctrl_c() -> None:
     assert "Traceback" not in err
 
 
-def test_hz_agrees_with_a_hand_written_subscriber_to_one_percent() -> None:
-    with hand_written_times() as times_s:
-        last = out("topic", "hz", "/lab/count", "--count", "200", "--json").splitlines()[-1]
-        seen_s = times_s[-200:]
-    rate = json.loads(last)
+def test_echo_and_hz_agree_with_a_hand_written_subscriber_to_one_percent() -> None:
+    with hand_written_subscriber() as heard:
+        by_echo = start("topic", "echo", "/lab/count", "--count", "200", "--field", "data", "--csv")
+        by_hz = start("topic", "hz", "/lab/count", "--count", "200", "--json")
+        rate = json.loads(finished(by_hz).splitlines()[-1])
+        seen_s = [at_s for at_s, _ in heard[-200:]]  # hz has just ended with the last of them
+        values = [int(line) for line in finished(by_echo).splitlines()]
+    expected = {value for _, value in heard if values[0] <= value <= values[-1]}
+    assert len(set(values) & expected) == pytest.approx(len(expected), rel=0.01)
+    assert len(values) == pytest.approx(len(expected), rel=0.01)
     assert rate["window"] == 199
     assert rate["average_hz"] == pytest.approx(199 / (seen_s[-1] - seen_s[0]), rel=0.01)
 
 
 @contextmanager
-def hand_written_times() -> Iterator[list[float]]:
-    """Yield a list to which a plain subscription adds the time of each message."""
-    times_s: list[float] = []
+def hand_written_subscriber() -> Iterator[list[tuple[float, int]]]:
+    """Yield a list to which a plain subscription adds the time and the number of each message."""
+    heard: list[tuple[float, int]] = []
     context = rclpy.Context()
     context.init([])
     node = rclpy.create_node("by_hand", context=context)
     node.create_subscription(
-        Int32, "/lab/count", lambda _: times_s.append(time.monotonic()), qos_profile_sensor_data
+        Int32,
+        "/lab/count",
+        lambda message: heard.append((time.monotonic(), message.data)),
+        qos_profile_sensor_data,
     )
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     thread = threading.Thread(target=executor.spin)
     thread.start()
     try:
-        yield times_s
+        yield heard
     finally:
         executor.shutdown()
         thread.join()
@@ -199,19 +214,20 @@ def test_measuring_looks_at_wanted_messages_only_and_does_not_wait_for_ever() ->
     even = ("--filter", "message.data % 2 == 0", "--count", "20", "--json")
     last = out("topic", "hz", "/lab/count", *even).splitlines()[-1]
     assert json.loads(last)["average_hz"] == pytest.approx(25.0, rel=0.1)
-    silence = ("--silence", "0.2", "--qos-reliability", "reliable")
-    assert "nothing came over '/lab/count' for 0.2 s" in error(
-        "topic", "bw", "/lab/count", *silence
-    )
+    # Of a best-effort publisher a reliable subscription hears nothing.
+    silent = ("topic", "bw", "/lab/count", "--qos-reliability", "reliable", "--timeout", "2")
+    assert "nothing came over '/lab/count' for 2 s" in error(*silent)
 
 
 def test_what_is_published_arrives() -> None:
     arguments = ("/lab/in", "std_msgs/msg/String", '{data: "number {count}"}')
-    done = compose("topic", "pub", "-r", "20", "--times", "2", *arguments)
+    done = compose("topic", "pub", "-r", "20", "--times", "2", "--print", "2", *arguments)
     assert done.stdout == ""
-    assert "published #2" in done.stderr
+    assert done.stderr == "published #2: std_msgs.msg.String(data='number 1')\n"
     heard = out("topic", "echo", "/lab/heard", "--once", "--field", "data")
     assert heard == "number 1\n---\n"
+    once = ("topic", "pub", "--once", "--json", "--qos-history", "keep_all", *arguments)
+    assert json.loads(out(*once)) == {"data": "number 0"}
 
 
 def test_publishing_says_what_is_wrong() -> None:
@@ -261,14 +277,15 @@ def test_a_rejected_goal_is_told() -> None:
     )
 
 
+def test_a_goal_that_takes_too_long_is_canceled() -> None:
+    goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: -1}", "--json")
+    done = compose(*goal, "--result-timeout", "0.3", code=1)
+    assert json.loads(done.stdout)["status"] == "canceled"
+
+
 def test_ctrl_c_cancels_a_goal() -> None:
     goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: -1}", "--feedback", "--json")
-    process = subprocess.Popen(
-        [*COMPOSE, *goal, "--timeout", "20"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = start(*goal, "--timeout", "20")
     assert process.stdout is not None
     assert "feedback" in process.stdout.readline()
     process.send_signal(signal.SIGINT)
@@ -283,9 +300,11 @@ def test_ctrl_c_cancels_a_goal() -> None:
 def test_parameters_are_read_and_set() -> None:
     assert {"speed", "name", "gains"} <= set(out("param", "list", "talker").split())
     assert out("param", "get", "talker", "speed") == "1.5\n"
-    assert out("param", "set", "talker", "speed", "2") == "/lab/talker speed: 2\n"
+    assert out("param", "set", "talker", "speed", "2") == "/lab/talker speed: 2.0\n"
     assert json.loads(out("param", "get", "/lab/talker", "speed", "--json")) == 2.0
-    out("param", "set", "talker", "name", "123")
+    assert json.loads(out("param", "set", "talker", "name", "123", "--json")) == {
+        "/lab/talker": {"ros__parameters": {"name": "123"}}
+    }
     assert json.loads(out("param", "get", "talker", "name", "--json")) == "123"
     out("param", "set", "talker", "gains", "[3, 4.5]")
     assert json.loads(out("param", "get", "talker", "gains", "--json")) == [3.0, 4.5]
@@ -321,9 +340,26 @@ def test_parameters_of_all_nodes_are_listed_and_several_described() -> None:
 def test_what_is_dumped_can_be_loaded(tmp_path: Path) -> None:
     file = tmp_path / "talker.yaml"
     dumped = yaml.safe_load(out("param", "dump", "talker"))
-    dumped["/lab/talker"]["ros__parameters"] = {"speed": 0.25, "name": "loaded"}
+    values = dumped["/lab/talker"]["ros__parameters"]
+    assert values["start_type_description_service"] is True  # read-only, as in every ROS node
+    values.update(speed=0.25, name="loaded")
     file.write_text(yaml.safe_dump(dumped))
-    out("param", "load", "talker", str(file))
+    taken = json.loads(out("param", "load", "talker", str(file), "--json"))
+    del values["start_type_description_service"]
+    assert taken == dumped
     assert out("param", "get", "talker", "speed") == "0.25\n"
+
+
+def test_a_parameter_file_may_nest_names_and_use_wildcards(tmp_path: Path) -> None:
+    file = tmp_path / "robot.yaml"
+    file.write_text(
+        "/**: {ros__parameters: {speed: 1, for_others: 5}}\n"
+        "lab: {talker: {ros__parameters: {limits: {reach: 2}}}}\n"
+    )
+    assert out("param", "load", "talker", str(file)) == (
+        "/lab/talker speed: 1.0\n/lab/talker limits.reach: 2.0\n"
+    )
     file.write_text("/other: {ros__parameters: {speed: 1.0}}\n")
     assert "has nothing for /lab/talker" in error("param", "load", "talker", str(file))
+    file.write_text("/lab/talker: {speed: 1.0}\n")
+    assert "RC043 parameter-file" in error("param", "load", "talker", str(file))
