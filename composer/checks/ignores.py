@@ -3,6 +3,8 @@
 One stands behind what it is about, or on a line of its own before it. It holds for the findings
 that have their place, or one of the other places they show, on that line. Names and codes of rules
 are separated by commas; behind the bracket there may be a reason.
+
+Errors stay: no system runs that has one, and a robot must not start on the word of a comment.
 """
 
 from __future__ import annotations
@@ -19,10 +21,11 @@ RULE = register(
         code="RC502",
         name="unused-ignore",
         severity=Severity.WARNING,
-        summary="A comment silences a rule that finds nothing there.",
+        summary="A comment silences nothing: its rule finds nothing there, or an error.",
         why=(
             "The mistake it was about has been mended, or the rule's name is misspelt. Left where "
-            "it is, it would hide the next mistake."
+            "it is, it would hide the next mistake. Errors are not silenced: a system that has one "
+            "does not run."
         ),
         bad="""\
 system: silence
@@ -70,19 +73,24 @@ def without_ignored(
     """
     table = _Table()
     used: set[Span] = set()
+    refused: set[Span] = set()
     kept = []
     for finding in findings:
         ignores = {
-            ignore
+            ignore.span
             for span in (finding.primary, *(label.span for label in finding.related))
             for ignore in table.at(span)
             if ignore.concerns(finding.rule)
         }
-        used |= {ignore.span for ignore in ignores if ignore.span.file == source}
-        if not ignores:
+        if finding.severity is Severity.ERROR:
+            refused |= ignores
+        else:
+            used |= ignores
+        if finding.severity is Severity.ERROR or not ignores:
             kept.append(finding)
     if complete:
-        kept += [_unused(ignore) for ignore in ignores_in(source) if ignore.span not in used]
+        useless = (ignore for ignore in ignores_in(source) if ignore.span not in used)
+        kept += [_useless(ignore, is_error=ignore.span in refused) for ignore in useless]
     return kept
 
 
@@ -123,7 +131,10 @@ def _next_line(source: SourceFile, number: int) -> int:
     return next((line for line in behind if not _ONLY_COMMENT.match(source.line(line))), number)
 
 
-def _unused(ignore: Ignore) -> Diagnostic:
+def _useless(ignore: Ignore, *, is_error: bool) -> Diagnostic:
+    if is_error:
+        message = f"'{ignore.rule}' finds an error here, which no comment silences"
+        return Diagnostic(RULE, message, ignore.span, hint="mend it: no system runs that has one")
     names = {name for rule in registered_rules() for name in (rule.code, rule.name)}
     if ignore.rule in names:
         message = f"there is no '{ignore.rule}' to silence here"

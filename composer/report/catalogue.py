@@ -31,8 +31,8 @@ What `compose validate` finds. Errors keep a system from running; warnings and i
 This page is made from the rules themselves by `python tools/write_rules.py`; a test runs each
 example.
 
-A comment on the line of a finding, or on a line of its own before it, silences a rule there:
-`# compose: ignore[unheard-publisher]`.
+A comment on the line of a finding, or on a line of its own before it, silences a warning or an info
+there: `# compose: ignore[unheard-publisher]`. Errors are not silenced.
 """
 
 

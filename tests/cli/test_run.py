@@ -25,9 +25,14 @@ def test_options_change_the_plan() -> None:
     assert compose("run", "pipeline", "--dry-run", "--autostart", "unconfigured").out == ""
 
 
-def test_a_system_with_errors_is_refused_and_nothing_is_planned(tmp_path: Path) -> None:
+@pytest.mark.parametrize("comment", ["", "  # compose: ignore[unknown-node] two will come"])
+def test_a_system_with_errors_is_refused_whatever_its_comments_say(
+    comment: str, tmp_path: Path
+) -> None:
     path = tmp_path / "broken.yaml"
-    path.write_text("system: broken\nnodes:\n  one: {lifecycle: {depends_on: [two]}}\n")
+    path.write_text(
+        f"system: broken\nnodes:\n  one: {{lifecycle: {{depends_on: [two]}}}}{comment}\n"
+    )
     done = compose("run", str(path), "--dry-run")
     assert (done.code, done.out) == (1, "")
     assert "is not a node of this system" in done.err

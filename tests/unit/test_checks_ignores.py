@@ -68,14 +68,27 @@ def test_every_rule_of_a_comment_that_silences_nothing_is_told(tmp_path: Path) -
 def test_a_comment_at_a_related_place_silences_too(tmp_path: Path) -> None:
     nodes = (
         "system: demo\nnodes:\n"
+        "  planner: {lifecycle: {autostart: inactive}}  # MARK\n"
+        "  motor_controller: {lifecycle: {depends_on: [planner]}}\n"
+    )
+    assert rules_broken(nodes, tmp_path) == ["dependency-not-reached"]
+    silenced = nodes.replace("MARK", "compose: ignore[dependency-not-reached] moved by hand")
+    assert rules_broken(silenced, tmp_path) == []
+
+
+def test_no_comment_silences_an_error(tmp_path: Path) -> None:
+    text = (
+        "system: demo\nnodes:\n"
         "  lidar:\n"
         "    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data}}  # MARK\n"
         "  mapper:\n"
         "    subscriptions: {scan: {type: std_msgs/msg/String, qos: command}}\n"
     )
-    assert rules_broken(nodes, tmp_path) == ["qos-incompatible"]
-    silenced = nodes.replace("MARK", "compose: ignore[qos-incompatible] a demonstration")
-    assert rules_broken(silenced, tmp_path) == []
+    assert rules_broken(text, tmp_path) == ["qos-incompatible"]
+    commented = text.replace("MARK", "compose: ignore[qos-incompatible] on purpose")
+    found = findings_in(commented, tmp_path)
+    assert [item.rule.name for item in found] == ["unused-ignore", "qos-incompatible"]
+    assert found[0].message == "'qos-incompatible' finds an error here, which no comment silences"
 
 
 def test_a_comment_in_a_python_file_silences_what_is_found_there(tmp_path: Path) -> None:
