@@ -206,6 +206,7 @@ def _options(
         log_level=LogLevel(level.value),
         hard_exit=lambda: _end_hard(FINDINGS),
         tracing=tracing,
+        ends_process=True,
     )
 
 

@@ -57,6 +57,7 @@ class Crew:
         self.loops: dict[str, Loop] = {}
         #: The loops with a callback that does not return; nothing can be asked of their nodes.
         self.hung: set[str] = set()
+        self._keeps_entities = False
 
     def create(self) -> None:
         """Create all nodes and start their loops. Raises CreationFailed; nothing is started then.
@@ -111,23 +112,33 @@ class Crew:
             reason = f"it cannot be made anew: {describe(error)}"
             raise CreationFailed(old.full_name, reason) from error
 
-    def close(self, end_s: float) -> bool:
-        """Stop the loops and give the nodes back until ``time.monotonic()`` says ``end_s``.
+    def keep_entities(self) -> None:
+        """Let no node give anything back from now on: the process ends, and all goes with it."""
+        self._keeps_entities = True
+        for node in self.nodes.values():
+            node.keep_entities()
 
-        False when something is left that only the end of the process removes: Fast DDS takes longer
-        for each endpoint the more there are, seconds for 100 nodes, and a hung loop never ends.
-        What there is no time for is missed by others when its lease ends.
-        """
+    def stop_loops(self) -> None:
+        """End the threads of the nodes. What cannot be ended is in ``hung`` then."""
         for name, loop in self.loops.items():
             if not loop.stop(_LOOP_ENDS_WITHIN_S):
                 self.hung.add(name)
-        complete = True
+
+    def destroy(self, end_s: float) -> bool:
+        """Give the nodes back, with the loops stopped, until ``time.monotonic()`` says ``end_s``.
+
+        False when something is left that only the end of the process removes: Fast DDS takes longer
+        for each endpoint the more there are, seconds for 100 nodes, and a hung loop never ends.
+        """
+        if self._keeps_entities:
+            return False
+        complete = not self.hung
         for name in reversed(self.nodes):
             if self.is_lost(name) or time.monotonic() > end_s:
                 complete = False
             else:
                 self.nodes[name].destroy()
-        return complete and not self.hung
+        return complete
 
     def _remake(self, old: RunningNode) -> RunningNode:
         old.destroy()

@@ -193,9 +193,8 @@ class NodeSummary:
 class Outcome:
     """How a run ended. ``exit_code`` is 0 after a clean stop and 1 when a node failed.
 
-    ``hung`` is true when something remains that would hold up the end of the process: a callback
-    that never returned, or nodes there was no time to take out of the ROS graph. ``os._exit``
-    ends it at once.
+    ``hung`` is true when something remains that only the end of the process removes: a callback
+    that never returned, or nodes that were not given back one by one. ``os._exit`` has to end it.
     """
 
     exit_code: int

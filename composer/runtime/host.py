@@ -39,6 +39,7 @@ from composer.runtime.board import Board
 from composer.runtime.claim import claimed, refusal
 from composer.runtime.commands import Commands
 from composer.runtime.crew import FINALIZED, CreationFailed, Crew
+from composer.runtime.departure import can_leave_at_once, leave_at_once
 from composer.runtime.environment import prepare_environment
 from composer.runtime.events import NodeSummary, Outcome, Report
 from composer.runtime.figures import CallbackFigures, figures
@@ -64,6 +65,8 @@ _DOWN = (PrimaryState.UNCONFIGURED.value, FINALIZED)
 #: The most that one step of the tear-down may take of the time for all of it.
 _STEP_SHARE = 0.6
 _HURRY_S = 0.2
+#: So many nodes are given back one by one within half a second.
+_FEW_NODES = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +77,8 @@ class HostOptions:
     ``run_for_s`` ends it by itself; ``bring_up_within_s`` is the time for the whole bring-up;
     ``transition_timeout_s`` goes before what the system says; ``stop_within_s`` is the time for the
     whole tear-down. If the process still stands ``grace_s`` after the request to stop,
-    ``hard_exit`` is called, on a thread of its own: it is to end the process.
+    ``hard_exit`` is called, on a thread of its own: it is to end the process. ``ends_process``
+    promises that the process ends once the run has, by ``os._exit`` where the outcome says so.
     """
 
     run_for_s: float | None = None
@@ -85,6 +89,7 @@ class HostOptions:
     grace_s: float = 10.0
     hard_exit: Callable[[], None] | None = None
     tracing: bool = True
+    ends_process: bool = False
 
 
 class Host:
@@ -121,6 +126,7 @@ class Host:
         self._farewells: list[Command] = []
         self._end_s = math.inf  # when the tear-down has to be through
         self._remains = False  # something that only the end of the process removes
+        self._has_left = False  # all of it is out of the ROS graph
 
     def stop(self, reason: str) -> None:
         """Ask for the end, from any thread or a signal handler. Asking again hurries."""
@@ -138,7 +144,8 @@ class Host:
             try:
                 self._run(namespace)
             finally:
-                try_shutdown()
+                if not self._has_left:  # or there is nothing left to shut down
+                    try_shutdown()
         return self._outcome()
 
     def _run(self, namespace: str) -> None:
@@ -260,6 +267,12 @@ class Host:
         self._failed = self._failed or self._supervisor.has_failed_nodes
         self._board.set_activity("stopping")
         self._reporter.tell(events.Stopping(self._reporter.elapsed_s, self._reason))
+        if (
+            self._options.ends_process
+            and len(self._crew.nodes) > _FEW_NODES
+            and can_leave_at_once()
+        ):
+            self._crew.keep_entities()
         stop_within_s = self._options.stop_within_s
         self._end_s = time.monotonic() + stop_within_s
         if self._is_created:
@@ -287,9 +300,15 @@ class Host:
         end_s = self._end_s
         if self._inbox.hurry:
             end_s = min(end_s, time.monotonic() + _HURRY_S)
-        self._remains = not self._crew.close(end_s)
+        self._crew.stop_loops()
+        self._remains = not self._crew.destroy(end_s)
         self._failed = self._failed or bool(self._crew.hung)
-        manager.close(linger=bool(self._farewells))
+        manager.retire(linger=bool(self._farewells))
+        # A thread that hangs may come back and use what is gone.
+        if self._remains and self._options.ends_process and not self._crew.hung:
+            self._has_left = leave_at_once()
+        if not self._has_left:
+            manager.destroy()
 
     def _outcome(self) -> Outcome:
         return Outcome(

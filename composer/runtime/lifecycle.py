@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 from lifecycle_msgs.msg import State, Transition, TransitionDescription
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
+from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -89,6 +90,7 @@ class Lifecycle:
         self._timeout_s = timeout_s
         self._lock = threading.Lock()
         self._under_way: Future[None] | None = None
+        self._last_state = ""
         with node.handle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, True)
         self._services = _services(node, self._machine)
@@ -104,8 +106,15 @@ class Lifecycle:
 
     @property
     def state(self) -> str:
-        """The label of the state: a primary one, or a transition state such as *activating*."""
-        return str(self._machine.current_state[1])
+        """The label of the state: a primary one, or a transition state such as *activating*.
+
+        From any thread, also while the machine is destroyed; after that it is the last one.
+        """
+        try:
+            with self._machine:
+                return str(self._machine.current_state[1])
+        except InvalidHandle:
+            return self._last_state
 
     @property
     def legal(self) -> Mapping[str, int]:
@@ -127,6 +136,7 @@ class Lifecycle:
         for service in self._services:
             self._loop.remove(service)
             self._node.destroy_service(service)
+        self._last_state = self.state
         self._machine.destroy_when_not_in_use()
 
     def _begin(self) -> Future[None] | None:

@@ -113,8 +113,8 @@ class Manager:
         self._loop.call_soon(self._publish)
         board.on_change(self._publish_soon)
 
-    def close(self, *, linger: bool) -> None:
-        """Tell the last state and leave; with ``linger`` an answer that was given just now arrives.
+    def retire(self, *, linger: bool) -> None:
+        """Tell the last state and fall silent; with ``linger`` an answer given just now arrives.
 
         With shared memory it would be gone with the node.
         """
@@ -123,6 +123,9 @@ class Manager:
         if linger:
             time.sleep(_ANSWERS_ARRIVE_WITHIN_S)
         self._loop.stop(_ENDS_WITHIN_S)
+
+    def destroy(self) -> None:
+        """Leave the ROS graph."""
         self._node.destroy_node()
 
     def _serve(self, name: str, callback: Callable[[Any, Reply], None]) -> None:

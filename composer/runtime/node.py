@@ -106,6 +106,7 @@ class RunningNode:
         self._standby = replace(self._core, gate=Gate(model.full_name))
         self._behavior: Any = None
         self._assembly = Assembly(self._core, self._standby)
+        self._keeps_entities = False
         loop.add_node(self._ros)
         self._lifecycle = Lifecycle(self._core, self, timeout_s=options.transition_timeout_s)
 
@@ -142,6 +143,10 @@ class RunningNode:
     async def change(self, transition: str) -> Result:
         """Make a transition when no other one is under way. Raises nothing."""
         return await self._lifecycle.change(transition)
+
+    def keep_entities(self) -> None:
+        """Keep ports when they are to be given back: the process ends, and they go with it."""
+        self._keeps_entities = True
 
     def destroy(self) -> None:
         """Give back everything, whatever the state. No transition can be made afterwards."""
@@ -243,6 +248,8 @@ class RunningNode:
 
     def _release(self) -> None:
         self._core.cancel_tasks()
+        if self._keeps_entities:
+            return
         for port in reversed(tuple(self._assembly.ports)):
             try:
                 port.destroy()

@@ -1,0 +1,102 @@
+"""A large system leaves the ROS graph in one go, and nothing of it is left behind."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import yaml
+from std_srvs.srv import Trigger
+
+from composer.runtime.shared_memory import SHARED_MEMORY
+from tests.ros.system_bench import PATIENCE_S, Peer, running, wait_until
+
+NODES = 40
+#: Others give up on a participant that says nothing after so long.
+MISSED_ANYWAY_S = 20.0
+COUNT = f"{NODES} of {NODES} nodes active"
+
+
+def large_system() -> str:
+    """Return a system in which each node answers, sends, listens, and says when it goes."""
+    nodes = {
+        f"node_{index:02}": {
+            "publishers": {"output": {"type": "std_msgs/msg/String", "external": True}},
+            "subscriptions": {"input": {"type": "std_msgs/msg/String", "external": True}},
+            "services": {
+                "answer": {
+                    "type": "std_srvs/srv/Trigger",
+                    "service": f"/node_{index:02}/answer",
+                    "external": True,
+                    "respond": {"success": True},
+                }
+            },
+            "on_cleanup": {"log": "tidied up"},
+        }
+        for index in range(NODES)
+    }
+    return yaml.safe_dump({"system": "large", "nodes": nodes})
+
+
+def test_a_large_system_is_gone_for_others_as_soon_as_it_ends(tmp_path: Path, peer: Peer) -> None:
+    before = set(SHARED_MEMORY.iterdir())
+    path = tmp_path / "large.yaml"
+    path.write_text(large_system(), encoding="utf-8")
+    command = [sys.executable, "-m", "composer", "run", str(path)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        said = []
+        for line in process.stderr:
+            said.append(line)
+            if COUNT in line:
+                break
+        client = peer.client(Trigger, "/node_07/answer")
+        ours = shared_memory_of(process.pid)
+        began_s = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        said += process.stderr.readlines()
+        code = process.wait(PATIENCE_S)
+    text = "".join(said)
+    assert code == 0, text
+    assert text.count("tidied up") == NODES
+    assert text.index("/node_39 finalized") < text.index("/node_00 finalized")
+    wait_until(lambda: not client.service_is_ready(), "the end of the server")
+    wait_until(lambda: peer.node.get_node_names() == [peer.node.get_name()], "an empty graph")
+    assert time.monotonic() - began_s < MISSED_ANYWAY_S / 2
+    assert not [path for path in ours - before if path.exists()]
+
+
+def test_a_state_can_be_asked_for_while_the_node_is_destroyed(tmp_path: Path) -> None:
+    nodes = {f"node_{index}": {} for index in range(10)}
+    text = yaml.safe_dump({"system": "small", "nodes": nodes})
+    states: set[str] = set()
+    over = threading.Event()
+    with running(text, tmp_path) as system:
+        crew = system.host._crew
+
+        def look() -> None:
+            while not over.wait(0.001):
+                states.update(node.state for node in tuple(crew.nodes.values()))
+
+        looking = threading.Thread(target=look)
+        looking.start()
+        outcome = system.stop()
+        over.set()
+        looking.join(PATIENCE_S)
+    assert (outcome.exit_code, outcome.hung) == (0, False)
+    assert {node.state for node in crew.nodes.values()} == {"finalized"}
+    assert "finalized" in states
+
+
+def shared_memory_of(pid: int) -> set[Path]:
+    """Return Fast DDS's files in shared memory that a process uses, but for those of ports.
+
+    A port is open as long as anybody writes to it.
+    """
+    text = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8")
+    return set(map(Path, re.findall(rf"{SHARED_MEMORY}/fastrtps_[0-9a-f]+\b", text)))
