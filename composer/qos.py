@@ -52,6 +52,11 @@ class QosProfile:
     liveliness: Liveliness = Liveliness.AUTOMATIC
     liveliness_lease_duration_ms: float | None = None
 
+    @property
+    def queue_depth(self) -> int | None:
+        """How many messages may wait; None where the history keeps all."""
+        return None if self.history is History.KEEP_ALL else max(self.depth, 1)
+
 
 #: The profiles that can be named without being declared.
 #:

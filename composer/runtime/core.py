@@ -10,6 +10,7 @@ from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
 from composer.behavior import CallCancelled
+from composer.runtime.delivery.delivery import Delivery
 from composer.runtime.gate import Gate
 from composer.runtime.log import Faults, Log
 from composer.runtime.loop import Loop
@@ -26,8 +27,9 @@ _NANOSECONDS = 1e-9
 class Core:
     """One node's ROS handle, loop, gate, log and counters.
 
-    ``names`` is what every expression of the node may use: ``parameters``, ``state``, ``node``.
-    ``group`` is the callback group of its ports.
+    ``delivery`` is where its ports meet those of other nodes of the process. ``names`` is what
+    every expression of the node may use: ``parameters``, ``state``, ``node``. ``group`` is the
+    callback group of its ports.
     """
 
     node: Node
@@ -38,6 +40,7 @@ class Core:
     faults: Faults
     statistics: Statistics
     names: dict[str, Any]
+    delivery: Delivery
     tasks: set[Future[Any]] = field(default_factory=set)
     group: CallbackGroup = field(default_factory=MutuallyExclusiveCallbackGroup)
 

@@ -8,6 +8,8 @@ from functools import partial
 
 from composer.behavior import CallCancelled
 from composer.model import Executor, ExecutorKind, LogLevel, Node, PrimaryState, System
+from composer.runtime.delivery.choice import shared_topics
+from composer.runtime.delivery.delivery import Delivery
 from composer.runtime.executors import log_exception, make_loop
 from composer.runtime.log import describe
 from composer.runtime.loop import Loop
@@ -53,6 +55,7 @@ class Crew:
         self._transition_timeout_s = transition_timeout_s
         self._tracing = tracing
         self._executors = {executor.name.value: executor for executor in system.executors}
+        self._delivery = Delivery({})
         self.nodes: dict[str, RunningNode] = {}
         self.loops: dict[str, Loop] = {}
         #: The loops with a callback that does not return; nothing can be asked of their nodes.
@@ -64,6 +67,7 @@ class Crew:
 
         A node that cannot be created leaves those before it to be closed.
         """
+        self._delivery = Delivery(shared_topics(self._system))
         for node in self._system.nodes:
             try:
                 self.nodes[node.name.value] = self._make(node)
@@ -150,6 +154,7 @@ class Crew:
         if name not in self.loops:
             self.loops[name] = make_loop(executor, _take_exception)
         options = NodeOptions(
+            delivery=self._delivery,
             parallel=executor.kind is ExecutorKind.MULTI_THREADED,
             log_level=self._log_level,
             transition_timeout_s=self._timeout_s(node),

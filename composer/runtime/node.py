@@ -19,6 +19,7 @@ from composer.model import Event, LogLevel, Node
 from composer.runtime.assembly import Assembly
 from composer.runtime.behaviors import Named, NodeClock, behavior_class, method
 from composer.runtime.core import Core
+from composer.runtime.delivery.delivery import Delivery
 from composer.runtime.gate import Gate
 from composer.runtime.lifecycle import Lifecycle, Result
 from composer.runtime.log import Faults, Log, Write, describe
@@ -43,8 +44,13 @@ class WrongReturn(Exception):
 
 @dataclass(frozen=True, slots=True)
 class NodeOptions:
-    """How a node is run. ``parallel`` is true when its loop has several threads."""
+    """How a node is run.
 
+    ``delivery`` is where its ports meet those of the nodes beside it; ``parallel`` is true when its
+    loop has several threads.
+    """
+
+    delivery: Delivery
     parallel: bool = False
     log_level: LogLevel = LogLevel.INFO
     transition_timeout_s: float = 10.0
@@ -97,6 +103,7 @@ class RunningNode:
             faults=Faults(log, self.statistics, listener.on_fault),
             statistics=self.statistics,
             names={"parameters": {}, "state": {}, "node": model.full_name},
+            delivery=options.delivery,
         )
         parameters = Parameters(
             self._ros, model.parameters, objection=self._objection, changed=self._changed

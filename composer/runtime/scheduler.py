@@ -183,9 +183,9 @@ class Scheduler:
                 self._timers.repeat(call)
 
     def _run_calls(self) -> None:
-        for _ in range(min(len(self._calls), _ROUND)):
+        for _ in range(_ROUND):  # those that calls bring about included
             self._call(self._calls.popleft())
-            if monotonic() >= self._timers.next_s:
+            if not self._calls or monotonic() >= self._timers.next_s:
                 return
 
     def _wait(self) -> list[tuple[int, int]]:

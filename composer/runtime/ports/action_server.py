@@ -16,7 +16,6 @@ from composer.runtime.messages import Build, compile_message, interface_class
 from composer.runtime.ports.goal import RunningGoal
 from composer.runtime.ports.port import callback_group
 from composer.runtime.ports.profiles import rclpy_profile
-from composer.runtime.ports.subscription import queue_depth
 from composer.runtime.reactions import RunningReaction
 from composer.runtime.tasks import Cancelled, Future, sleep, within
 from composer.runtime.tracing import CallbackTimer
@@ -57,7 +56,7 @@ class ActionServerPort:
         if port.result is not None:
             self._result = compile_message(port.result, self._type.Result, "'result'")
         self._goals: dict[bytes, RunningGoal] = {}
-        self._limit = None if port.reentrant else queue_depth(port.qos.profile)
+        self._limit = None if port.reentrant else port.qos.profile.queue_depth
         self._count = 0
         traced = core.statistics.callback(port.kind.value, self._name)
         self._timer = CallbackTimer(core, traced, port.budget_ms)

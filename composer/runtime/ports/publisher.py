@@ -25,7 +25,10 @@ class PublisherPort:
             rclpy_profile(port.qos.profile),
             callback_group=core.group,
         )
-        self._send = self._publisher.publish
+        self._send, self._leave = core.delivery.add_publisher(port, self._publisher)
+        objection = core.delivery.objection(port)
+        if objection is not None:
+            core.log.debug(f"publisher '{port.name}' publishes by DDS alone: {objection}")
         self._warned = False
         self.sent = 0
 
@@ -47,6 +50,7 @@ class PublisherPort:
 
     def destroy(self) -> None:
         """Leave the topic."""
+        self._leave()
         self._core.node.destroy_publisher(self._publisher)
 
     def _drop(self) -> None:

@@ -7,8 +7,9 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 from composer.model import Port
-from composer.qos import Durability, History, QosProfile
+from composer.qos import Durability
 from composer.runtime.core import Core
+from composer.runtime.delivery.queue import Queue
 from composer.runtime.line import Line
 from composer.runtime.messages import interface_class
 from composer.runtime.ports.port import callback_group
@@ -37,7 +38,7 @@ class SubscriptionPort:
         self._name = port.name.value
         self._reaction = reaction
         self._handler = handler
-        depth = queue_depth(port.qos.profile)
+        depth = port.qos.profile.queue_depth
         self._traced = core.statistics.callback(port.kind.value, self._name)
         timer = CallbackTimer(core, self._traced, port.budget_ms)
         self._line = Line(
@@ -56,6 +57,8 @@ class SubscriptionPort:
             rclpy_profile(port.qos.profile),
             callback_group=callback_group(core, port),
         )
+        queue = Queue(core.loop.call_soon, self.receive, depth, self._count_drop)
+        self._leave = core.delivery.add_subscription(port, self._subscription, queue)
         core.loop.add_subscription(self._subscription, self.receive)
 
     def receive(self, message: Any) -> None:
@@ -86,8 +89,12 @@ class SubscriptionPort:
 
     def destroy(self) -> None:
         """Leave the topic."""
+        self._leave()
         self._core.loop.remove(self._subscription)
         self._core.node.destroy_subscription(self._subscription)
+
+    def _count_drop(self) -> None:
+        self._statistics.dropped += 1
 
     def _work(self, message: Any) -> Coroutine[Any, Any, None] | None:
         if self._reaction is not None:
@@ -98,8 +105,3 @@ class SubscriptionPort:
         if self._handler is None:
             return None
         return self._core.call(f"on_{self._name}", self._handler, message)
-
-
-def queue_depth(profile: QosProfile) -> int | None:
-    """Return how many messages may wait; None where the history keeps all."""
-    return None if profile.history is History.KEEP_ALL else max(profile.depth, 1)

@@ -1,0 +1,5 @@
+"""In-process delivery between the ports of one system (DESIGN: The runtime, Delivery).
+
+Messages, requests and answers go straight from port to port, by reference. The DDS endpoints are
+there all the same, and serve whoever is outside.
+"""

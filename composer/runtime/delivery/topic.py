@@ -1,0 +1,134 @@
+"""One topic within the process: who publishes, who listens, and what goes out by DDS as well."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.publisher import Publisher
+from rclpy.serialization import deserialize_message
+
+from composer.qos import Durability, QosProfile, incompatibilities
+from composer.runtime.delivery.queue import Queue
+
+Send = Callable[[Any], None]
+
+
+class Inlet:
+    """A subscription, as publishers of its topic see it."""
+
+    __slots__ = ("message_type", "profile", "queue")
+
+    def __init__(self, message_type: Any, profile: QosProfile, queue: Queue) -> None:
+        self.message_type = message_type
+        self.profile = profile
+        self.queue = queue
+
+
+class Outlet:
+    """A publisher: hands each message to the inlets it matches, and to DDS where that is needed.
+
+    ``send`` may be called from any thread.
+    """
+
+    def __init__(self, publisher: Publisher, profile: QosProfile) -> None:
+        self.message_type: Any = publisher.msg_type
+        self.profile = profile
+        self._publish: Send = publisher.publish
+        self._count_matched: Callable[[], int] = publisher.handle.get_subscription_count
+        self._inlets: tuple[Inlet, ...] = ()
+        self._puts: tuple[Send, ...] = ()
+        self._matched_here = 0
+        self._latched: deque[Any] | None = None
+        self.send: Send = self._send
+        if profile.durability is Durability.TRANSIENT_LOCAL:
+            self._latched = deque(maxlen=profile.queue_depth)
+            self._lock = threading.Lock()  # who joins gets each message once
+            self.send = self._send_and_latch
+
+    def join(self, inlet: Inlet) -> None:
+        """Hand messages to ``inlet`` from now on, if they match; what is latched first."""
+        if inlet.message_type is not self.message_type:
+            return
+        if incompatibilities(self.profile, inlet.profile):
+            return
+        if self._latched is None:
+            self._reach((*self._inlets, inlet))
+            return
+        with self._lock:
+            if inlet.profile.durability is Durability.TRANSIENT_LOCAL:
+                for message in self._latched:
+                    inlet.queue.put(message)
+            self._reach((*self._inlets, inlet))
+
+    def leave(self, inlet: Inlet) -> None:
+        """Hand it no more."""
+        self._reach(tuple(kept for kept in self._inlets if kept is not inlet))
+
+    def _reach(self, inlets: tuple[Inlet, ...]) -> None:
+        self._inlets = inlets
+        self._matched_here = len(inlets)
+        self._puts = tuple(inlet.queue.put for inlet in inlets)
+
+    def _send(self, message: Any) -> None:
+        if message.__class__ is not self.message_type:
+            message = self._converted(message)
+        for put in self._puts:
+            put(message)
+        if self._count_matched() > self._matched_here:
+            self._publish(message)
+
+    def _send_and_latch(self, message: Any) -> None:
+        message = self._converted(message)
+        with self._lock:
+            if self._latched is not None:
+                self._latched.append(message)
+            for put in self._puts:
+                put(message)
+            self._publish(message)  # somebody who is not here yet may want it
+
+    def _converted(self, message: Any) -> Any:
+        """Return what rclpy would publish. Raises TypeError where it would."""
+        if isinstance(message, self.message_type):
+            return message
+        if isinstance(message, bytes):
+            return deserialize_message(message, self.message_type)
+        raise TypeError(f"Expected {self.message_type}, got {type(message)}")
+
+
+class Topic:
+    """Everybody of the process who has joined the topic now."""
+
+    def __init__(self) -> None:
+        self._outlets: list[Outlet] = []
+        self._inlets: list[Inlet] = []
+        self._lock = threading.Lock()
+
+    def add_outlet(self, outlet: Outlet) -> None:
+        """Have it meet everybody who listens."""
+        with self._lock:
+            self._outlets.append(outlet)
+            for inlet in self._inlets:
+                outlet.join(inlet)
+
+    def remove_outlet(self, outlet: Outlet) -> None:
+        """Forget it, and what is latched in it."""
+        with self._lock:
+            self._outlets.remove(outlet)
+
+    def add_inlet(self, inlet: Inlet) -> None:
+        """Have it meet everybody who publishes."""
+        with self._lock:
+            self._inlets.append(inlet)
+            for outlet in self._outlets:
+                outlet.join(inlet)
+
+    def remove_inlet(self, inlet: Inlet) -> None:
+        """Have nothing more received."""
+        with self._lock:
+            self._inlets.remove(inlet)
+            for outlet in self._outlets:
+                outlet.leave(inlet)
+        inlet.queue.close()
