@@ -1,0 +1,196 @@
+"""Messages between co-located ports: straight, in order, and by DDS to whoever is outside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Int64
+
+from tests.ros.system_bench import Peer, RunningSystem, running, wait_until
+
+
+@pytest.fixture
+def outsider() -> Iterator[Callable[[], Peer]]:
+    """Joins when it is called: what goes in the process is to go without anybody outside."""
+    peers: list[Peer] = []
+
+    def join() -> Peer:
+        peers.append(Peer())
+        return peers[-1]
+
+    yield join
+    for peer in peers:
+        peer.close()
+
+
+NUMBERS = """
+system: numbers
+executors: {other: {kind: KIND}}
+nodes:
+  source:
+    behavior: counting:Source
+    publishers:
+      numbers: {type: std_msgs/msg/Int64, qos: {depth: 100}}
+  near:
+    behavior: counting:Listener
+    subscriptions:
+      numbers: {type: std_msgs/msg/Int64, qos: {depth: 100}}
+  far:
+    executor: other
+    behavior: counting:Listener
+    subscriptions:
+      numbers: {type: std_msgs/msg/Int64, qos: {depth: 100}}
+"""
+MODULE = """
+from composer.behavior import Behavior
+from std_msgs.msg import Int64
+
+class Source(Behavior):
+    def on_configure(self):
+        self.next = 0
+        self.sent = []
+
+    def send(self, count):
+        for _ in range(count):
+            self.sent.append(Int64(data=self.next))
+            self.publishers.numbers.publish(self.sent[-1])
+            self.next += 1
+
+class Listener(Behavior):
+    def on_configure(self):
+        self.heard = []
+
+    def on_numbers(self, message):
+        self.heard.append(message)
+"""
+
+
+def behavior(system: RunningSystem, node: str) -> Any:
+    return system.host._crew.nodes[node]._behavior
+
+
+def send(system: RunningSystem, count: int) -> None:
+    """Have the source publish so many at once, in a callback of its loop."""
+    source = system.host._crew.nodes["source"]
+    source.loop.run(lambda: source._behavior.send(count))
+
+
+def change(system: RunningSystem, node: str, *transitions: str) -> None:
+    running_node = system.host._crew.nodes[node]
+    for transition in transitions:
+        running_node.loop.run_task(running_node.change(transition))
+        goal = {"activate": "active", "cleanup": "unconfigured"}.get(transition, "inactive")
+        wait_until(lambda goal=goal: running_node.state == goal, f"{node} {goal}")
+
+
+def numbers(messages: list[Any]) -> list[int]:
+    return [message.data for message in messages]
+
+
+@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+def test_what_is_published_is_what_is_received_and_outsiders_hear_it_too(
+    tmp_path: Path, outsider: Callable[[], Peer], kind: str
+) -> None:
+    with running(NUMBERS.replace("KIND", kind), tmp_path, counting=MODULE) as system:
+        near, far, source = (behavior(system, name) for name in ("near", "far", "source"))
+        send(system, 50)
+        wait_until(lambda: len(near.heard) == len(far.heard) == 50)
+        # By reference: nothing of it went through DDS.
+        for listener in (near, far):
+            assert all(a is b for a, b in zip(listener.heard, source.sent, strict=True))
+
+        peer = outsider()
+        outside = peer.listen(Int64, "/numbers", 100)
+        port = system.host._crew.nodes["source"]._assembly.publishers["numbers"]
+        wait_until(lambda: port._publisher.get_subscription_count() == 3)
+        send(system, 50)
+        wait_until(lambda: len(outside) == 50)
+        wait_until(lambda: len(near.heard) == len(far.heard) == 100)
+        assert numbers(outside) == list(range(50, 100))
+        assert numbers(near.heard) == numbers(far.heard) == list(range(100))
+
+        intruder = peer.publisher(Int64, "/numbers", 100)
+        wait_until(lambda: intruder.get_subscription_count() == 3)  # its own is one of them
+        intruder.publish(Int64(data=-1))
+        wait_until(lambda: len(near.heard) == len(far.heard) == 101)
+        assert near.heard[-1].data == far.heard[-1].data == -1
+        # As many ends as ROS tools are to see.
+        assert peer.node.count_publishers("/numbers") == 2
+        assert peer.node.count_subscribers("/numbers") == 3
+
+
+def test_what_is_under_way_when_its_reader_leaves_active_is_dropped(tmp_path: Path) -> None:
+    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
+        change(system, "near", "deactivate")
+        send(system, 3)
+        near = system.host._crew.nodes["near"]
+        wait_until(lambda: near.statistics.dropped == 3)
+        change(system, "near", "activate")
+        send(system, 2)
+        wait_until(lambda: len(near._behavior.heard) == 2)
+        assert numbers(near._behavior.heard) == [3, 4]
+        # A node that is cleaned up has no subscription: nothing is kept for it.
+        change(system, "near", "deactivate", "cleanup")
+        send(system, 2)
+        wait_until(lambda: len(behavior(system, "far").heard) == 7)
+        change(system, "near", "configure", "activate")
+        send(system, 1)
+        wait_until(lambda: len(near._behavior.heard) == 1)
+        assert numbers(near._behavior.heard) == [7]
+        assert near.statistics.dropped == 3
+        far = behavior(system, "far")
+        wait_until(lambda: len(far.heard) == 8)
+        assert numbers(far.heard) == list(range(8))
+
+
+def test_a_flood_leaves_what_the_depth_allows_and_the_rest_is_counted(tmp_path: Path) -> None:
+    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
+        send(system, 1000)
+        near = system.host._crew.nodes["near"]
+        wait_until(lambda: len(near._behavior.heard) == 100)
+        assert numbers(near._behavior.heard) == list(range(900, 1000))
+        assert near.statistics.dropped == 900
+
+
+LATCHED = """
+system: latched
+nodes:
+  setter:
+    publishers: {mode: {type: std_msgs/msg/Int64, qos: {extends: state, depth: 2}}}
+    behavior: setter:Setter
+  late:
+    lifecycle: {autostart: unconfigured}
+    subscriptions:
+      mode: {type: std_msgs/msg/Int64, qos: {extends: state, depth: 5}, log: "late {message.data}"}
+  volatile:
+    lifecycle: {autostart: unconfigured}
+    subscriptions:
+      mode: {type: std_msgs/msg/Int64, log: "volatile {message.data}"}
+"""
+
+
+def test_who_joins_late_gets_what_is_latched_once_inside_and_outside(
+    tmp_path: Path, outsider: Callable[[], Peer]
+) -> None:
+    module = """
+    from composer.behavior import Behavior
+    from std_msgs.msg import Int64
+
+    class Setter(Behavior):
+        def on_activate(self):
+            for number in (1, 2, 3):
+                self.publishers.mode.publish(Int64(data=number))
+    """
+    with running(LATCHED, tmp_path, setter=module) as system:
+        for node in ("volatile", "late"):
+            change(system, node, "configure", "activate")
+        system.wait_for_log("late 3")
+        profile = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        outside = outsider().listen(Int64, "/mode", profile)
+        wait_until(lambda: len(outside) == 2)
+        assert numbers(outside) == [2, 3]
+    assert system.log() == ["late 2", "late 3"]
