@@ -6,6 +6,7 @@ import hashlib
 import importlib
 import importlib.util
 import sys
+import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
@@ -18,6 +19,9 @@ from composer.runtime.tasks import Future, sleep
 
 #: A behaviour's method, or None where it has none of that name.
 Method = Callable[..., Any]
+
+#: Nodes of several loops may want the same file at once; nobody is to get a half of it.
+_IMPORTING = threading.RLock()
 
 
 class BehaviorError(Exception):
@@ -65,8 +69,11 @@ def _module_of_file(path: Path) -> ModuleType:
     """Import a file under a name of its own, so that ``planner.py`` of two folders are two."""
     mark = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
     name = f"_composer_behavior_{mark}_{path.stem}"
-    if name in sys.modules:
-        return sys.modules[name]
+    with _IMPORTING:
+        return sys.modules.get(name) or _imported(name, path)
+
+
+def _imported(name: str, path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise BehaviorError(f"{path} is not a Python file")

@@ -1,0 +1,20 @@
+"""A behaviour's file is imported once, whoever wants it at the same time."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from composer.model import BehaviorReference
+from composer.runtime.behaviors import behavior_class
+from composer.source import Located, SourceFile, Span
+
+
+def test_nodes_of_several_loops_get_the_whole_module(tmp_path: Path) -> None:
+    module = "import time\ntime.sleep(0.1)\nclass Late:\n    pass\n"
+    tmp_path.joinpath("late.py").write_text(module, encoding="utf-8")
+    span = Span(SourceFile("system.yaml", ""), 1, 1, 1)
+    reference = BehaviorReference(Located("late:Late", span), tmp_path)
+    with ThreadPoolExecutor(4) as threads:
+        classes = list(threads.map(lambda _: behavior_class(reference), range(4)))
+    assert len(set(classes)) == 1
