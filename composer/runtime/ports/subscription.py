@@ -71,8 +71,7 @@ class SubscriptionPort:
             return
         self._statistics.received += 1
         if self._line.put(message) is not None:
-            self._statistics.dropped += 1
-            self._traced.dropped += 1
+            self._count_drop()
 
     def activate(self) -> None:
         """Take what was latched meanwhile."""
@@ -95,6 +94,7 @@ class SubscriptionPort:
 
     def _count_drop(self) -> None:
         self._statistics.dropped += 1
+        self._traced.dropped += 1
 
     def _work(self, message: Any) -> Coroutine[Any, Any, None] | None:
         if self._reaction is not None:
