@@ -1,15 +1,18 @@
 """The whole pure pipeline: from a file to its model and everything that is wrong with it.
 
-Document, kind, variables, schema, model, checks - each stage runs on whatever the one before left
-it, so that one run shows every finding (DESIGN: The way data flows).
+Document, kind, what is included, variables, schema, model, checks - each stage runs on whatever the
+one before left it, so that one run shows every finding (DESIGN: The way data flows).
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Mapping as Map
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from composer.assembly import NodeTypeFile, assemble, inherited
+from composer.assembly.telling import once, with_includes
 from composer.catalog import Catalog, interface_folders
 from composer.checks import Context, all_checks, run_checks
 from composer.checks.ignores import without_ignored
@@ -21,9 +24,10 @@ from composer.interfaces import Interfaces
 from composer.model import System
 from composer.project import SETTINGS_FILE, Project, Settings
 from composer.project.choices import told, wrong_choices
-from composer.resolve import Overrides, check_kind, read_overrides, resolve
-from composer.schema import check_schema, kind_of
-from composer.source import SourceFile
+from composer.resolve import Overrides, read_overrides, resolve
+from composer.schema import check_schema, kind_of, kinds
+from composer.schema.kinds import check_kind
+from composer.source import SourceFile, Span
 from composer.tree import Mapping
 
 
@@ -32,7 +36,7 @@ class Loading:
     """What came of a file. ``system`` is None when too little of it could be read.
 
     ``source`` is the text, ``project`` what it belongs to; ``catalog`` and ``interfaces`` are what
-    the checks knew.
+    the checks knew. ``tree`` is all that the file says together with what it includes or extends.
     """
 
     system: System | None
@@ -41,6 +45,7 @@ class Loading:
     project: Project
     catalog: Catalog
     interfaces: Interfaces
+    tree: Mapping | None = None
 
     @property
     def runnable(self) -> bool:
@@ -96,14 +101,35 @@ def load_bytes(
     )
 
 
+def findings_of(loadings: Collection[Loading]) -> list[Diagnostic]:
+    """Return what is to be said of all files together, and of each, everything once.
+
+    What is found in a file that is itself among them is told of it alone, and not again of the
+    systems that include or use it.
+    """
+    own = {
+        (finding.rule.code, str(finding.primary))
+        for loading in loadings
+        for finding in loading.diagnostics
+        if finding.primary.file == loading.source
+    }
+    findings = project_findings(loadings)
+    for loading in loadings:
+        findings += (
+            finding
+            for finding in loading.diagnostics
+            if finding.primary.file == loading.source
+            or (finding.rule.code, str(finding.primary)) not in own
+        )
+    return in_order(findings)
+
+
 def project_findings(loadings: Collection[Loading]) -> list[Diagnostic]:
     """Return what is to be said of files only when they are looked at together."""
-    loaded = [
-        (loading.system, loading.catalog) for loading in loadings if loading.system is not None
-    ]
+    systems = [loading.system for loading in loadings if loading.system is not None]
     settings = {loading.source.path: loading.project.settings for loading in loadings}
     findings: list[Diagnostic] = []
-    for finding in unused_node_types(loaded):
+    for finding in unused_node_types(systems):
         kept = without_ignored([finding], finding.primary.file, complete=False)
         findings += told(kept, settings[finding.primary.file.path])
     return in_order(findings)
@@ -134,18 +160,29 @@ def _load(
     known: _Known,
     overrides: Overrides,
 ) -> Loading:
-    system, findings = _resolved(tree, source, known, overrides) if tree else (None, [])
-    findings = [*found, *findings]
+    resolved = _resolved(tree, source, known, overrides) if tree else _Resolved()
+    system = resolved.system
+    findings = [*found, *resolved.findings]
     if system is not None:
         refused = tuple(item.primary for item in findings if item.severity is Severity.ERROR)
         context = Context(system, known.interfaces, known.catalog, refused)
         findings.extend(run_checks(context))
+        findings = once(findings, (node.name for node in system.nodes))
+    findings = with_includes(findings, resolved.included)
     # In a node type alone much goes unsaid that its comments may be about.
     judged = system is not None and not system.node_type
     kept = without_ignored(findings, source, complete=judged)
     settings = known.project.settings
     chosen = [*told(kept, settings), *known.project.findings, *_wrong_choices(settings)]
-    return Loading(system, in_order(chosen), source, known.project, known.catalog, known.interfaces)
+    return Loading(
+        system,
+        in_order(chosen),
+        source,
+        known.project,
+        known.catalog,
+        known.interfaces,
+        resolved.tree,
+    )
 
 
 def _wrong_choices(settings: Settings) -> Iterator[Diagnostic]:
@@ -161,19 +198,61 @@ def _real_folder(path: Path) -> Path:
         return Path.cwd()
 
 
+@dataclass(frozen=True, slots=True)
+class _Resolved:
+    """What came of a tree: all of it in one tree, and as a model."""
+
+    tree: Mapping | None = None
+    system: System | None = None
+    findings: tuple[Diagnostic, ...] = ()
+    included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
+
+
 def _resolved(
     tree: Mapping,
     source: SourceFile,
     known: _Known,
     overrides: Overrides,
-) -> tuple[System | None, list[Diagnostic]]:
-    kind = kind_of(tree)
-    if kind is None:
-        wrong = check_kind(tree, source)
-        return None, [wrong] if wrong is not None else []
-    expanded, findings = expand(tree, {})
-    findings.extend(check_schema(expanded, kind))
+) -> _Resolved:
+    match kind_of(tree):
+        case kinds.SYSTEM:
+            return _resolved_system(tree, source, known, overrides)
+        case kinds.NODE:
+            return _resolved_node_type(tree, source, known, overrides)
+        case _:
+            wrong = check_kind(tree, source)
+            return _Resolved(findings=() if wrong is None else (wrong,))
+
+
+def _resolved_system(
+    tree: Mapping, source: SourceFile, known: _Known, overrides: Overrides
+) -> _Resolved:
+    whole = assemble(tree, source, known.folder, known.project)
+    if whole.tree is None:
+        return _Resolved(findings=tuple(whole.findings), included=whole.included)
     system, found = resolve(
-        expanded, source, known.catalog, folder=known.folder, overrides=overrides
+        whole.tree,
+        source,
+        known.catalog,
+        folders=whole.folders,
+        overrides=overrides,
     )
-    return system, [*findings, *found]
+    return _Resolved(whole.tree, system, (*whole.findings, *found), whole.included)
+
+
+def _resolved_node_type(
+    tree: Mapping, source: SourceFile, known: _Known, overrides: Overrides
+) -> _Resolved:
+    whole = inherited(NodeTypeFile(known.folder / Path(source.path).name, source, tree))
+    if whole.tree is None:
+        return _Resolved(findings=tuple(whole.findings))
+    expanded, findings = expand(whole.tree, {})
+    findings = [*whole.findings, *findings, *check_schema(expanded, kinds.NODE)]
+    system, found = resolve(
+        expanded,
+        source,
+        known.catalog,
+        folders=whole.folders,
+        overrides=overrides,
+    )
+    return _Resolved(whole.tree, system, (*findings, *found))

@@ -97,6 +97,23 @@ def is_hidden(name: str) -> bool:
     return any(token.startswith("_") for token in name.split("/"))
 
 
+def fits(pattern: str, part: str) -> bool:
+    """Say whether ``part`` of a name fits ``pattern``, in which ``*`` is any text."""
+    pieces = pattern.split("*")
+    if len(pieces) == 1:
+        return pattern == part
+    first, *middle, last = pieces
+    if len(part) < len(first) + len(last) or not part.startswith(first):
+        return False
+    rest = part[len(first) : len(part) - len(last)]
+    for piece in middle:
+        found = rest.find(piece)
+        if found < 0:
+            return False
+        rest = rest[found + len(piece) :]
+    return part.endswith(last)
+
+
 def _empty_problem(name: str) -> str | None:
     return "is empty" if not name else None
 

@@ -42,12 +42,12 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for kind in (PortKind.CLIENT, PortKind.ACTION_CLIENT):
         for end in lonely_ends(context, kind):
             if end.port.required is None:
-                place, labels = place_of(context, end)
+                place, labels = place_of(end)
                 yield Diagnostic(
                     RULE,
                     f"nobody in this system serves '{end.port.full_name}', "
                     f"which '{end_name(end)}' calls",
                     place,
                     labels,
-                    nearest_channel(context, end) or external_hint(context, end),
+                    nearest_channel(context, end) or external_hint(end),
                 )

@@ -41,28 +41,59 @@ class Doubt:
 def doubt(context: Context) -> Doubt:
     """Find what the errors of the stages before the checks were in."""
     system = context.system
-    home = system.source.path
-    files = {span.file.path for span in context.refused} - {home}
+    homes = _homes(context)
+    files = {span.file.path for span in context.refused} - homes.keys()
     suspects = {node.name.value for node in system.nodes if _files(node) & files}
-    starts = sorted(
-        (node.name.span.line, node.name.span.column, node.name.value) for node in system.nodes
-    )
-    end = _end_of_nodes(context)
     elsewhere = False
     misspelt: set[tuple[str, str]] = set()
     for span in context.refused:
-        if span.file.path != home:
-            continue
-        index = bisect_right(starts, (span.line, span.column, "\U0010ffff")) - 1
-        if index < 0 or (end is not None and (span.line, span.column) >= end):
+        home = homes.get(span.file.path)
+        names = home.nodes_at(span) if home is not None else ()
+        if home is not None and not names:
             elsewhere = True
-        else:
-            name = starts[index][2]
-            suspects.add(name)
-            section = nearest(_text(span), SECTIONS)
-            if section is not None:
-                misspelt.add((name, section))
+        suspects.update(names)
+        section = nearest(_text(span), SECTIONS) if names else None
+        if section is not None:
+            misspelt.update((name, section) for name in names)
     return Doubt(frozenset(suspects), elsewhere, frozenset(misspelt))
+
+
+@dataclass(frozen=True, slots=True)
+class _Home:
+    """A file that nodes of the system are written in: where each begins, and where they end."""
+
+    starts: list[tuple[int, int]]
+    names: dict[tuple[int, int], list[str]]  # several where one entry makes several nodes
+    end: tuple[int, int] | None
+
+    def nodes_at(self, span: Span) -> list[str]:
+        """Return the nodes within which ``span`` is."""
+        place = (span.line, span.column)
+        index = bisect_right(self.starts, place) - 1
+        if index < 0 or (self.end is not None and place >= self.end):
+            return []
+        return self.names[self.starts[index]]
+
+
+def _homes(context: Context) -> dict[str, _Home]:
+    """Return the files that the system's nodes are written in, and its own."""
+    system = context.system
+    names: dict[str, dict[tuple[int, int], list[str]]] = {system.source.path: {}}
+    for node in system.nodes:
+        span = node.name.span
+        in_file = names.setdefault(span.file.path, {})
+        in_file.setdefault((span.line, span.column), []).append(node.name.value)
+    others = [connection.span for connection in system.connections]
+    others += [profile.name.span for profile in system.qos_profiles]
+    others += [executor.name.span for executor in system.executors]
+    homes = {}
+    for path, found in names.items():
+        starts = sorted(found)
+        behind = [(span.line, span.column) for span in others if span.file.path == path]
+        # As far as it is known, the first part behind the last node begins here.
+        end = min((place for place in behind if starts and place > starts[-1]), default=None)
+        homes[path] = _Home(starts, found, end)
+    return homes
 
 
 def _text(span: Span) -> str:
@@ -75,16 +106,3 @@ def _files(node: Node) -> set[str]:
     names += [timer.name for timer in node.timers]
     names += [parameter.name for parameter in node.parameters]
     return {name.span.file.path for name in names}
-
-
-def _end_of_nodes(context: Context) -> tuple[int, int] | None:
-    """Return where the first part behind the last node begins, as far as it is known."""
-    system = context.system
-    if not system.nodes:
-        return None
-    last = max((node.name.span.line, node.name.span.column) for node in system.nodes)
-    others = [connection.span for connection in system.connections]
-    others += [profile.name.span for profile in system.qos_profiles]
-    others += [executor.name.span for executor in system.executors]
-    behind = [(span.line, span.column) for span in others if span.file == system.source]
-    return min((found for found in behind if found > last), default=None)

@@ -16,6 +16,9 @@ def part_of(text: Located[str], start: int, length: int) -> Span:
     wanted = text.value[start : start + length]
     written = span.file.line(span.line)[span.column - 1 : span.column - 1 + span.length]
     found = written.find(wanted, start)
+    if found < 0 and start + length == len(text.value):  # something else was put before it
+        end = len(written.rstrip("'\""))
+        found = end - length if written[:end].endswith(wanted) else -1
     return span.part(found, len(wanted)) if wanted and found >= 0 else span
 
 

@@ -60,7 +60,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for start in steps:
         circle = _circle(steps, start, done)
         if circle:
-            yield _finding(context, circle)
+            yield _finding(circle)
 
 
 def _steps(context: Context) -> _Steps:
@@ -106,10 +106,10 @@ def _circle(steps: _Steps, start: str, done: set[str]) -> list[tuple[str, PortOf
     return []
 
 
-def _finding(context: Context, circle: list[tuple[str, PortOfNode]]) -> Diagnostic:
+def _finding(circle: list[tuple[str, PortOfNode]]) -> Diagnostic:
     names = [topic for topic, _ in circle]
     way = " -> ".join((names[-1], *names))
-    first, *others = [(end, place_of(context, end)[0]) for _, end in circle]
+    first, *others = [(end, place_of(end)[0]) for _, end in circle]
     return Diagnostic(
         RULE,
         f"messages go round for ever: {way}",

@@ -46,12 +46,12 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Look for topics with subscriptions only."""
     for end in lonely_ends(context, PortKind.SUBSCRIPTION):
         if end.port.required is None:
-            place, labels = place_of(context, end)
+            place, labels = place_of(end)
             yield Diagnostic(
                 RULE,
                 f"nobody in this system publishes '{end.port.full_name}', "
                 f"which '{end_name(end)}' subscribes to",
                 place,
                 labels,
-                nearest_channel(context, end) or external_hint(context, end),
+                nearest_channel(context, end) or external_hint(end),
             )

@@ -40,12 +40,12 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Look for topics with publishers only."""
     for end in lonely_ends(context, PortKind.PUBLISHER):
         if end.port.required is None:
-            place, labels = place_of(context, end)
+            place, labels = place_of(end)
             yield Diagnostic(
                 RULE,
                 f"nobody in this system subscribes to '{end.port.full_name}', "
                 f"which '{end_name(end)}' publishes",
                 place,
                 labels,
-                external_hint(context, end),
+                external_hint(end),
             )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from composer.catalog import Catalog
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import System
 
@@ -32,22 +31,16 @@ systems/pipeline.yaml    # uses planner
 )
 
 
-def unused_node_types(project: Iterable[tuple[System, Catalog]]) -> Iterator[Diagnostic]:
-    """Look at all systems and node types of a run together, each with what it could refer to."""
-    loaded = list(project)
-    systems = [(system, catalog) for system, catalog in loaded if not system.node_type]
-    if not systems:
-        return
-    used = {path for system, catalog in systems for path in _used(system, catalog)}
-    for node_type, _ in loaded:
-        if node_type.node_type and Path(node_type.source.path).resolve() not in used:
+def unused_node_types(loaded: Iterable[System]) -> Iterator[Diagnostic]:
+    """Look at all systems and node types of a run together."""
+    node_types: list[System] = []
+    systems: list[System] = []
+    for system in loaded:
+        (node_types if system.node_type else systems).append(system)
+    used = {
+        path.resolve() for system in systems for node in system.nodes for path in node.type_files
+    }
+    for node_type in node_types if systems else ():
+        if Path(node_type.source.path).resolve() not in used:
             message = f"no system here uses node type '{node_type.name}'"
             yield Diagnostic(RULE, message, node_type.name.span)
-
-
-def _used(system: System, catalog: Catalog) -> Iterator[Path]:
-    names = {node.type_name.value for node in system.nodes if node.type_name is not None}
-    for name in names:
-        path = catalog.find(name)
-        if path is not None:
-            yield path.resolve()

@@ -53,23 +53,23 @@ def lonely_ends(context: Context, kind: PortKind) -> Iterator[PortOfNode]:
                 yield end
 
 
-def place_of(context: Context, end: PortOfNode) -> tuple[Span, tuple[Label, ...]]:
+def place_of(end: PortOfNode) -> tuple[Span, tuple[Label, ...]]:
     """Return where a finding about the wiring of a port belongs, and what else to show.
 
     That is the port where it is declared; the node in the system where the declaration is that of
     a node type in another file, which may be wired differently elsewhere.
     """
     declared = end.port.name.span
-    if declared.file == context.system.source:
+    if declared.file == end.node.span.file:
         return declared, ()
     return end.node.name.span, (Label(declared, f"{end.port.kind} '{end.port.name}'"),)
 
 
-def external_hint(context: Context, end: PortOfNode) -> str:
+def external_hint(end: PortOfNode) -> str:
     """Return how to say that the other end of a port is outside the system."""
     port = end.port
     said = "external: true"
-    if port.name.span.file != context.system.source:
+    if port.name.span.file != end.node.span.file:
         said = f"{port.kind.section}: {{{port.name}: {{external: true}}}}"
     return f"say '{said}' if somebody outside does"
 

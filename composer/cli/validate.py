@@ -114,7 +114,7 @@ class _Checked:
 def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
     from composer.document.limits import MAX_BYTES
     from composer.files import find_files
-    from composer.loading import load_bytes, load_files, project_findings
+    from composer.loading import findings_of, load_bytes, load_files
 
     for path in paths:
         if path != _STDIN and not path.exists():
@@ -124,16 +124,12 @@ def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
     if _STDIN in paths:
         content = sys.stdin.buffer.read(MAX_BYTES + 1)
         loadings.insert(0, load_bytes(content, Path.cwd(), shown=stdin_name))
-    findings = list(found.findings)
-    findings += (finding for loading in loadings for finding in loading.diagnostics)
-    findings += project_findings(loadings)
+    findings = [*found.findings, *findings_of(loadings)]
     if not loadings and not findings:
         raise UsageFailure("there is no system and no node type in " + ", ".join(map(str, paths)))
-    # A node type is read with each system that uses it: its findings are told once.
-    once = {(str(finding.primary), finding): finding for finding in findings}
     return _Checked(
         files=len(loadings),
-        findings=list(once.values()),
+        findings=findings,
         strict=any(loading.project.settings.strict for loading in loadings),
         foreign=found.foreign,
     )

@@ -15,6 +15,15 @@ MAX_DEPTH = 32
 #: Keys, values, maps and lists in a file, those repeated by aliases counted again.
 MAX_VALUES = 250_000
 
+#: Copies that the ``for_each`` of one file make.
+MAX_COPIES = 2_000
+
+#: Files that a system includes, those counted again that are included again.
+MAX_INCLUDES = 500
+
+#: Files that include each other, one in another.
+MAX_INCLUDE_DEPTH = 16
+
 #: Characters of a number.
 MAX_NUMBER_LENGTH = 100
 

@@ -1,4 +1,4 @@
-"""Load-time variables: ``${name}`` in a file, and what is put in its place.
+"""Load-time variables: ``${name}`` in a file, and what is put in its place; and copies.
 
 A scalar that is just ``${name}`` becomes the value, whatever it is; inside a text the value's own
 text is put in; ``$${`` is a plain ``${``. A declared variable without a value stays as written.
@@ -11,12 +11,13 @@ from collections.abc import Mapping as Map
 
 from composer.diagnostics import Diagnostic, Label, shown
 from composer.expand import rules
+from composer.expand.copies import COPYING
 from composer.expand.order import dependency_order
 from composer.expand.scope import Scope, measured, read_scope
 from composer.expand.substitution import Substitution, TooLarge
 from composer.expand.text import references
 from composer.schema import kind_of
-from composer.tree import Mapping, Scalar, Tree
+from composer.tree import Entry, Mapping, Scalar, Tree
 
 __all__ = ["expand", "missing_variables"]
 
@@ -28,8 +29,9 @@ def expand(tree: Mapping, given: Map[str, Tree]) -> tuple[Mapping, list[Diagnost
     """Return ``tree`` with its variables put in, and what is wrong with them.
 
     ``given`` goes before what the file itself says: the arguments that a system has for a node
-    type. A value that stands for ``${name}`` alone keeps the place where it was written, so that
-    a finding points at the argument; a text with values in it keeps its own. The section
+    type, or for a system that it includes. What says ``for_each`` is there as often as it asks for.
+    A value that stands for ``${name}`` alone keeps the place where it was written, so that a
+    finding points at the argument; a text with values in it keeps its own. The section
     ``variables`` stays as it is. Takes time in proportion to the expanded file, which is bounded.
     """
     scope = read_scope(tree, is_node_type=kind_of(tree) == "node")
@@ -37,7 +39,7 @@ def expand(tree: Mapping, given: Map[str, Tree]) -> tuple[Mapping, list[Diagnost
     findings = list(_unknown_arguments(tree, scope, given))
     try:
         findings += _work_out(substitution, given)
-        expanded = _without_section(substitution, tree)
+        expanded = _filled(substitution, tree)
     except TooLarge as stopped:
         return tree, [*findings, *substitution.findings, stopped.finding]
     return expanded, [*findings, *substitution.findings, *_unused(scope)]
@@ -74,17 +76,27 @@ def _work_out(substitution: Substitution, given: Map[str, Tree]) -> list[Diagnos
     return [_circle(circle, scope) for circle in circles]
 
 
-def _without_section(substitution: Substitution, tree: Mapping) -> Mapping:
-    entries = tuple(entry for entry in tree if entry.name != _SECTION)
-    expanded = substitution.put_into(Mapping(entries, tree.span)).tree
-    values = {entry.name: entry for entry in expanded} if isinstance(expanded, Mapping) else {}
-    return Mapping(tuple(values.get(entry.name, entry) for entry in tree), tree.span)
+def _filled(substitution: Substitution, tree: Mapping) -> Mapping:
+    """Return the file with variables put in, and its copies made; ``variables`` as it stands."""
+    substitution.growth.values = 0
+    substitution.grow(1 + len(tree.entries), tree)
+    sections = COPYING if kind_of(tree) == "system" else {}
+
+    def filled(entry: Entry) -> Entry:
+        if entry.name == _SECTION:
+            return entry
+        copying = sections.get(entry.name)
+        if copying is not None:
+            return Entry(entry.key, copying(entry.value, substitution))
+        return Entry(entry.key, substitution.add(entry.value, depth=1).tree)
+
+    return Mapping(tuple(filled(entry) for entry in tree), tree.span)
 
 
 def _unknown_arguments(tree: Mapping, scope: Scope, given: Map[str, Tree]) -> Iterator[Diagnostic]:
     if not scope.is_known:
         return
-    name = tree.get("node")
+    name = tree.get(kind_of(tree) or "")
     for argument, value in given.items():
         if argument not in scope.declared:
             owner = f"'{shown(name.value)}'" if isinstance(name, Scalar) else "this file"

@@ -1,4 +1,4 @@
-"""The rules of load-time variables (RC28x)."""
+"""The rules of load-time variables and copies (RC28x)."""
 
 from __future__ import annotations
 
@@ -93,8 +93,8 @@ TOO_LARGE = register(
     _error(
         code="RC285",
         name="variables-too-large",
-        summary="With its variables put in, a file says too much.",
-        why="Variables of variables let a few lines stand for more than a program can go through.",
+        summary="With its variables put in and its copies made, a file says too much.",
+        why="A few lines with variables or 'for_each' can stand for more than anybody can read.",
         bad="variables: {a: '${b}${b}', b: '${c}${c}', c: '${d}${d}'}  # and so on",
         good="variables: {a: some text}",
     )
@@ -117,6 +117,28 @@ system: demo
 variables: {rate_hz: 10}
 nodes:
   robot: {timers: {tick: {rate_hz: "${rate_hz}", log: tick}}}
+""",
+    )
+)
+DUPLICATE_NODE_NAME = register(
+    _error(
+        code="RC288",
+        name="duplicate-node-name",
+        summary="Two nodes of a system have the same name, by 'for_each' or by 'include'.",
+        why="Connections and dependencies could not say which one they mean.",
+        bad="""\
+system: demo
+nodes:
+  camera:
+    for_each: {side: [left, right]}
+    on_activate: {log: "started on the ${side}"}
+""",
+        good="""\
+system: demo
+nodes:
+  camera_${side}:
+    for_each: {side: [left, right]}
+    on_activate: {log: "started on the ${side}"}
 """,
     )
 )

@@ -40,13 +40,37 @@ class Scope:
     is_known: bool  # false when the section is no map: then nobody knows what is declared
     values: dict[str, Sized] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
+    outer: Scope | None = None
     _compared: int = 0
+
+    def inner(self, declared: dict[str, Declared], *, is_known: bool = True) -> Scope:
+        """Return a scope in which these names stand for something, before those of this one."""
+        values = {
+            name: measured(variable.value)
+            for name, variable in declared.items()
+            if variable.value is not None
+        }
+        return Scope(declared, self.is_known and is_known, values, outer=self)
+
+    def find(self, name: str) -> Sized | None:
+        """Return what ``name`` stands for, as far as that is worked out; it counts as used."""
+        if name in self.declared or self.outer is None:
+            self.used.add(name)
+            return self.values.get(name)
+        return self.outer.find(name)
+
+    def declares(self, name: str) -> bool:
+        """Say whether ``name`` is a variable here."""
+        return name in self.declared or (self.outer is not None and self.outer.declares(name))
 
     def hint(self, name: str) -> str | None:
         """Return the nearest declared name as a hint; none when many were asked for already.
 
         That name counts as used: it is what was meant.
         """
+        if self.outer is not None:
+            close = nearest(name, self.declared)
+            return self.outer.hint(name) if close is None else f"did you mean '{close}'?"
         self._compared += len(self.declared)
         close = nearest(name, self.declared) if self._compared <= _MAX_COMPARISONS else None
         if close is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from composer.diagnostics import Diagnostic, Rule, shown
-from composer.document.limits import MAX_BYTES, MAX_DEPTH, MAX_VALUES
+from composer.document.limits import MAX_BYTES, MAX_COPIES, MAX_DEPTH, MAX_VALUES
 from composer.expand import rules
 from composer.expand.scope import Scope, Sized
 from composer.expand.text import Reference, has_reference, pieces
@@ -21,23 +21,50 @@ class TooLarge(Exception):
 
 
 @dataclass(slots=True)
+class Growth:
+    """How much one file says once its variables are put in."""
+
+    values: int = 0
+    characters: int = 0
+    copies: int = 0
+
+
+@dataclass(slots=True)
 class Substitution:
     """Puts the variables of one file into its trees, and keeps count of what that adds."""
 
     scope: Scope
     findings: list[Diagnostic] = field(default_factory=list)
-    _values: int = 0
-    _characters: int = 0
+    growth: Growth = field(default_factory=Growth)
+
+    def within(self, scope: Scope) -> Substitution:
+        """Return what puts in the variables of another scope, and keeps the same count."""
+        return Substitution(scope, self.findings, self.growth)
 
     def put_into(self, tree: Tree, depth: int = 0) -> Sized:
         """Return ``tree``, which stands in ``depth`` maps and lists, with variables put in.
 
         A value keeps the place where it was written. Raises TooLarge.
         """
-        self._values = 0
-        return self._tree(tree, depth)
+        self.growth.values = 0
+        return self.add(tree, depth)
 
-    def _tree(self, tree: Tree, depth: int) -> Sized:
+    def grow(self, values: int, tree: Tree) -> None:
+        """Count values that are put where ``tree`` stands. Raises TooLarge."""
+        self.growth.values += values
+        if self.growth.values > MAX_VALUES:
+            message = f"with its variables, this file says more than {MAX_VALUES:,} things"
+            raise self._too_large(tree, message)
+
+    def grow_copies(self, copies: int, tree: Tree) -> None:
+        """Count copies that ``tree`` asks for. Raises TooLarge."""
+        self.growth.copies += copies
+        if self.growth.copies > MAX_COPIES:
+            message = f"with this, the file makes more than {MAX_COPIES:,} copies"
+            raise self._too_large(tree, message)
+
+    def add(self, tree: Tree, depth: int) -> Sized:
+        """Do the same with a further part of what is counted already."""
         match tree:
             case Scalar():
                 return self._scalar(tree, depth)
@@ -47,15 +74,15 @@ class Substitution:
                 return self._mapping(tree, depth)
 
     def _sequence(self, tree: Sequence, depth: int) -> Sized:
-        self._grow(1, tree)
-        parts = [self._tree(item, depth + 1) for item in tree.items]
+        self.grow(1, tree)
+        parts = [self.add(item, depth + 1) for item in tree.items]
         if any(part.tree is not item for part, item in zip(parts, tree.items, strict=True)):
             tree = Sequence(tuple(part.tree for part in parts), tree.span)
         return _sized(tree, parts, keys=0)
 
     def _mapping(self, tree: Mapping, depth: int) -> Sized:
-        self._grow(1 + len(tree.entries), tree)
-        parts = [self._tree(entry.value, depth + 1) for entry in tree]
+        self.grow(1 + len(tree.entries), tree)
+        parts = [self.add(entry.value, depth + 1) for entry in tree]
         pairs = list(zip(parts, tree.entries, strict=True))
         if any(part.tree is not entry.value for part, entry in pairs):
             entries = tuple(Entry(entry.key, part.tree) for part, entry in pairs)
@@ -64,13 +91,13 @@ class Substitution:
 
     def _scalar(self, scalar: Scalar, depth: int) -> Sized:
         if not isinstance(scalar.value, str) or not has_reference(scalar.value):
-            self._grow(1, scalar)
+            self.grow(1, scalar)
             return Sized(scalar, 1, 0)
         match pieces(scalar.value):
             case [Reference() as reference]:
                 return self._whole(reference, scalar, depth)
             case parts:
-                self._grow(1, scalar)
+                self.grow(1, scalar)
                 text = "".join(self._part(part, scalar) for part in parts)
                 return Sized(Scalar(text, scalar.span, verbatim=False), 1, 0)
 
@@ -78,9 +105,9 @@ class Substitution:
         """Return what stands for a scalar that is one reference."""
         found = self._find(reference, scalar)
         if found is None:
-            self._grow(1, scalar)
+            self.grow(1, scalar)
             return Sized(scalar, 1, 0)
-        self._grow(found.values, scalar)
+        self.grow(found.values, scalar)
         if depth + found.height > MAX_DEPTH:
             raise self._too_large(
                 scalar, f"with its variables, more than {MAX_DEPTH} maps and lists are nested here"
@@ -100,8 +127,8 @@ class Substitution:
             self._report(rules.NOT_A_TEXT, message, part, scalar)
             return part.written
         text = found.tree.value if isinstance(found.tree.value, str) else shown(found.tree.value)
-        self._characters += len(text)
-        if self._characters > MAX_BYTES:
+        self.growth.characters += len(text)
+        if self.growth.characters > MAX_BYTES:
             raise self._too_large(
                 scalar, f"variables put more than {MAX_BYTES:,} characters into the file"
             )
@@ -114,19 +141,12 @@ class Substitution:
             hint = "write '$${' for a plain '${', and '{...}' for an expression"
             self._report(rules.MALFORMED_VARIABLE, message, reference, scalar, hint)
             return None
-        self.scope.used.add(name)
-        if name not in self.scope.declared and self.scope.is_known:
+        found = self.scope.find(name)
+        if not self.scope.declares(name) and self.scope.is_known:
             message = f"there is no variable '{shown(name)}'"
             hint = self.scope.hint(name) or "declare it under 'variables'"
             self._report(rules.UNKNOWN_VARIABLE, message, reference, scalar, hint)
-        return self.scope.values.get(name)
-
-    def _grow(self, values: int, tree: Tree) -> None:
-        self._values += values
-        if self._values > MAX_VALUES:
-            raise self._too_large(
-                tree, f"with its variables, this file says more than {MAX_VALUES:,} things"
-            )
+        return found
 
     def _too_large(self, tree: Tree, message: str) -> TooLarge:
         return TooLarge(Diagnostic(rules.TOO_LARGE, message, tree.span))

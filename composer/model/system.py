@@ -100,6 +100,7 @@ class Node:
     span: Span = field(compare=False)
     type_name: Located[str] | None = None
     type_found: bool = True
+    type_files: tuple[Path, ...] = field(default=(), compare=False)  # its own, and what it extends
     description: str = ""
     behavior: BehaviorReference | None = None
     parameters: tuple[Parameter, ...] = ()

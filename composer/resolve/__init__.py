@@ -8,20 +8,22 @@ written, and the checks say what is wrong with it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Map
 from pathlib import Path
+from types import MappingProxyType
 
 from composer.catalog import Catalog
 from composer.diagnostics import Diagnostic, in_order
 from composer.model import System
-from composer.resolve import kinds
-from composer.resolve.kinds import check_kind
+from composer.resolve.files import Places
 from composer.resolve.overrides import Overrides, read_overrides
 from composer.resolve.system import resolve_node_type, resolve_system
-from composer.schema import kind_of
+from composer.schema import kind_of, kinds
+from composer.schema.kinds import check_kind
 from composer.source import SourceFile
 from composer.tree import Mapping
 
-__all__ = ["Overrides", "check_kind", "read_overrides", "resolve"]
+__all__ = ["Overrides", "read_overrides", "resolve"]
 
 
 def resolve(
@@ -29,22 +31,24 @@ def resolve(
     source: SourceFile,
     catalog: Catalog,
     *,
-    folder: Path | None = None,
+    folders: Map[str, Path] = MappingProxyType({}),
     overrides: Overrides | None = None,
 ) -> tuple[System | None, list[Diagnostic]]:
     """Return the model of a file, and what is wrong with its expressions and its node types.
 
-    ``tree`` has its load-time variables filled in; ``folder`` is where its behaviours are looked
-    for first (the folder of ``source.path`` unless given). A node type gives a system of that one
+    ``tree`` has its load-time variables filled in; ``folders`` are those of the files that it was
+    put together from, by what they are called (the folder of ``source.path`` unless given): there
+    behaviours are looked for first. A node type gives a system of that one
     node; a file that is neither gives no system and a finding.
     """
-    place = folder if folder is not None else Path(source.path).parent
+    home = folders.get(source.path, Path(source.path).parent)
+    places = Places(home, folders, catalog)
     extra = overrides if overrides is not None else Overrides()
     match kind_of(tree):
         case kinds.SYSTEM:
-            system, findings = resolve_system(tree, source, place, catalog, extra)
+            system, findings = resolve_system(tree, source, places, extra)
         case kinds.NODE:
-            system, findings = resolve_node_type(tree, source, place, extra)
+            system, findings = resolve_node_type(tree, source, places, extra)
         case _:
             wrong = check_kind(tree, source)
             return None, [wrong] if wrong is not None else []

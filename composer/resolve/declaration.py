@@ -16,6 +16,7 @@ from composer.model import (
     UnknownKey,
 )
 from composer.project import Project
+from composer.resolve.files import Places
 from composer.resolve.parameters import declarations
 from composer.resolve.ports import ports, timers
 from composer.resolve.qos import QosTable
@@ -38,12 +39,16 @@ class Declaration:
     reactions: Events
 
 
-def declare(tree: Mapping, folder: Path, qos: QosTable, findings: list[Diagnostic]) -> Declaration:
-    """Read a node type or an inline node. ``folder`` is that of the file it stands in."""
+def declare(
+    tree: Mapping, places: Places, qos: QosTable, findings: list[Diagnostic]
+) -> Declaration:
+    """Read a node type or an inline node. ``places`` are those of the files it is written in."""
     behavior = text(tree.get("behavior"))
     return Declaration(
         description=plain_text(tree.get("description")),
-        behavior=_behavior(behavior, folder) if behavior is not None else None,
+        behavior=_behavior(behavior, places.folder(behavior.span))
+        if behavior is not None
+        else None,
         parameters=declarations(tree.get("parameters")),
         ports=ports(tree, qos, findings),
         timers=timers(tree, findings),

@@ -19,6 +19,7 @@ from composer.model import (
 from composer.names import expand_name, join
 from composer.resolve.connections import Joint, Joints, joint_of
 from composer.resolve.declaration import Declaration, declare, refined, refines, unknown_keys
+from composer.resolve.files import Places
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import ParameterFiles
 from composer.resolve.parameters import with_values
@@ -34,7 +35,7 @@ from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 class Surroundings:
     """What all nodes of a system have around them."""
 
-    folder: Path
+    places: Places
     namespace: Located[str]  # absolute
     types: NodeTypes
     qos: QosTable
@@ -53,6 +54,7 @@ class Made:
     unknown: tuple[UnknownKey, ...] = ()
     type_found: bool = True
     complete: bool = True
+    type_files: tuple[Path, ...] = ()
 
 
 _NOTHING = Declaration("", None, (), (), (), (), ())
@@ -80,6 +82,7 @@ def node(entry: Entry, around: Surroundings) -> Node:
         span=entry.key.span,
         type_name=text_or_opaque(type_entry.value, type_entry.key.span) if type_entry else None,
         type_found=made.type_found,
+        type_files=made.type_files,
         description=plain_text(tree.get("description")) or declared.description,
         behavior=declared.behavior,
         parameters=parameters,
@@ -142,12 +145,12 @@ def _placed(
 
 
 def _inline(tree: Mapping, around: Surroundings) -> Made:
-    return Made(declare(tree, around.folder, around.qos, around.findings))
+    return Made(declare(tree, around.places, around.qos, around.findings))
 
 
 def _typed(type_entry: Entry, tree: Mapping, around: Surroundings) -> Made:
     name = text(type_entry.value)
-    path = around.types.find(name.value) if name is not None else None
+    path = around.types.find(name) if name is not None else None
     if path is None:
         return Made(_NOTHING, type_found=False, complete=False)
     made = around.types.make(path, tree.get("variables"), type_entry.value.span)
@@ -158,8 +161,8 @@ def _typed(type_entry: Entry, tree: Mapping, around: Surroundings) -> Made:
     if refines(tree):
         # Expressions of the type that are compiled again say nothing that was not said before.
         merged = refined(made.tree, tree)
-        declaration = declare(merged, made.folder, around.qos, around.findings)
-    return Made(declaration, unknown, complete=made.complete)
+        declaration = declare(merged, made.places, around.qos, around.findings)
+    return Made(declaration, unknown, complete=made.complete, type_files=made.files)
 
 
 def _remappings(tree: Tree | None) -> tuple[Remapping, ...]:

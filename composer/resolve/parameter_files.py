@@ -15,7 +15,7 @@ from pathlib import Path
 
 from composer.diagnostics import Diagnostic, Rule, Severity, register, shown
 from composer.document import read_document
-from composer.names import join
+from composer.names import fits, join
 from composer.project import Project
 from composer.resolve.reading import is_opaque, texts
 from composer.source import Located, shown_path
@@ -187,24 +187,5 @@ def _is_match(pattern: Sequence[str], parts: Sequence[str]) -> bool:
         if piece == "**":
             ends = set(range(min(ends), len(parts) + 1)) if ends else set()
         else:
-            ends = {
-                end + 1 for end in ends if end < len(parts) and _is_part_match(piece, parts[end])
-            }
+            ends = {end + 1 for end in ends if end < len(parts) and fits(piece, parts[end])}
     return len(parts) in ends
-
-
-def _is_part_match(pattern: str, part: str) -> bool:
-    """Say whether ``pattern``, in which ``*`` is any text, is ``part``."""
-    pieces = pattern.split("*")
-    if len(pieces) == 1:
-        return pattern == part
-    first, *middle, last = pieces
-    if len(part) < len(first) + len(last) or not part.startswith(first):
-        return False
-    rest = part[len(first) : len(part) - len(last)]
-    for piece in middle:
-        found = rest.find(piece)
-        if found < 0:
-            return False
-        rest = rest[found + len(piece) :]
-    return part.endswith(last)

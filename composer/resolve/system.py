@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from composer.catalog import Catalog
 from composer.diagnostics import Diagnostic
 from composer.model import (
     DEFAULT_SUPERVISION,
@@ -19,6 +16,7 @@ from composer.names import join
 from composer.resolve.chains import chains
 from composer.resolve.connections import connections
 from composer.resolve.declaration import declare
+from composer.resolve.files import Places
 from composer.resolve.node import Surroundings, node, placed, state
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import read_parameter_files
@@ -44,20 +42,20 @@ DEFAULT_THREADS = 2
 
 
 def resolve_system(
-    tree: Mapping, source: SourceFile, folder: Path, catalog: Catalog, overrides: Overrides
+    tree: Mapping, source: SourceFile, places: Places, overrides: Overrides
 ) -> tuple[System, list[Diagnostic]]:
     """Return the system that an expanded tree declares. See :func:`composer.resolve.resolve`."""
     findings: list[Diagnostic] = []
     qos = qos_table(tree.get("qos_profiles"))
     namespace = _system_namespace(tree, overrides)
     joined, joints = connections(tree.get("connections"), namespace.value, qos)
-    types = NodeTypes(catalog, qos, findings)
+    types = NodeTypes(places, qos, findings)
     written = tree.get("lifecycle")
     lifecycle = written if isinstance(written, Mapping) else Mapping((), tree.span)
     upkeep = supervision(lifecycle, DEFAULT_SUPERVISION)
     written = tree.get("parameter_files")
-    files = read_parameter_files(written, folder, catalog.project, findings)
-    around = Surroundings(folder, namespace, types, qos, joints, overrides, upkeep, files, findings)
+    files = read_parameter_files(written, places.home, places.catalog.project, findings)
+    around = Surroundings(places, namespace, types, qos, joints, overrides, upkeep, files, findings)
     nodes = tuple(node(entry, around) for entry in entries(tree.get("nodes")))
     autostart = state(lifecycle.get("autostart"))
     system = System(
@@ -82,12 +80,12 @@ def resolve_system(
 
 
 def resolve_node_type(
-    tree: Mapping, source: SourceFile, folder: Path, overrides: Overrides
+    tree: Mapping, source: SourceFile, places: Places, overrides: Overrides
 ) -> tuple[System, list[Diagnostic]]:
     """Return a system of the one node that a node type declares, for validating it alone."""
     findings: list[Diagnostic] = []
     qos = qos_table(None)
-    declared = declare(tree, folder, qos, findings)
+    declared = declare(tree, places, qos, findings)
     name = _name(tree, "node")
     span = _name_span(tree, "node")
     namespace = _system_namespace(Mapping((), span), overrides)

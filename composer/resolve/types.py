@@ -6,16 +6,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from composer.catalog import Catalog
+from composer.assembly import Inherited, NodeTypeFile, inherited
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, has_errors, register, shown
 from composer.document import read_document
 from composer.expand import expand, missing_variables
 from composer.resolve.declaration import Declaration, declare
-from composer.resolve.kinds import NODE, check_kind
+from composer.resolve.files import Places
 from composer.resolve.qos import QosTable
 from composer.resolve.reading import entries
 from composer.schema import check_schema
-from composer.source import Span, shown_path
+from composer.schema.kinds import NODE, check_kind
+from composer.source import Located, Span, shown_path
 from composer.tree import Mapping, Plain, Tree, plain
 
 RULE = register(
@@ -49,31 +50,34 @@ class NodeType:
     """A node type made with the variables of an instance.
 
     ``complete`` is false when its file has errors, so that what it declares may not be all.
+    ``files`` are its own and those of the types that it extends.
     """
 
     tree: Mapping
-    folder: Path
+    places: Places
     declaration: Declaration
     complete: bool
+    files: tuple[Path, ...]
 
 
 @dataclass(slots=True)
 class NodeTypes:
     """The node types a system uses. Findings in their files are added to ``findings``."""
 
-    catalog: Catalog
+    places: Places
     qos: QosTable
     findings: list[Diagnostic]
-    _found: dict[str, Path | None] = field(default_factory=dict)
-    _read: dict[Path, Mapping | None] = field(default_factory=dict)
+    _found: dict[tuple[Path, str], Path | None] = field(default_factory=dict)
+    _read: dict[Path, Inherited | None] = field(default_factory=dict)
     _without_variables: dict[Path, NodeType | None] = field(default_factory=dict)
     _shapes: set[tuple[Path, str]] = field(default_factory=set)
 
-    def find(self, name: str) -> Path | None:
-        """Return the file of the node type called ``name``, or None."""
-        if name not in self._found:
-            self._found[name] = self.catalog.find(name)
-        return self._found[name]
+    def find(self, name: Located[str]) -> Path | None:
+        """Return the file of the node type called ``name`` where that is written, or None."""
+        known = (self.places.folder(name.span), name.value)
+        if known not in self._found:
+            self._found[known] = self.places.catalog_for(name.span).find(name.value)
+        return self._found[known]
 
     def make(self, path: Path, variables: Tree | None, span: Span) -> NodeType | None:
         """Return the type in the file ``path`` made with ``variables``, or None.
@@ -81,25 +85,29 @@ class NodeTypes:
         None stands for a file that cannot be read as a node type; the findings say why. ``span``
         is where the type is asked for.
         """
-        tree = self._document(path)
-        if tree is None:
+        written = self._document(path)
+        if written is None or written.tree is None:
             return None
         given = {entry.name: entry.value for entry in entries(variables)}
         if variables is None or isinstance(variables, Mapping):
-            self.findings.extend(_missing(tree, given, span))
+            self.findings.extend(_missing(written.tree, given, span))
         if given:
             # Not shared: what an argument stands for is placed where that argument is written.
-            return self._make(path, tree, given)
+            return self._make(path, written, written.tree, given)
         if path not in self._without_variables:
-            self._without_variables[path] = self._make(path, tree, {})
+            self._without_variables[path] = self._make(path, written, written.tree, {})
         return self._without_variables[path]
 
-    def _make(self, path: Path, tree: Mapping, given: dict[str, Tree]) -> NodeType:
+    def _make(
+        self, path: Path, written: Inherited, tree: Mapping, given: dict[str, Tree]
+    ) -> NodeType:
         expanded, found = expand(tree, given)
         found = [*found, *self._misshapen(path, expanded, given)]
-        declaration = declare(expanded, path.parent, self.qos, found)
+        places = Places(path.parent, written.folders, self.places.catalog)
+        declaration = declare(expanded, places, self.qos, found)
         self.findings.extend(found)
-        return NodeType(expanded, path.parent, declaration, complete=not has_errors(found))
+        files = tuple(file.path for file in written.files)
+        return NodeType(expanded, places, declaration, not has_errors(found), files)
 
     def _misshapen(self, path: Path, expanded: Mapping, given: dict[str, Tree]) -> list[Diagnostic]:
         """Hold a type against its schema, unless it passed with the very same values before."""
@@ -112,12 +120,12 @@ class NodeTypes:
             self._shapes.add(shape)
         return found
 
-    def _document(self, path: Path) -> Mapping | None:
+    def _document(self, path: Path) -> Inherited | None:
         if path not in self._read:
             self._read[path] = self._read_file(path)
         return self._read[path]
 
-    def _read_file(self, path: Path) -> Mapping | None:
+    def _read_file(self, path: Path) -> Inherited | None:
         tree, source, found = read_document(path, shown_path(path))
         self.findings.extend(found)
         if tree is None:
@@ -126,7 +134,9 @@ class NodeTypes:
         if wrong_kind is not None:
             self.findings.append(wrong_kind)
             return None
-        return tree
+        whole = inherited(NodeTypeFile(path, source, tree))
+        self.findings.extend(whole.findings)
+        return whole
 
 
 def _missing(tree: Mapping, given: dict[str, Tree], span: Span) -> Iterator[Diagnostic]:

@@ -173,7 +173,9 @@ def _missing_choice(error: _Error, misspelt: _Misspelt) -> Iterator[Diagnostic]:
     names = [name for choice in error.wanted for name in choice["required"]]
     if not any((error.path, name) in misspelt.keys for name in names):
         message = f"{error.owner} needs {_any_of(names)}"
-        yield Diagnostic(rules.MISSING_KEY, message, error.owner_span)
+        example = _EXAMPLES.get((error.schema.get("title", ""), names[0]))
+        hint = f"for example '{names[0]}: {example}'" if example is not None else None
+        yield Diagnostic(rules.MISSING_KEY, message, error.owner_span, hint=hint)
 
 
 def _excluding_keys(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:

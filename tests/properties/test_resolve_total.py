@@ -72,7 +72,11 @@ def files(draw: st.DrawFn) -> Mapping:
 def test_every_tree_has_a_model_and_a_plan(tree: Mapping, text: str) -> None:
     overrides, _ = read_overrides([f"a.b={text}", text], text)
     system, _ = resolve(
-        tree, SOURCE, Catalog((FOLDER,), Project.at(FOLDER)), folder=FOLDER, overrides=overrides
+        tree,
+        SOURCE,
+        Catalog((FOLDER,), Project.at(FOLDER)),
+        folders={SOURCE.path: FOLDER},
+        overrides=overrides,
     )
     assert system is not None
     assert dependency_cycles(system) is not None

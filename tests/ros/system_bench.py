@@ -56,7 +56,7 @@ def system_of(text: str, folder: Path, **modules: str) -> System:
     assert tree is not None, found
     expanded, findings = expand(tree, {})
     catalog = Catalog.for_file(folder / "system.yaml")
-    system, more = resolve(expanded, source, catalog, folder=folder)
+    system, more = resolve(expanded, source, catalog, folders={source.path: folder})
     findings = [*found, *findings, *more]
     assert system is not None, findings
     assert not has_errors(findings), findings

@@ -34,7 +34,7 @@ def resolve_text(
         expanded,
         source,
         Catalog((folder,), Project(folder, folder)),
-        folder=folder,
+        folders={source.path: folder},
         overrides=overrides,
     )
     assert system is not None

@@ -55,7 +55,7 @@ def profile(text: str) -> str:
     ("text", "rule", "mark", "message", "hint"),
     [
         # the file
-        ("system: demo", "missing-key", "system", "a system needs the key 'nodes'", "nodes: {"),
+        ("system: demo", "missing-key", "system", "a system needs 'nodes' or 'in", "nodes: {"),
         ("system: demo\nnodes: {}", "nothing-there", "nodes", "'nodes' is empty", "at least one"),
         (
             "system: 5\nnodes: {robot: {}}",

@@ -1,0 +1,51 @@
+"""What is written in several files made one tree: ``include`` and, of node types, ``extends``.
+
+Every key and value keeps the place, and the file, where it was written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Map
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from composer.assembly.budget import Budget, TooMuch
+from composer.assembly.including import Including, system_file
+from composer.assembly.inheritance import Inherited, NodeTypeFile, inherited
+from composer.assembly.reading import Reader
+from composer.diagnostics import Diagnostic
+from composer.project import Project
+from composer.source import SourceFile, Span
+from composer.tree import Mapping
+
+__all__ = ["Assembly", "Inherited", "NodeTypeFile", "assemble", "inherited"]
+
+
+@dataclass(frozen=True, slots=True)
+class Assembly:
+    """A system put together. ``tree`` is None when it says more than can be gone through.
+
+    By what the files are called, ``folders`` are where they are, ``included`` where each was
+    included.
+    """
+
+    tree: Mapping | None
+    findings: list[Diagnostic]
+    folders: Map[str, Path] = field(default_factory=dict)
+    included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
+
+
+def assemble(tree: Mapping, source: SourceFile, folder: Path, project: Project) -> Assembly:
+    """Return the system ``tree`` with its variables put in, its copies made, and all it includes.
+
+    ``folder`` is where its file is; everything that is included is in ``project``. What is found
+    wrong includes what the schema says of every file.
+    """
+    findings: list[Diagnostic] = []
+    budget = Budget()
+    including = Including(Reader(project, budget, findings), budget, findings)
+    try:
+        whole = including.whole(system_file(tree, source, folder), {})
+    except TooMuch as stopped:
+        return Assembly(None, [stopped.finding])
+    return Assembly(whole, findings, including.folders, including.included)

@@ -1,0 +1,56 @@
+"""How much a system may say with all that it includes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from composer.assembly.rules import TOO_MUCH_INCLUDED
+from composer.diagnostics import Diagnostic
+from composer.document.limits import MAX_BYTES, MAX_INCLUDES, MAX_VALUES
+from composer.source import Span
+
+#: Names held against patterns.
+_MAX_COMPARISONS = 1_000_000
+
+
+class TooMuch(Exception):
+    """A system says too much; the finding says where that was noticed."""
+
+    def __init__(self, message: str, span: Span) -> None:
+        super().__init__(message)
+        self.finding = Diagnostic(TOO_MUCH_INCLUDED, message, span)
+
+
+@dataclass(slots=True)
+class Budget:
+    """What was used of all limits so far. Each method raises TooMuch beyond its own."""
+
+    _includes: int = 0
+    _characters: int = 0
+    _values: int = 0
+    _comparisons: int = 0
+
+    def include(self, span: Span) -> None:
+        """Count a file that is included, once more or for the first time."""
+        self._includes += 1
+        if self._includes > MAX_INCLUDES:
+            raise TooMuch(f"with this, the system includes more than {MAX_INCLUDES} files", span)
+
+    def read(self, characters: int, span: Span) -> None:
+        """Count what is in a file that is read for the first time."""
+        self._characters += characters
+        if self._characters > MAX_BYTES:
+            message = f"with this, the files of the system are larger than {MAX_BYTES:,} bytes"
+            raise TooMuch(message, span)
+
+    def add(self, values: int, span: Span) -> None:
+        """Count what a file says with its variables put in, or what stands for a pattern."""
+        self._values += values
+        if self._values > MAX_VALUES:
+            raise TooMuch(f"with this, the system says more than {MAX_VALUES:,} things", span)
+
+    def compare(self, names: int, span: Span) -> None:
+        """Count names that are held against a pattern."""
+        self._comparisons += names
+        if self._comparisons > _MAX_COMPARISONS:
+            raise TooMuch("with this, there are too many patterns for so many nodes", span)

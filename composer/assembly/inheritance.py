@@ -1,0 +1,127 @@
+"""A node type with everything that it inherits by ``extends``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Map
+from dataclasses import dataclass
+from pathlib import Path
+
+from composer.assembly.budget import Budget, TooMuch
+from composer.assembly.merging import merged
+from composer.assembly.rules import EXTENDS_CYCLE, UNKNOWN_BASE
+from composer.catalog import Catalog
+from composer.diagnostics import Diagnostic, Label, shown, suggestion
+from composer.document import read_document
+from composer.document.limits import MAX_INCLUDE_DEPTH
+from composer.expand.scope import measured
+from composer.project import Project
+from composer.schema.kinds import NODE, check_kind
+from composer.source import Located, SourceFile, shown_path
+from composer.tree import Mapping, Scalar
+
+EXTENDS = "extends"
+
+
+@dataclass(frozen=True, slots=True)
+class NodeTypeFile:
+    """The file of a node type."""
+
+    path: Path
+    source: SourceFile
+    tree: Mapping
+
+    @property
+    def base(self) -> Located[str] | None:
+        """The type that it extends; None where that is not said, or not by a text."""
+        written = self.tree.get(EXTENDS)
+        if isinstance(written, Scalar) and isinstance(written.value, str):
+            return Located(written.value, written.span)
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Inherited:
+    """A node type with what it inherits, and the files that this was written in, its own first.
+
+    ``tree`` is None when something that it inherits cannot be found or read.
+    """
+
+    tree: Mapping | None
+    findings: list[Diagnostic]
+    files: tuple[NodeTypeFile, ...]
+
+    @property
+    def folders(self) -> Map[str, Path]:
+        """Where the files are, by what they are called."""
+        return {file.source.path: file.path.parent for file in self.files}
+
+
+def inherited(file: NodeTypeFile) -> Inherited:
+    """Return the node type in ``file`` laid over the ones that it extends.
+
+    Every key and value keeps its place. Variables are not put in yet: a type may give other values
+    to those of its base.
+    """
+    files = [file]
+    findings: list[Diagnostic] = []
+    budget = Budget()
+    try:
+        while (name := files[-1].base) is not None:
+            base = _base(name, files, budget, findings)
+            if base is None:
+                return Inherited(None, findings, tuple(files))
+            files.append(base)
+    except TooMuch as stopped:
+        return Inherited(None, [stopped.finding], tuple(files))
+    tree = files[-1].tree
+    for child in reversed(files[:-1]):
+        tree = merged(tree, _without_extends(child.tree))
+    return Inherited(tree, findings, tuple(files))
+
+
+def _base(
+    name: Located[str], files: list[NodeTypeFile], budget: Budget, findings: list[Diagnostic]
+) -> NodeTypeFile | None:
+    """Return the file of the type called ``name``, which the last of ``files`` extends."""
+    catalog = Catalog.of(Project.at(files[-1].path.parent))
+    path = catalog.find(name.value)
+    if path is None:
+        message = f"there is no node type '{shown(name.value)}' to extend"
+        hint = suggestion(name.value, catalog.names())
+        findings.append(Diagnostic(UNKNOWN_BASE, message, name.span, hint=hint))
+        return None
+    known = [number for number, file in enumerate(files) if file.path.resolve() == path.resolve()]
+    if known:
+        findings.append(_cycle(files[known[0] :]))
+        return None
+    if len(files) > MAX_INCLUDE_DEPTH:
+        message = f"node types extend each other more than {MAX_INCLUDE_DEPTH} deep"
+        raise TooMuch(message, name.span)
+    tree, source, found = read_document(path, shown_path(path))
+    findings += found
+    if tree is None:
+        return None
+    budget.read(len(source.text), name.span)
+    budget.add(measured(tree).values, name.span)
+    wrong_kind = check_kind(tree, source, (NODE,))
+    if wrong_kind is not None:
+        findings.append(wrong_kind)
+        return None
+    return NodeTypeFile(path, source, tree)
+
+
+def _cycle(files: list[NodeTypeFile]) -> Diagnostic:
+    """Tell a circle, from the first of its files by name, so that it is one from wherever."""
+    paths = [file.source.path for file in files]
+    first = paths.index(min(paths))
+    files = files[first:] + files[:first]
+    names = [shown(file.path.stem) for file in files]
+    circle = " -> ".join([*names, names[0]])
+    spans = [file.base.span for file in files if file.base is not None]
+    labels = tuple(Label(span, "by way of this") for span in spans[1:])
+    message = f"node type '{names[0]}' extends itself: {circle}"
+    return Diagnostic(EXTENDS_CYCLE, message, spans[0], labels)
+
+
+def _without_extends(tree: Mapping) -> Mapping:
+    return Mapping(tuple(entry for entry in tree if entry.name != EXTENDS), tree.span)

@@ -1,0 +1,102 @@
+"""Several parts of a system made one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from composer.assembly.rules import INCLUDE_CONFLICT
+from composer.diagnostics import Diagnostic, Label, shown
+from composer.expand.rules import DUPLICATE_NODE_NAME
+from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, plain
+
+INCLUDE = "include"
+#: Sections of parts that become one, each with what its entries are called.
+_MAPS = {
+    "qos_profiles": "QoS profile",
+    "executors": "executor",
+    "nodes": "node",
+    "chains": "chain",
+}
+_LISTS = ("parameter_files", "connections")
+
+
+def joined(own: Mapping, parts: Iterable[Mapping], findings: list[Diagnostic]) -> Mapping:
+    """Return ``own`` with everything that is in ``parts`` as well, before what it says itself.
+
+    Of two things of one name the first stays, and what is told of them is added to ``findings``.
+    """
+    whole = [*parts, own]
+    if len(whole) == 1 and own.entry(INCLUDE) is None:
+        return own
+    sections = {
+        **{name: _joined_maps(name, whole, findings) for name in _MAPS},
+        **{name: _joined_lists(name, whole) for name in _LISTS},
+    }
+    findings.extend(_misfits(own, whole[:-1]))
+    kept = [sections.pop(entry.name, None) or entry for entry in own if entry.name != INCLUDE]
+    added = [entry for entry in sections.values() if entry is not None]
+    return Mapping((*kept, *added), own.span)
+
+
+def _joined_maps(name: str, whole: list[Mapping], findings: list[Diagnostic]) -> Entry | None:
+    sections = _sections(name, whole)
+    if not all(isinstance(section.value, Mapping) for section in sections):
+        return sections[-1]
+    found: dict[str, Entry] = {}
+    for section in sections:
+        for entry in section.value if isinstance(section.value, Mapping) else ():
+            earlier = found.setdefault(entry.name, entry)
+            if earlier is not entry:
+                findings.extend(_conflict(name, entry, earlier))
+    if not sections:
+        return None
+    return Entry(sections[-1].key, Mapping(tuple(found.values()), sections[-1].value.span))
+
+
+def _joined_lists(name: str, whole: list[Mapping]) -> Entry | None:
+    sections = _sections(name, whole)
+    if len(sections) < 2:
+        return next(iter(sections), None)
+    items = [item for section in sections for item in _items(section.value)]
+    return Entry(sections[-1].key, Sequence(tuple(items), sections[-1].value.span))
+
+
+def _sections(name: str, whole: list[Mapping]) -> list[Entry]:
+    found = (part.entry(name) for part in whole)
+    return [entry for entry in found if entry is not None]
+
+
+def _items(tree: Tree) -> Iterator[Tree]:
+    yield from tree.items if isinstance(tree, Sequence) else (tree,)
+
+
+def _conflict(section: str, entry: Entry, earlier: Entry) -> Iterator[Diagnostic]:
+    name = shown(entry.name)
+    label = Label(earlier.key.span, "the other one")
+    if section == "nodes":
+        message = f"two nodes are called '{name}'"
+        hint = "give an include a 'prefix'"
+        yield Diagnostic(DUPLICATE_NODE_NAME, message, entry.key.span, (label,), hint)
+    elif section == "chains" or plain(entry.value) != plain(earlier.value):
+        message = f"there are two different {_MAPS[section]}s '{name}'"
+        hint = "make them the same with 'overrides' of the include, or rename one"
+        yield Diagnostic(INCLUDE_CONFLICT, message, entry.key.span, (label,), hint)
+
+
+def _misfits(own: Mapping, parts: list[Mapping]) -> Iterator[Diagnostic]:
+    """Yield what parts say of the system as a whole, where the system says something else."""
+    for part in parts:
+        theirs = _implied_dependencies(part)
+        ours = _implied_dependencies(own)
+        if theirs is None or theirs.value is (ours.value if ours is not None else True):
+            continue
+        message = "an included file has other 'implied_dependencies' than the system"
+        labels = (Label(ours.span, "the system's"),) if ours is not None else ()
+        hint = "say the same in the including file's 'lifecycle'"
+        yield Diagnostic(INCLUDE_CONFLICT, message, theirs.span, labels, hint)
+
+
+def _implied_dependencies(tree: Mapping) -> Scalar | None:
+    lifecycle = tree.get("lifecycle")
+    said = lifecycle.get("implied_dependencies") if isinstance(lifecycle, Mapping) else None
+    return said if isinstance(said, Scalar) and isinstance(said.value, bool) else None

@@ -1,0 +1,194 @@
+"""An included system put in its place: below a namespace, its nodes with a prefix.
+
+What a file says about all of its nodes (namespace, lifecycle) is said of each of them, so that it
+does not become what the including system says.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from composer.assembly.merging import merged
+from composer.source import Located, Span
+from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
+
+_CHANNELS = frozenset({"topic", "service", "action"})
+_ENDS = frozenset({"from", "to", "server", "clients"})
+#: What ``lifecycle`` says of the system as a whole, and not for each of its nodes.
+_OF_THE_SYSTEM = frozenset({"implied_dependencies"})
+
+_Change = Callable[[Tree], Tree]
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Where a file is included: what is put before the names of its nodes, and of everything."""
+
+    prefix: str = ""
+    namespace: Located[str] | None = None
+
+
+def placed(tree: Mapping, position: Position, includer: Path, folder: Path) -> Mapping:
+    """Return an assembled system, whose file is in ``folder``, as a part of one in ``includer``."""
+    names = _Names(position.prefix, _below(position.namespace, tree.get("namespace")))
+    lifecycle = tree.get("lifecycle")
+    defaults = _defaults(lifecycle) if isinstance(lifecycle, Mapping) else None
+    changes: dict[str, _Change] = {
+        "nodes": lambda part: names.of_nodes(part, defaults),
+        "connections": names.of_connections,
+        "chains": names.of_chains,
+        "parameter_files": lambda part: _seen_from(includer, folder, part),
+    }
+    return Mapping(
+        tuple(
+            Entry(entry.key, changes[entry.name](entry.value)) if entry.name in changes else entry
+            for entry in tree
+        ),
+        tree.span,
+    )
+
+
+def _below(outer: Located[str] | None, inner: Tree | None) -> Located[str] | None:
+    """Return one namespace below another; an absolute one is below none."""
+    if not isinstance(inner, Scalar) or not isinstance(inner.value, str):
+        return outer
+    if outer is None or inner.value.startswith("/") or _is_opaque(inner.value):
+        return Located(inner.value, inner.span)
+    return Located(f"{outer.value.rstrip('/')}/{inner.value}", inner.span)
+
+
+def _seen_from(includer: Path, folder: Path, tree: Tree) -> Tree:
+    """Return paths relative to ``folder`` as paths relative to ``includer``."""
+    match tree:
+        case Sequence():
+            items = tuple(_seen_from(includer, folder, item) for item in tree.items)
+            return Sequence(items, tree.span)
+        case Scalar(value=str() as text) if includer != folder and not _is_opaque(text):
+            path = os.path.relpath(folder / text, includer)
+            return Scalar(path, tree.span, verbatim=False)
+        case _:
+            return tree
+
+
+def _defaults(lifecycle: Mapping) -> Mapping | None:
+    entries = tuple(entry for entry in lifecycle if entry.name not in _OF_THE_SYSTEM)
+    return Mapping(entries, lifecycle.span) if entries else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Names:
+    prefix: str
+    namespace: Located[str] | None
+
+    def of_nodes(self, tree: Tree, defaults: Mapping | None) -> Tree:
+        if not isinstance(tree, Mapping):
+            return tree
+        return Mapping(tuple(self._node(entry, defaults) for entry in tree), tree.span)
+
+    def of_connections(self, tree: Tree) -> Tree:
+        if not isinstance(tree, Sequence):
+            return tree
+        return Sequence(
+            tuple(_changed(item, self._in_connection) for item in tree.items), tree.span
+        )
+
+    def of_chains(self, tree: Tree) -> Tree:
+        if not isinstance(tree, Mapping):
+            return tree
+
+        def renamed(entry: Entry) -> Tree:
+            return self._each(entry.value) if entry.name == "through" else entry.value
+
+        chains = (
+            Entry(self._renamed_key(entry.key), _changed(entry.value, renamed)) for entry in tree
+        )
+        return Mapping(tuple(chains), tree.span)
+
+    def _node(self, entry: Entry, defaults: Mapping | None) -> Entry:
+        key = self._renamed_key(entry.key)
+        if not isinstance(entry.value, Mapping):
+            return Entry(key, entry.value)
+        tree = _changed_map(entry.value, self._in_node)
+        said = [self._namespace_entry(entry.value, key.span), _lifecycle(tree, defaults, key.span)]
+        changes = {change.name: change for change in said if change is not None}
+        kept = tuple(changes.pop(inner.name, inner) for inner in tree)
+        return Entry(key, Mapping((*kept, *changes.values()), tree.span))
+
+    def _in_node(self, entry: Entry) -> Tree:
+        if entry.name != "lifecycle":
+            return entry.value
+        return _changed(entry.value, self._in_lifecycle)
+
+    def _in_lifecycle(self, entry: Entry) -> Tree:
+        if entry.name != "depends_on":
+            return entry.value
+        if isinstance(entry.value, Mapping):
+            entries = (Entry(self._renamed_key(inner.key), inner.value) for inner in entry.value)
+            return Mapping(tuple(entries), entry.value.span)
+        return self._each(entry.value)
+
+    def _in_connection(self, entry: Entry) -> Tree:
+        if entry.name in _ENDS:
+            return self._each(entry.value)
+        if entry.name in _CHANNELS and self.namespace is not None:
+            return self._channel(entry.value, self.namespace)
+        return entry.value
+
+    def _channel(self, tree: Tree, namespace: Located[str]) -> Tree:
+        if not isinstance(tree, Scalar) or not isinstance(tree.value, str):
+            return tree
+        if not tree.value or tree.value[0] in "/~" or _is_opaque(tree.value):
+            return tree
+        name = f"{namespace.value.rstrip('/')}/{tree.value}"
+        return Scalar(name, tree.span, verbatim=False)
+
+    def _namespace_entry(self, node: Mapping, span: Span) -> Entry | None:
+        if self.namespace is None:
+            return None
+        own = node.entry("namespace")
+        below = _below(self.namespace, own.value if own is not None else None)
+        if below is None or (own is not None and not isinstance(own.value, Scalar)):
+            return None
+        key = own.key if own is not None else Scalar("namespace", span, verbatim=False)
+        return Entry(key, Scalar(below.value, below.span, verbatim=False))
+
+    def _each(self, tree: Tree) -> Tree:
+        """Return ``node`` or ``node.port``, or a list of them, with the prefix."""
+        match tree:
+            case Sequence():
+                return Sequence(tuple(map(self._each, tree.items)), tree.span)
+            case Scalar(value=str() as text) if self.prefix and not _is_opaque(text):
+                return Scalar(f"{self.prefix}{text}", tree.span, verbatim=False)
+            case _:
+                return tree
+
+    def _renamed_key(self, key: Scalar) -> Scalar:
+        renamed = self._each(key)
+        return renamed if isinstance(renamed, Scalar) else key
+
+
+def _lifecycle(node: Mapping, defaults: Mapping | None, span: Span) -> Entry | None:
+    """Return a node's ``lifecycle`` laid over what its file says for all nodes."""
+    if defaults is None:
+        return None
+    own = node.entry("lifecycle")
+    if own is None:
+        return Entry(Scalar("lifecycle", span, verbatim=False), defaults)
+    if not isinstance(own.value, Mapping):
+        return None
+    return Entry(own.key, merged(defaults, own.value))
+
+
+def _changed(tree: Tree, change: Callable[[Entry], Tree]) -> Tree:
+    return _changed_map(tree, change) if isinstance(tree, Mapping) else tree
+
+
+def _changed_map(tree: Mapping, change: Callable[[Entry], Tree]) -> Mapping:
+    return Mapping(tuple(Entry(entry.key, change(entry)) for entry in tree), tree.span)
+
+
+def _is_opaque(text: str) -> bool:
+    return "${" in text

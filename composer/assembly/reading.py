@@ -1,0 +1,165 @@
+"""An entry of ``include``: what it asks for, and the file that it means."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+
+from composer.assembly.budget import Budget
+from composer.assembly.placing import Position
+from composer.assembly.rules import INVALID_INCLUDE
+from composer.diagnostics import Diagnostic, nearest, shown
+from composer.document import read_document
+from composer.document.rules import FILE_TOO_LARGE, UNREADABLE_FILE
+from composer.names import namespace_problem
+from composer.project import Project
+from composer.schema.kinds import SYSTEM, check_kind
+from composer.source import Located, SourceFile
+from composer.tree import Mapping, Scalar, Tree
+
+_PREFIX = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_NAMES_FOR_HINT = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Include:
+    """What an entry asks for. ``file`` is written relative to the file it stands in."""
+
+    file: Located[str]
+    position: Position
+    arguments: dict[str, Tree]
+    overrides: Mapping | None
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """A file that was reached: where it really is, and what it is called and says."""
+
+    path: Path
+    source: SourceFile
+    tree: Mapping
+
+
+def read_include(tree: Tree, findings: list[Diagnostic]) -> Include | None:
+    """Return what an entry asks for, as far as it has the right shape; None without a file."""
+    entry = tree if isinstance(tree, Mapping) else None
+    file = _text(entry.get("file") if entry is not None else tree)
+    if file is None or _is_opaque(file.value):
+        return None
+    if entry is None:
+        return Include(file, Position(), {}, None)
+    variables, overrides = entry.get("variables"), entry.get("overrides")
+    return Include(
+        file,
+        Position(_prefix(entry, findings), _namespace(entry, findings)),
+        {item.name: item.value for item in variables} if isinstance(variables, Mapping) else {},
+        overrides if isinstance(overrides, Mapping) else None,
+    )
+
+
+@dataclass(slots=True)
+class Reader:
+    """Reads the files of one system, each once."""
+
+    project: Project
+    budget: Budget
+    findings: list[Diagnostic]
+    _files: dict[Path, File | None] = field(default_factory=dict)
+
+    def read(self, name: Located[str], folder: Path, includer: SourceFile) -> File | None:
+        """Return the file that ``name`` means in ``folder``; None when it is out of reach.
+
+        What keeps it out of reach is told where it is included. Raises TooMuch.
+        """
+        path = self._reached(name, folder)
+        if path is None:
+            return None
+        if path not in self._files:
+            shown_path = os.path.normpath(Path(includer.path).parent / name.value)
+            self._files[path] = self._read(path, name, shown_path)
+        return self._files[path]
+
+    def _reached(self, name: Located[str], folder: Path) -> Path | None:
+        target = folder / name.value
+        try:
+            if Path(name.value).is_absolute():
+                self._refuse(name, "is not relative to this file", "name it from here: 'a.yaml'")
+            elif not self.project.holds(target):
+                self._refuse(name, "is outside the project", None)
+            elif not target.exists():
+                self._refuse(name, "does not exist", _similar(name.value, folder))
+            else:
+                return target.resolve()
+        except (OSError, RuntimeError, ValueError):
+            self._refuse(name, "cannot be read", None)
+        return None
+
+    def _read(self, path: Path, name: Located[str], shown_path: str) -> File | None:
+        tree, source, found = read_document(path, shown_path)
+        self.budget.read(len(source.text), name.span)
+        for finding in found:
+            if finding.rule in (UNREADABLE_FILE, FILE_TOO_LARGE):
+                self._refuse(name, f"cannot be included: {finding.message}", finding.hint)
+            else:
+                self.findings.append(finding)
+        if tree is None:
+            return None
+        wrong_kind = check_kind(tree, source, (SYSTEM,))
+        if wrong_kind is not None:
+            self._refuse(name, "is not a system", wrong_kind.hint)
+            return None
+        return File(path, source, tree)
+
+    def _refuse(self, name: Located[str], why: str, hint: str | None) -> None:
+        message = f"'{shown(name.value)}' {why}"
+        self.findings.append(Diagnostic(INVALID_INCLUDE, message, name.span, hint=hint))
+
+
+def _prefix(entry: Mapping, findings: list[Diagnostic]) -> str:
+    prefix = _text(entry.get("prefix"))
+    if prefix is None or not prefix.value or _is_opaque(prefix.value):
+        return ""
+    if _PREFIX.fullmatch(prefix.value):
+        return prefix.value
+    message = f"no name of a node can begin with '{shown(prefix.value)}'"
+    hint = "letters, digits and '_', beginning with a letter: 'left_'"
+    findings.append(Diagnostic(INVALID_INCLUDE, message, prefix.span, hint=hint))
+    return ""
+
+
+def _namespace(entry: Mapping, findings: list[Diagnostic]) -> Located[str] | None:
+    namespace = _text(entry.get("namespace"))
+    if namespace is None or _is_opaque(namespace.value):
+        return None
+    absolute = namespace.value if namespace.value.startswith("/") else f"/{namespace.value}"
+    problem = namespace_problem(absolute)
+    if problem is None:
+        return namespace
+    message = f"namespace '{shown(namespace.value)}' {problem}"
+    findings.append(Diagnostic(INVALID_INCLUDE, message, namespace.span))
+    return None
+
+
+def _similar(name: str, folder: Path) -> str | None:
+    """Return a hint at a file of nearly that name."""
+    path = Path(name)
+    try:
+        with os.scandir(folder / path.parent) as entries:
+            beside = [entry.name for entry in islice(entries, _NAMES_FOR_HINT)]
+    except OSError:
+        return None
+    close = nearest(path.name, [other for other in beside if other.endswith((".yaml", ".yml"))])
+    return f"did you mean '{shown(path.with_name(close))}'?" if close is not None else None
+
+
+def _text(tree: Tree | None) -> Located[str] | None:
+    if isinstance(tree, Scalar) and isinstance(tree.value, str):
+        return Located(tree.value, tree.span)
+    return None
+
+
+def _is_opaque(text: str) -> bool:
+    return "${" in text

@@ -1,0 +1,116 @@
+"""``camera_*``: all nodes whose names fit, where connections and dependencies name nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+
+from composer.assembly.budget import Budget
+from composer.names import fits
+from composer.source import Span
+from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
+
+WILDCARD = "*"
+_ENDS = frozenset({"from", "to", "server", "clients"})
+
+
+@dataclass(slots=True)
+class Wildcards:
+    """Puts names in the place of patterns, in which ``*`` is any text."""
+
+    names: tuple[str, ...]
+    budget: Budget
+    _found: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def in_connections(self, tree: Tree) -> Tree:
+        """Return ``connections`` with the ends of all nodes that patterns stand for."""
+        if not isinstance(tree, Sequence):
+            return tree
+        return Sequence(tuple(self._in_connection(item) for item in tree.items), tree.span)
+
+    def in_nodes(self, tree: Tree) -> Tree:
+        """Return ``nodes`` with the dependencies on all nodes that patterns stand for."""
+        return _changed(tree, lambda node: self._in_node(node.value))
+
+    def _in_node(self, tree: Tree) -> Tree:
+        return _changed(
+            tree,
+            lambda entry: (
+                _changed(entry.value, self._in_lifecycle)
+                if entry.name == "lifecycle"
+                else entry.value
+            ),
+        )
+
+    def _in_lifecycle(self, entry: Entry) -> Tree:
+        tree = entry.value
+        if entry.name != "depends_on":
+            return tree
+        match tree:
+            case Sequence() if _has_wildcard(tree.items):
+                return Sequence(tuple(self._names(tree.items)), tree.span)
+            case Mapping() if _has_wildcard(entry.key for entry in tree):
+                named = {
+                    str(key.value): Entry(key, entry.value)
+                    for entry in tree
+                    for key in self._names([entry.key])
+                    if isinstance(key, Scalar)
+                }
+                return Mapping(tuple(named.values()), tree.span)
+            case _:
+                return tree
+
+    def _in_connection(self, tree: Tree) -> Tree:
+        return _changed(
+            tree, lambda entry: self._end(entry.value) if entry.name in _ENDS else entry.value
+        )
+
+    def _end(self, tree: Tree) -> Tree:
+        items = tree.items if isinstance(tree, Sequence) else (tree,)
+        if not _has_wildcard(items):
+            return tree
+        return Sequence(tuple(self._ports(items)), tree.span)
+
+    def _ports(self, items: Iterable[Tree]) -> Iterator[Tree]:
+        for item in items:
+            text = _text(item)
+            node, dot, port = text.rpartition(".")
+            names = self._fitting(node, item.span)
+            yield from (Scalar(f"{name}{dot}{port}", item.span, False) for name in names)
+            if not names:  # a check says that there is no such node
+                yield item
+
+    def _names(self, items: Iterable[Tree]) -> Iterator[Tree]:
+        for item in items:
+            text = _text(item)
+            names = self._fitting(text, item.span)
+            yield from (Scalar(name, item.span, False) for name in names)
+            if not names:
+                yield item
+
+    def _fitting(self, pattern: str, span: Span) -> tuple[str, ...]:
+        if WILDCARD not in pattern:
+            return ()
+        if pattern not in self._found:
+            self.budget.compare(len(self.names) * (1 + len(pattern) // 64), span)
+            self._found[pattern] = tuple(name for name in self.names if fits(pattern, name))
+        self.budget.add(len(self._found[pattern]), span)
+        return self._found[pattern]
+
+
+def _changed(tree: Tree, change: Callable[[Entry], Tree]) -> Tree:
+    """Return a map with other values; the very same where none changes."""
+    if not isinstance(tree, Mapping):
+        return tree
+    entries = [(entry, change(entry)) for entry in tree]
+    if all(entry.value is value for entry, value in entries):
+        return tree
+    return Mapping(tuple(Entry(entry.key, value) for entry, value in entries), tree.span)
+
+
+def _has_wildcard(items: Iterable[Tree]) -> bool:
+    return any(WILDCARD in _text(item) for item in items)
+
+
+def _text(tree: Tree) -> str:
+    return tree.value if isinstance(tree, Scalar) and isinstance(tree.value, str) else ""
