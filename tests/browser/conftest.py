@@ -42,34 +42,40 @@ def browser() -> Iterator[Browser]:
 
 @dataclass
 class Opened:
-    """A file in the browser, and everything it did that a file of ours must not do."""
+    """Files in the browser, and everything they did that a file of ours must not do."""
 
     page: Page
+    files: list[str] = field(default_factory=list)
     complaints: list[str] = field(default_factory=list)
     requests: list[str] = field(default_factory=list)
+
+    def go(self, path: Path) -> None:
+        """Open a file in place of the one before."""
+        self.files.append(path.as_uri())
+        self.page.goto(path.as_uri())
 
 
 @pytest.fixture
 def open_file(browser: Browser) -> Iterator[Callable[..., Opened]]:
     """Opens a file; at the end no file may have complained or asked for anything else."""
     contexts = []
-    opened_files = []
+    opened_files: list[Opened] = []
 
     def open_it(path: Path, **options: Any) -> Opened:
         context = browser.new_context(viewport={"width": 1280, "height": 800}, **options)
         contexts.append(context)
         page = context.new_page()
         opened = Opened(page)
-        opened_files.append((path, opened))
+        opened_files.append(opened)
         page.on("console", lambda message: opened.complaints.append(message.text))
         page.on("pageerror", lambda error: opened.complaints.append(str(error)))
         page.on("request", lambda request: opened.requests.append(request.url))
-        page.goto(path.as_uri())
+        opened.go(path)
         return opened
 
     yield open_it
-    for path, opened in opened_files:
+    for opened in opened_files:
         assert opened.complaints == []
-        assert opened.requests == [path.as_uri()]
+        assert opened.requests == opened.files
     for context in contexts:
         context.close()

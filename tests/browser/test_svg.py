@@ -21,10 +21,13 @@ def test_every_example_is_shown_and_asks_for_nothing(
     loading = load(systems_folder() / f"{name}.yaml")
     assert loading.system is not None
     scene = scene_of([loading.system], loading.diagnostics)
-    for view in View:
-        path = tmp_path / f"{name}.{view}.svg"
+    paths = [tmp_path / f"{name}.{view}.svg" for view in View]
+    for path, view in zip(paths, View, strict=True):
         path.write_bytes(render([build_graph(scene, view)], Format.SVG, Engine.BUNDLED))
-        page = open_file(path).page
+    opened = open_file(paths[0])
+    page = opened.page
+    for path in paths:
+        opened.go(path)
         assert page.evaluate("document.documentElement.tagName") == "svg"
         drawn = page.evaluate("document.documentElement.width.baseVal.value")
         size = page.evaluate("document.documentElement.getBoundingClientRect().width")

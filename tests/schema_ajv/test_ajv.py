@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -76,11 +75,9 @@ BAD = [
 
 @pytest.fixture(scope="module")
 def ajv() -> Ajv:
-    node, npm = shutil.which("node"), shutil.which("npm")
-    if os.environ.get("CI") == "true" and npm is not None and not INSTALLED.exists():
-        subprocess.run([npm, "ci", "--silent"], cwd=HERE, check=True, stdin=subprocess.DEVNULL)
+    node = shutil.which("node")
     if node is None or not INSTALLED.exists():
-        pytest.skip("ajv is not installed: npm ci in tests/schema_ajv")
+        pytest.skip("ajv is not installed: npm ci --prefix tests/schema_ajv")
 
     def check(documents: list[tuple[str, Any]]) -> list[list[str]]:
         done = subprocess.run(
