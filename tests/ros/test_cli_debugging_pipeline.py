@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,55 @@ def out(*arguments: str) -> str:
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+#: What a command line prints; they look only, so several may run side by side.
+ANSWERS = {
+    ("node", "list"): "/planning/planner\n",
+    ("node", "info", "planner"): "  Subscribers:\n    /sensor_data:  nav_msgs/msg/Odometry\n",
+    ("topic", "list", "-t"): "/sensor_data  ",
+    ("topic", "echo", "/sensor_data", "--once", "--field", "header.frame_id"): "odom\n---\n",
+    ("topic", "hz", "/sensor_data", "--count", "20"): "average rate: ",
+    ("topic", "bw", "/sensor_data", "--count", "20"): "/s from 20 messages",
+    ("service", "list"): "/plan_trajectory\n",
+    ("service", "type", "/plan_trajectory"): "composer_interfaces/srv/PlanTrajectory\n",
+    ("action", "list"): "/navigate\n",
+    ("action", "info", "/navigate"): "Action servers: 1\n  /control/motor_controller\n",
+    ("param", "list", "planner"): "max_velocity\n",
+    ("param", "get", "planner", "max_velocity"): "1.0\n",
+    ("param", "describe", "planner", "max_velocity"): "maximum:      5.0",
+    ("param", "dump", "planner"): "/planning/planner:\n  ros__parameters:\n",
+}
+
+
+def test_every_command_that_looks_answers() -> None:
+    with ThreadPoolExecutor(4) as pool:
+        told = pool.map(answer, ANSWERS)
+    for (arguments, expected), text in zip(ANSWERS.items(), told, strict=True):
+        assert expected in text, arguments
+
+
+def answer(arguments: tuple[str, ...]) -> str:
+    """Ask again for lists: on a busy machine discovery outlasts a command."""
+    until_s = time.monotonic() + PATIENCE_S
+    while True:
+        text = out(*arguments)
+        if "list" not in arguments or ANSWERS[arguments] in text or time.monotonic() > until_s:
+            return text
+
+
+def test_a_goal_is_reached() -> None:
+    goal = ("action", "send-goal", "/navigate", "{target: {x: 0.3}, max_velocity: 2.0}")
+    told = [json.loads(line) for line in out(*goal, "--feedback", "--json").splitlines()]
+    assert told[-1]["status"] == "succeeded"
+    assert all(0.0 <= item["feedback"]["progress_percent"] <= 100.0 for item in told[:-1])
+
+
+def test_a_parameter_is_set_and_a_message_published() -> None:
+    command = ("param", "set", "motor_controller", "max_velocity", "0.5")
+    assert out(*command) == "/control/motor_controller max_velocity: 0.5\n"
+    once = ("topic", "pub", "--once", "--json", "/motor_commands", "geometry_msgs/msg/Twist")
+    assert json.loads(out(*once, "{linear: {x: 0.1}}"))["linear"]["x"] == 0.1
 
 
 def test_the_doctor_finds_no_fault() -> None:
