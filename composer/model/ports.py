@@ -52,6 +52,20 @@ class ChannelKind(StrEnum):
         return {"topic": "msg", "service": "srv", "action": "action"}[self.value]
 
 
+class Delivery(StrEnum):
+    """How messages get from port to port within the process."""
+
+    AUTO = "auto"  # straight, and by DDS as well to whoever is outside
+    DDS = "dds"  # by DDS alone
+
+
+class Isolation(StrEnum):
+    """Whether who publishes and who receives in one process hold the same object."""
+
+    SHARE = "share"
+    COPY = "copy"
+
+
 class Event(StrEnum):
     """What a reaction reacts to."""
 
@@ -155,6 +169,8 @@ class Port:
     reentrant: bool = False
     always_on: bool = False  # it lives while its node is inactive, too
     external: bool = False  # the other end is outside this system
+    delivery: Delivery | None = None  # as its connection says; None: as the system does
+    isolation: Isolation = Isolation.SHARE
     required: bool | None = None  # whether an other end must be there; None: nobody said
     description: str = ""
 

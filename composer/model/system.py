@@ -10,7 +10,9 @@ from typing import Protocol, TypeVar
 
 from composer.model.ports import (
     ChannelKind,
+    Delivery,
     Event,
+    Isolation,
     Parameter,
     Port,
     PortKind,
@@ -168,6 +170,8 @@ class Connection:
     sinks: tuple[Endpoint, ...]
     span: Span = field(compare=False)
     qos: Located[str] | None = None  # the profile's name, where it is named
+    delivery: Located[Delivery] | None = None
+    isolation: Located[Isolation] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,6 +244,7 @@ class System:
     autostart: PrimaryState = PrimaryState.ACTIVE
     supervision: Supervision = DEFAULT_SUPERVISION
     implied_dependencies: bool = True
+    delivery: Delivery = Delivery.AUTO
     node_type: bool = False
     unmatched_parameters: tuple[Located[str], ...] = ()  # nodes that only parameter files name
     unknown: tuple[UnknownKey, ...] = ()  # what the command line names and the system lacks

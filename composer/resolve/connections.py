@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TypeVar
 
-from composer.model import ChannelKind, Connection, Endpoint, Port, Qos
+from composer.model import ChannelKind, Connection, Delivery, Endpoint, Isolation, Port, Qos
 from composer.names import join
 from composer.resolve.qos import QosTable, implicit_qos
-from composer.resolve.reading import is_opaque, text, texts
+from composer.resolve.reading import choice, is_opaque, text, texts
 from composer.tree import Entry, Mapping, Sequence, Tree
+
+T = TypeVar("T")
 
 _ENDS = {
     ChannelKind.TOPIC: ("from", "to"),
@@ -25,6 +28,8 @@ class Joint:
     kind: ChannelKind
     full_name: str
     qos: Qos | None
+    delivery: Delivery | None = None
+    isolation: Isolation | None = None
 
 
 Joints = dict[tuple[str, str], list[Joint]]
@@ -45,6 +50,8 @@ def connections(
             connection.kind,
             full_name(connection.name.value, namespace),
             _profile(item, connection.kind, qos),
+            connection.delivery.value if connection.delivery else None,
+            connection.isolation.value if connection.isolation else None,
         )
         for end in (*connection.sources, *connection.sinks):
             joints.setdefault((end.node, end.port), []).append(joint)
@@ -57,14 +64,23 @@ def full_name(name: str, namespace: str) -> str:
 
 
 def joint_of(port: Port, joints: Iterable[Joint]) -> Joint | None:
-    """Return the first joint of the port's kind, with the first profile given to its name."""
+    """Return the first joint of the port's kind, with what is first given to its name."""
     fitting = [joint for joint in joints if joint.kind is port.kind.channel]
     if not fitting:
         return None
     first = fitting[0]
-    profiles = (joint.qos for joint in fitting if joint.full_name == first.full_name)
-    qos = next((profile for profile in profiles if profile is not None), None)
-    return Joint(first.kind, first.full_name, qos)
+    same = [joint for joint in fitting if joint.full_name == first.full_name]
+    return Joint(
+        first.kind,
+        first.full_name,
+        _first(joint.qos for joint in same),
+        _first(joint.delivery for joint in same),
+        _first(joint.isolation for joint in same),
+    )
+
+
+def _first(given: Iterable[T | None]) -> T | None:
+    return next((value for value in given if value is not None), None)
 
 
 def _connection(tree: Tree) -> Connection | None:
@@ -76,7 +92,16 @@ def _connection(tree: Tree) -> Connection | None:
         return None
     kind = ChannelKind(entry.name)
     sources, sinks = (_ends(tree.get(end)) for end in _ENDS[kind])
-    return Connection(kind, name, sources, sinks, entry.key.span, text(tree.get("qos")))
+    return Connection(
+        kind,
+        name,
+        sources,
+        sinks,
+        entry.key.span,
+        qos=text(tree.get("qos")),
+        delivery=choice(tree.get("delivery"), Delivery),
+        isolation=choice(tree.get("isolation"), Isolation),
+    )
 
 
 def _kind_entry(tree: Mapping) -> Entry | None:

@@ -141,7 +141,13 @@ def _placed(
     if joint is None:
         own = expanded(port.ros_name.value)
         return replace(port, full_name=renamed.get(own, own))
-    return replace(port, full_name=joint.full_name, qos=joint.qos or port.qos)
+    return replace(
+        port,
+        full_name=joint.full_name,
+        qos=joint.qos or port.qos,
+        delivery=joint.delivery,
+        isolation=joint.isolation or port.isolation,
+    )
 
 
 def _inline(tree: Mapping, around: Surroundings) -> Made:

@@ -5,8 +5,13 @@ The schema has already said what is wrong with the rest.
 
 from __future__ import annotations
 
+from enum import StrEnum
+from typing import TypeVar
+
 from composer.source import Located, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
+
+E = TypeVar("E", bound=StrEnum)
 
 #: Stands for a text that must be there and is not. Like every text with a load-time variable left
 #: in it, it is judged by nobody, so that one mistake makes one finding.
@@ -64,6 +69,15 @@ def number(tree: Tree | None) -> Located[float] | None:
     if isinstance(tree, Scalar) and isinstance(tree.value, int | float):
         return None if isinstance(tree.value, bool) else Located(tree.value, tree.span)
     return None
+
+
+def choice(tree: Tree | None, kind: type[E]) -> Located[E] | None:
+    """Return the member of an enumeration that is written there; None for what is none of it."""
+    written = text(tree)
+    known = {item.value: item for item in kind}
+    if written is None or written.value not in known:
+        return None
+    return written.map(known.__getitem__)
 
 
 def flag(tree: Tree | None, default: bool) -> bool:

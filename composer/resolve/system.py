@@ -5,6 +5,7 @@ from __future__ import annotations
 from composer.diagnostics import Diagnostic
 from composer.model import (
     DEFAULT_SUPERVISION,
+    Delivery,
     Executor,
     ExecutorKind,
     Node,
@@ -23,6 +24,7 @@ from composer.resolve.parameter_files import read_parameter_files
 from composer.resolve.parameters import with_values
 from composer.resolve.qos import qos_table
 from composer.resolve.reading import (
+    choice,
     entries,
     flag,
     integer,
@@ -35,7 +37,7 @@ from composer.resolve.reading import (
 from composer.resolve.supervision import supervision
 from composer.resolve.types import NodeTypes
 from composer.source import Located, SourceFile, Span
-from composer.tree import Entry, Mapping, Tree
+from composer.tree import Entry, Mapping
 
 ROOT = "/"
 DEFAULT_THREADS = 2
@@ -58,6 +60,7 @@ def resolve_system(
     around = Surroundings(places, namespace, types, qos, joints, overrides, upkeep, files, findings)
     nodes = tuple(node(entry, around) for entry in entries(tree.get("nodes")))
     autostart = state(lifecycle.get("autostart"))
+    delivery = choice(tree.get("delivery"), Delivery)
     system = System(
         name=_name(tree, "system"),
         source=source,
@@ -72,6 +75,7 @@ def resolve_system(
         executors=tuple(_executor(entry) for entry in entries(tree.get("executors"))),
         autostart=autostart.value if autostart is not None else PrimaryState.ACTIVE,
         supervision=upkeep,
+        delivery=delivery.value if delivery is not None else Delivery.AUTO,
         implied_dependencies=flag(lifecycle.get("implied_dependencies"), default=True),
         unknown=_unknown_nodes(nodes, overrides),
         unmatched_parameters=files.unmatched(frozenset(node.full_name for node in nodes)),
@@ -147,15 +151,10 @@ def _unknown_nodes(nodes: tuple[Node, ...], overrides: Overrides) -> tuple[Unkno
 def _executor(entry: Entry) -> Executor:
     tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
     threads = integer(tree.get("threads"))
+    kind = choice(tree.get("kind"), ExecutorKind)
     return Executor(
         name=key(entry),
-        kind=_executor_kind(tree.get("kind")),
+        kind=kind.value if kind is not None else ExecutorKind.EVENTS,
         span=entry.key.span,
         threads=threads.value if threads is not None else DEFAULT_THREADS,
     )
-
-
-def _executor_kind(tree: Tree | None) -> ExecutorKind:
-    written = text(tree)
-    known = {item.value: item for item in ExecutorKind}
-    return known.get(written.value, ExecutorKind.EVENTS) if written else ExecutorKind.EVENTS

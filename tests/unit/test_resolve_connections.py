@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from composer.model import ChannelKind, System
+from composer.model import ChannelKind, Delivery, Isolation, System
 from tests.unit.resolving import quoted, system_of
 
 NODES = """\
@@ -150,3 +150,22 @@ def test_ports_of_types_are_joined_as_those_of_inline_nodes(tmp_path: Path) -> N
         "two.out": "/far/out",
         "two.in": "/between",
     }
+
+
+def test_a_connection_says_how_its_ports_are_joined_and_others_follow_the_system() -> None:
+    text = """
+    system: ways
+    delivery: dds
+    nodes:
+      talker: {publishers: {a: {type: std_msgs/msg/String}, b: {type: std_msgs/msg/String}}}
+      listener: {subscriptions: {a: {type: std_msgs/msg/String}}}
+    connections:
+      - {topic: /a, from: talker.a, to: listener.a, delivery: auto, isolation: copy}
+    """
+    system = system_of(text)
+    assert system.delivery is Delivery.DDS
+    joined = [system.node("talker").port("a"), system.node("listener").port("a")]
+    assert [port.delivery for port in joined] == [Delivery.AUTO, Delivery.AUTO]
+    assert [port.isolation for port in joined] == [Isolation.COPY, Isolation.COPY]
+    free = system.node("talker").port("b")
+    assert (free.delivery, free.isolation) == (None, Isolation.SHARE)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from composer.model import Channel, ChannelKind, System, channels
+from composer.model import Channel, ChannelKind, Delivery, System, channels
 from composer.qos import Liveliness, QosProfile
 from composer.runtime.manager import NAME, STATE_TOPIC
 
@@ -20,13 +20,15 @@ def shared_topics(system: System) -> Mapping[str, str | None]:
     topic cannot do, the topic does not do.
     """
     return {
-        channel.name: _objection(channel)
+        channel.name: _objection(channel, system.delivery)
         for channel in channels(system.nodes)
         if channel.kind is ChannelKind.TOPIC and channel.sources and channel.sinks
     }
 
 
-def _objection(channel: Channel) -> str | None:
+def _objection(channel: Channel, unless_said: Delivery) -> str | None:
+    if any((end.port.delivery or unless_said) is Delivery.DDS for end in channel.ends):
+        return "'delivery: dds' says so"
     if channel.name in _NOT_BY_PORTS or channel.name.endswith(_ENDINGS_NOT_BY_PORTS):
         return "not only ports publish it"
     if _is_timed(end.port.qos.profile for end in channel.ends):

@@ -48,7 +48,7 @@ class Delivery:
         topic = self._topics.get(port.full_name)
         if topic is None:
             return publisher.publish, _nothing
-        outlet = Outlet(publisher, port.qos.profile)
+        outlet = Outlet(publisher, port)
         topic.add_outlet(outlet)
         return outlet.send, lambda: topic.remove_outlet(outlet)
 
@@ -58,7 +58,7 @@ class Delivery:
         if topic is None:
             return _nothing
         ignore_own_publications(subscription)
-        inlet = Inlet(subscription.msg_type, port.qos.profile, queue)
+        inlet = Inlet(subscription.msg_type, port, queue)
         topic.add_inlet(inlet)
         return lambda: topic.remove_inlet(inlet)
 

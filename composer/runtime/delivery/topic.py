@@ -10,7 +10,9 @@ from typing import Any
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
-from composer.qos import Durability, QosProfile, incompatibilities
+from composer.model import Isolation, Port
+from composer.qos import Durability, incompatibilities
+from composer.runtime.delivery.copying import copy_of
 from composer.runtime.delivery.queue import Queue
 
 Send = Callable[[Any], None]
@@ -19,12 +21,17 @@ Send = Callable[[Any], None]
 class Inlet:
     """A subscription, as publishers of its topic see it."""
 
-    __slots__ = ("message_type", "profile", "queue")
+    __slots__ = ("isolated", "message_type", "profile", "queue")
 
-    def __init__(self, message_type: Any, profile: QosProfile, queue: Queue) -> None:
+    def __init__(self, message_type: Any, port: Port, queue: Queue) -> None:
         self.message_type = message_type
-        self.profile = profile
+        self.profile = port.qos.profile
+        self.isolated = port.isolation is Isolation.COPY
         self.queue = queue
+
+    def put_copy(self, message: Any) -> None:
+        """Have a copy of the message received."""
+        self.queue.put(copy_of(message))
 
 
 class Outlet:
@@ -33,9 +40,11 @@ class Outlet:
     ``send`` may be called from any thread.
     """
 
-    def __init__(self, publisher: Publisher, profile: QosProfile) -> None:
+    def __init__(self, publisher: Publisher, port: Port) -> None:
+        profile = port.qos.profile
         self.message_type: Any = publisher.msg_type
         self.profile = profile
+        self._isolated = port.isolation is Isolation.COPY
         self._publish: Send = publisher.publish
         self._count_matched: Callable[[], int] = publisher.handle.get_subscription_count
         self._inlets: tuple[Inlet, ...] = ()
@@ -60,7 +69,7 @@ class Outlet:
         with self._lock:
             if inlet.profile.durability is Durability.TRANSIENT_LOCAL:
                 for message in self._latched:
-                    inlet.queue.put(message)
+                    self._put_into(inlet)(message)
             self._reach((*self._inlets, inlet))
 
     def leave(self, inlet: Inlet) -> None:
@@ -70,7 +79,10 @@ class Outlet:
     def _reach(self, inlets: tuple[Inlet, ...]) -> None:
         self._inlets = inlets
         self._matched_here = len(inlets)
-        self._puts = tuple(inlet.queue.put for inlet in inlets)
+        self._puts = tuple(self._put_into(inlet) for inlet in inlets)
+
+    def _put_into(self, inlet: Inlet) -> Send:
+        return inlet.put_copy if self._isolated or inlet.isolated else inlet.queue.put
 
     def _send(self, message: Any) -> None:
         if message.__class__ is not self.message_type:
@@ -84,7 +96,7 @@ class Outlet:
         message = self._converted(message)
         with self._lock:
             if self._latched is not None:
-                self._latched.append(message)
+                self._latched.append(copy_of(message) if self._isolated else message)
             for put in self._puts:
                 put(message)
             self._publish(message)  # somebody who is not here yet may want it

@@ -1,0 +1,137 @@
+"""Delivery in the process has the same semantics as by DDS: the same table for both."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from std_msgs.msg import Int64
+
+from tests.ros.system_bench import RunningSystem, running, wait_until
+
+SENT = 30
+#: Offered, requested, and which of the 30 messages sent in one callback are received.
+TABLE = {
+    "deep": ("{depth: 50}", "{depth: 50}", range(SENT)),
+    "drops_oldest": ("{depth: 50}", "{depth: 5}", range(SENT - 5, SENT)),
+    "best_effort": (
+        "{depth: 50, reliability: best_effort}",
+        "{depth: 7, reliability: best_effort}",
+        range(SENT - 7, SENT),
+    ),
+    "weaker_request": ("{depth: 50}", "{depth: 50, reliability: best_effort}", range(SENT)),
+    "stronger_request": ("{depth: 50, reliability: best_effort}", "{depth: 50}", range(0)),
+    "keeps_all": ("{history: keep_all}", "{history: keep_all}", range(SENT)),
+    "no_latch": ("{depth: 50}", "{depth: 50, durability: transient_local}", range(0)),
+    "latch": (
+        "{depth: 50, durability: transient_local}",
+        "{depth: 9, durability: transient_local}",
+        range(SENT - 9, SENT),
+    ),
+    "latch_unused": ("{depth: 50, durability: transient_local}", "{depth: 50}", range(SENT)),
+}
+MODULE = """
+from composer.behavior import Behavior
+from std_msgs.msg import Int64
+
+class Source(Behavior):
+    def on_configure(self):
+        self.sent = []
+
+    def send(self, topics, count):
+        for name in topics:
+            for number in range(count):
+                self.sent.append(Int64(data=number))
+                self.publishers[name].publish(self.sent[-1])
+
+class Sink(Behavior):
+    def on_configure(self):
+        self.heard = []
+
+    def on_input(self, message):
+        self.heard.append(message)
+"""
+
+
+def text_of(delivery: str, executor: str) -> str:
+    """A source with a topic for each row, and a sink for each."""
+    publishers = "".join(
+        f"      {name}: {{type: std_msgs/msg/Int64, topic: /{name}, qos: {offered}}}\n"
+        for name, (offered, _, _) in TABLE.items()
+    )
+    sinks = "".join(
+        f"  {name}:\n    behavior: table:Sink\n    executor: own\n    subscriptions:\n"
+        f"      input: {{type: std_msgs/msg/Int64, topic: /{name}, qos: {requested}}}\n"
+        for name, (_, requested, _) in TABLE.items()
+    )
+    return (
+        f"system: table\ndelivery: {delivery}\nexecutors: {{own: {{kind: {executor}}}}}\nnodes:\n"
+        f"  source:\n    behavior: table:Source\n    executor: own\n    publishers:\n"
+        f"{publishers}{sinks}"
+    )
+
+
+def behavior(system: RunningSystem, node: str) -> Any:
+    return system.host._crew.nodes[node]._behavior
+
+
+@pytest.mark.parametrize("delivery", ["auto", "dds"])
+@pytest.mark.parametrize("executor", ["events", "single_threaded"])
+def test_every_combination_of_qos_delivers_the_same_either_way(
+    tmp_path: Path, executor: str, delivery: str
+) -> None:
+    with running(text_of(delivery, executor), tmp_path, table=MODULE) as system:
+        source = system.host._crew.nodes["source"]
+        source.loop.run(lambda: source._behavior.send(TABLE, SENT))
+        for name, (_, _, wanted) in TABLE.items():
+            sink = behavior(system, name)
+            wait_until(lambda sink=sink, wanted=wanted: len(sink.heard) >= len(wanted), name)
+        # Whatever came too late or too often would have come by now: this goes the same way.
+        source.loop.run(lambda: source._behavior.send(["deep"], 1))
+        deep = behavior(system, "deep")
+        wait_until(lambda: len(deep.heard) == SENT + 1)
+        heard = {name: [item.data for item in behavior(system, name).heard] for name in TABLE}
+        assert heard == {
+            name: [*wanted, 0] if name == "deep" else list(wanted)
+            for name, (_, _, wanted) in TABLE.items()
+        }
+        same = any(message is source._behavior.sent[0] for message in deep.heard)
+        assert same is (delivery == "auto")
+
+
+COPIED = """
+system: copied
+nodes:
+  source:
+    behavior: table:Source
+    publishers:
+      shared: {type: std_msgs/msg/Int64}
+      copied: {type: std_msgs/msg/Int64}
+      by_dds: {type: std_msgs/msg/Int64}
+  shared: {behavior: table:Sink, subscriptions: {input: {type: std_msgs/msg/Int64}}}
+  copied: {behavior: table:Sink, subscriptions: {input: {type: std_msgs/msg/Int64}}}
+  by_dds: {behavior: table:Sink, subscriptions: {input: {type: std_msgs/msg/Int64}}}
+connections:
+  - {topic: /shared, from: source.shared, to: shared.input}
+  - {topic: /copied, from: source.copied, to: copied.input, isolation: copy}
+  - {topic: /by_dds, from: source.by_dds, to: by_dds.input, delivery: dds}
+"""
+
+
+def test_a_connection_may_ask_for_copies_or_for_dds(tmp_path: Path) -> None:
+    with running(COPIED, tmp_path, table=MODULE) as system:
+        source = system.host._crew.nodes["source"]
+        publishers = source._assembly.publishers
+        sinks = {name: behavior(system, name) for name in ("shared", "copied", "by_dds")}
+
+        def publish_and_change() -> None:
+            for name in sinks:
+                message = Int64(data=1)
+                publishers[name].publish(message)
+                message.data = 2
+
+        source.loop.run(publish_and_change)
+        wait_until(lambda: all(sink.heard for sink in sinks.values()))
+        heard = {name: [item.data for item in sink.heard] for name, sink in sinks.items()}
+    assert heard == {"shared": [2], "copied": [1], "by_dds": [1]}
