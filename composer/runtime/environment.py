@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
 
 from composer.diagnostics import nearest
+from composer.runtime.discovery import complete_discovery
 from composer.runtime.shared_memory import remove_half_made_ports
 from composer.runtime.start_refused import StartRefused
 
@@ -53,6 +54,7 @@ def prepare_environment() -> None:
     the process.
     """
     complete_environment(os.environ)
+    complete_discovery(os.environ)
     check_environment(os.environ)
     remove_half_made_ports()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from composer.diagnostics import nearest
-from composer.runtime.session import MISSING_S, Deadline, RosError, Session
+from composer.runtime.session import Deadline, RosError, Session
 
 _MOST_LISTED = 8
 
@@ -25,8 +25,7 @@ def find_node(
 
     That is a full name, or the last part (or parts) of just one. Raises NotThere.
     """
-    patience = Deadline(min(MISSING_S, deadline.left_s))
-    found = session.wait_for(lambda: _matches(name, look()) or None, patience)
+    found = session.search(lambda: _matches(name, look()) or None, deadline)
     if found is None:
         raise not_there(kind, name, look())
     if name not in found:  # a part of a name: are there others with the same part?

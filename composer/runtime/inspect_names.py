@@ -14,7 +14,7 @@ from rclpy.action.graph import (
 from rclpy.node import Node
 
 from composer.runtime.finding import find_node, not_there
-from composer.runtime.session import MISSING_S, Deadline, Session
+from composer.runtime.session import Deadline, Session
 
 T = TypeVar("T")
 
@@ -108,8 +108,7 @@ class Names:
         A name without a leading slash means the one in the root namespace.
         """
         wanted = name if name.startswith("/") else f"/{name}"
-        patience = Deadline(min(MISSING_S, self._deadline.left_s))
-        if self._session.wait_for(lambda: wanted in look() or None, patience):
+        if self._session.search(lambda: wanted in look() or None, self._deadline):
             return wanted
         known = [found for found in look() if not is_hidden(found)]
         raise not_there(kind, wanted, known)

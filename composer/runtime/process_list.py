@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from composer.runtime.claim import claims
 from composer.runtime.control import Control
 from composer.runtime.session import Deadline, Session
-from composer.runtime.systems import SystemReport, Systems
+from composer.runtime.systems import MEETING_S, SystemReport, Systems
 
-#: Managers tell at once and again each second; who has not answered by then is said to be silent.
+#: Who does not answer so soon after being met is said to be silent.
 _PATIENCE_S = 2.0
-_STILL_WITHIN_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,17 +28,15 @@ def list_processes(session: Session, deadline: Deadline, *, callbacks: bool) -> 
     """Return everything there is, once discovery stands still; with or without callbacks."""
     systems = Systems(session, deadline, callbacks=callbacks)
     control = Control(session, deadline)
-    here = claims()
-    reports = systems.reports(sorted(here), _patience(deadline)) if here else {}
-    # Where a composer runs, there is no need to wait for the first of all nodes to be discovered.
-    rest = Deadline(min(_STILL_WITHIN_S, deadline.left_s)) if here else deadline
-    names, nodes = session.wait_until_still(lambda: (systems.look(), control.known()), rest)
-    found = [name for name in names if name not in reports]
-    reports |= systems.reports(found, _patience(deadline)) if found else {}
+    meeting = Deadline(min(MEETING_S, deadline.left_s))
+    here = sorted(claims())
+    systems.listen(here)
+    names, nodes = session.wait_until_still(lambda: (systems.look(), control.known()), deadline)
+    reports = systems.reports({*here, *names}, meeting)
     managed = {node.node for report in reports.values() if report for node in report.nodes}
     others = [node for node in nodes if node not in managed]
-    patient = Control(session, _patience(deadline))
-    return ProcessList(dict(sorted(reports.items())), patient.states(others) if others else {})
+    patient = Control(session, Deadline(min(_PATIENCE_S, deadline.left_s)))
+    return ProcessList(reports, patient.states(others) if others else {})
 
 
 def list_one(session: Session, deadline: Deadline, name: str, *, callbacks: bool) -> ProcessList:
@@ -47,7 +44,3 @@ def list_one(session: Session, deadline: Deadline, name: str, *, callbacks: bool
     systems = Systems(session, deadline, callbacks=callbacks)
     found = systems.find(name)
     return ProcessList({found: systems.report(found)})
-
-
-def _patience(deadline: Deadline) -> Deadline:
-    return Deadline(min(_PATIENCE_S, deadline.left_s))

@@ -1,7 +1,8 @@
 """A command's own short-lived node in the ROS graph: it joins, waits on what it needs, leaves.
 
-Discovery tells nobody when it is complete. Whoever knows a name waits for that name; whoever asks
-what there is waits until the graph has stood still for a moment.
+Discovery tells nobody when it is complete. What is asked for by name is there as soon as it is
+seen. For all else, what is seen counts once nobody on this computer is left to be met and nothing
+has come for a moment.
 """
 
 from __future__ import annotations
@@ -17,17 +18,20 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 
+from composer.runtime.participants import participants_here
+
 T = TypeVar("T")
 H = TypeVar("H", bound=Hashable)
 
 _STEP_S = 0.02
-#: What is there is told once nothing has come for so long, what is missing after so long.
-QUIET_S = 0.5
-MISSING_S = 3.0
-#: With Fast DDS a new participant is met at once or, in about half of the cases, only with the
-#: next announcement up to 3 s later (measured). Joining anew is another throw of that coin.
-_MEET_WITHIN_S = 0.25
-_JOINS = 8
+#: What a participant has is announced 0.1 s after it was met; what is lost, 0.1 s later again.
+_QUIET_S = 0.25
+#: So long is waited for the first of all others: one in another computer shows nothing before.
+_FIRST_S = 0.5
+#: Who is not met at once is met with its next announcement, with Fast DDS at most 3 s later.
+_ANNOUNCED_WITHIN_S = 3.2
+#: Each participant of ROS 2 has it; its name is as it is on the wire.
+_TOPIC_OF_PARTICIPANTS = "ros_discovery_info"
 #: Commands do not count as somebody: they come and go.
 _NAME_PREFIX = "_compose_"
 
@@ -66,28 +70,6 @@ class Session:
     """The node, hidden from node lists by its leading underscore. Use it in a ``with`` block."""
 
     def __init__(self) -> None:
-        self._began_s = time.monotonic()
-        self._join()
-        for _ in range(_JOINS - 1):
-            if self.wait_for(lambda: self.others() or None, Deadline(_MEET_WITHIN_S)):
-                break
-            self.rejoin()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._leave()
-
-    def rejoin(self) -> None:
-        """Leave and join anew: another throw of the coin whether others are met at once.
-
-        Whatever was made with ``node`` is gone.
-        """
-        self._leave()
-        self._join()
-
-    def _join(self) -> None:
         self._context = Context()
         # No signal handlers come with it: Ctrl-C stays Python's KeyboardInterrupt.
         self._context.init([])
@@ -100,8 +82,13 @@ class Session:
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
+        self._domain_id = self._context.get_domain_id()
+        self._joined_s = time.monotonic()
 
-    def _leave(self) -> None:
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         self._executor.shutdown(timeout_sec=1.0)
         self.node.destroy_node()
         self._context.try_shutdown()
@@ -129,21 +116,39 @@ class Session:
             self.spin_once(deadline)
 
     def wait_until_still(self, look: Callable[[], H], deadline: Deadline) -> H:
-        """Return what ``look`` finds once it stays the same for a moment, or at the deadline.
-
-        Where no other node is known it waits longer: so it looks before the first is discovered.
-        """
-        seen = look()
-        changed_s = time.monotonic()
-        while not deadline.passed:
+        """Return what ``look`` finds once everything is discovered, or at the deadline."""
+        quiet = _Quiet()
+        while True:
+            found = look()
+            if self._is_all_discovered(quiet.since_s(found)) or deadline.passed:
+                return found
             self.spin_once(deadline)
-            now = look()
-            if now != seen:
-                seen, changed_s = now, time.monotonic()
-            still_at_s = changed_s + QUIET_S if self.others() else self._began_s + MISSING_S
-            if time.monotonic() >= still_at_s:
-                break
-        return seen
+
+    def search(self, look: Callable[[], H | None], deadline: Deadline) -> H | None:
+        """Return what ``look`` finds as soon as it finds something.
+
+        None once everything is discovered, or at the deadline.
+        """
+        quiet = _Quiet()
+        while True:
+            found = look()
+            is_over = self._is_all_discovered(quiet.since_s(self.others())) or deadline.passed
+            if found is not None or is_over:
+                return found
+            self.spin_once(deadline)
+
+    def _is_all_discovered(self, unchanged_since_s: float) -> bool:
+        now_s = time.monotonic()
+        earliest_s = unchanged_since_s + _QUIET_S
+        if not self.others():
+            earliest_s = max(earliest_s, self._joined_s + _FIRST_S)
+        if now_s < earliest_s:
+            return False
+        return self._is_everybody_met() or now_s >= self._joined_s + _ANNOUNCED_WITHIN_S
+
+    def _is_everybody_met(self) -> bool:
+        met = self.node.get_publishers_info_by_topic(_TOPIC_OF_PARTICIPANTS, no_mangle=True)
+        return len(met) >= participants_here(self._domain_id)
 
     def call(self, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
         """Call a service and return its response. Raises NoAnswer at the deadline."""
@@ -166,6 +171,20 @@ class Session:
         finally:
             for call in calls.values():
                 self.node.destroy_client(call.client)
+
+
+class _Quiet:
+    """Since when something looks as it does."""
+
+    def __init__(self) -> None:
+        self._seen: Hashable = None
+        self._since_s = time.monotonic()
+
+    def since_s(self, seen: Hashable) -> float:
+        """Return since when it looks like that, on the clock of time.monotonic."""
+        if seen != self._seen:
+            self._seen, self._since_s = seen, time.monotonic()
+        return self._since_s
 
 
 class _Call:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -22,12 +22,12 @@ from composer.runtime.manager import (
     STATE_QOS,
     STATE_TOPIC,
 )
-from composer.runtime.session import MISSING_S, QUIET_S, Deadline, NoAnswer, Session
+from composer.runtime.session import Deadline, NoAnswer, Session
 
 _TRIGGER_TYPE = "std_srvs/srv/Trigger"
 _SERVICE = f"/{NAME}/{IS_ACTIVE}"
-#: Who was not met by then is often met at once by a participant that joins anew.
-_TURN_S = 0.4
+#: Managers tell at once and again each second; who is not met at once is met within 3 s.
+MEETING_S = 3.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,19 +90,19 @@ class Systems:
                 if name.endswith(_SERVICE) and _TRIGGER_TYPE in types
             )
         )
-        for name in found:
-            self._listen(name)
+        self.listen(found)
         return found
+
+    def listen(self, names: Iterable[str]) -> None:
+        """Listen for what systems tell, also of those that are not discovered yet."""
+        for name in names:
+            if name not in self._subscriptions:
+                self._subscriptions[name] = self._listen(name)
 
     def find(self, name: str) -> str:
         """Return the full name of the running system that ``name`` means. Raises NotThere."""
         here = _called(name, claims())
         if not here:
-            patience = Deadline(min(QUIET_S, self._deadline.left_s))
-            found = self._session.wait_for(lambda: _called(name, self.look()) or None, patience)
-            absolute = f"/{name.strip('/')}"
-            if found is not None and absolute in found:
-                return absolute
             known = self._session.wait_until_still(self.look, self._deadline)
             here = _called(name, known)
         if not here:
@@ -131,8 +131,8 @@ class Systems:
 
     def reports(self, names: Iterable[str], patience: Deadline) -> dict[str, SystemReport | None]:
         """Return what the managers tell until then; None for one that tells nothing."""
-        wanted = tuple(names)
-        self._meet(wanted, patience, self._has_told)
+        wanted = sorted(names)
+        self._hear(wanted, patience)
         return {name: self._report(name) if name in self._heard else None for name in wanted}
 
     def newer(self, name: str, than_s: float) -> SystemReport | None:
@@ -146,9 +146,9 @@ class Systems:
 
         ``what`` is one of the services of :class:`composer.runtime.manager.Manager`.
         """
-        meeting = Deadline(min(MISSING_S, self._deadline.left_s))
+        meeting = Deadline(min(MEETING_S, self._deadline.left_s))
         # Who tells its state is alive: of a killed process, services are in the graph for a while.
-        if not self._meet((name,), meeting, self._has_told):
+        if not self._hear((name,), meeting):
             raise self._silent(name)
         service = f"{name}/{NAME}/{what}"
         try:
@@ -168,20 +168,12 @@ class Systems:
             self._session.wait_for(lambda: name not in claims() or None, self._deadline)
         return message
 
-    def _meet(
-        self, names: tuple[str, ...], patience: Deadline, is_met: Callable[[str], bool]
-    ) -> bool:
-        """Wait until all managers are met; where that takes too long, join the graph anew."""
-        while True:
-            for name in names:
-                self._listen(name)
-            turn = Deadline(min(_TURN_S, patience.left_s))
-            if self._session.wait_for(lambda: all(map(is_met, names)) or None, turn):
-                return True
-            if patience.passed:
-                return False
-            self._subscriptions.clear()
-            self._session.rejoin()
+    def _hear(self, names: Collection[str], patience: Deadline) -> bool:
+        """Wait until all managers have told their state, and say whether they have."""
+        self.listen(names)
+        return bool(
+            self._session.wait_for(lambda: all(map(self._has_told, names)) or None, patience)
+        )
 
     def _silent(self, name: str) -> NoAnswer:
         pid = claims().get(name)
@@ -202,14 +194,13 @@ class Systems:
         at_s = _time_s(callbacks)
         return replace(report, callbacks=from_message(callbacks), callbacks_at_s=at_s)
 
-    def _listen(self, name: str) -> None:
-        if name in self._subscriptions:
-            return
-        self._subscriptions[name] = [self._heard_of(name, STATE_TOPIC, STATE_QOS, self._heard)]
+    def _listen(self, name: str) -> list[Subscription]:
+        subscriptions = [self._heard_of(name, STATE_TOPIC, STATE_QOS, self._heard)]
         if self._wants_callbacks:
-            self._subscriptions[name].append(
+            subscriptions.append(
                 self._heard_of(name, CALLBACKS_TOPIC, CALLBACKS_QOS, self._callbacks)
             )
+        return subscriptions
 
     def _heard_of(
         self, name: str, topic: str, qos: QoSProfile, heard: dict[str, DiagnosticArray]

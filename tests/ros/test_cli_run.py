@@ -171,7 +171,7 @@ def test_no_nodes_at_all_is_told_in_time(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_ctrl_c_ends_a_waiting_command_without_a_traceback() -> None:
     process = subprocess.Popen(
-        [*COMPOSE, "lifecycle", "get", "nobody", "--timeout", "60"],
+        [*COMPOSE, "topic", "pub", "/unheard", "std_msgs/msg/Empty", "--once", "--timeout", "60"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -1,0 +1,37 @@
+"""The ports that Linux says are held, read as participants."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from composer.runtime.participants import participants_here
+
+HEAD = "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  inode\n"
+
+
+def table(folder: Path, *ports: int) -> Path:
+    path = folder / "udp"
+    path.write_text(
+        HEAD + "".join(f"  {port}: 00000000:{port:04X} 00000000:0000 07\n" for port in ports),
+        encoding="ascii",
+    )
+    return path
+
+
+def test_a_participant_is_a_port_for_discovery(tmp_path: Path) -> None:
+    for_data, multicast, of_others = (7411, 7413), (7400, 7401), (53, 68, 40000)
+    path = table(tmp_path, 7410, 7412, *for_data, *multicast, *of_others)
+    assert participants_here(0, path) == 2
+
+
+def test_a_port_held_twice_is_one_participant(tmp_path: Path) -> None:
+    assert participants_here(0, table(tmp_path, 7410, 7410)) == 1
+
+
+def test_each_domain_has_its_ports(tmp_path: Path) -> None:
+    path = table(tmp_path, 7400 + 250 * 41 + 10, 7400 + 250 * 42 + 248, 7400 + 250 * 43)
+    assert [participants_here(domain_id, path) for domain_id in (40, 41, 42, 43)] == [0, 1, 1, 0]
+
+
+def test_where_nobody_tells_nobody_is_counted(tmp_path: Path) -> None:
+    assert participants_here(0, tmp_path / "udp") == 0
