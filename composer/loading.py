@@ -48,13 +48,14 @@ class Loading:
     tree: Mapping | None = None
 
     @property
+    def sound(self) -> bool:
+        """True when there is a system or a node type, whole and without errors."""
+        return self.system is not None and not has_errors(self.diagnostics)
+
+    @property
     def runnable(self) -> bool:
         """True when there is a system, whole and without errors."""
-        return (
-            self.system is not None
-            and not self.system.node_type
-            and not has_errors(self.diagnostics)
-        )
+        return self.system is not None and not self.system.node_type and self.sound
 
 
 def load(
@@ -99,6 +100,14 @@ def load_bytes(
     return _load(
         tree, source, findings, _Known.of(_real_folder(folder / shown), interfaces), Overrides()
     )
+
+
+def means_the_same(loading: Loading, text: str) -> bool:
+    """Say whether ``text`` in the place of the file that was loaded would give the same model."""
+    again = load_bytes(
+        text.encode(), Path.cwd(), shown=loading.source.path, interfaces=loading.interfaces
+    )
+    return again.system == loading.system
 
 
 def findings_of(loadings: Collection[Loading]) -> list[Diagnostic]:

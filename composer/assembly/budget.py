@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 from composer.assembly.rules import TOO_MUCH_INCLUDED
 from composer.diagnostics import Diagnostic
-from composer.document.limits import MAX_BYTES, MAX_INCLUDES, MAX_VALUES
+from composer.document.limits import MAX_BYTES, MAX_INCLUDED_VALUES, MAX_INCLUDES
 from composer.source import Span
 
 #: Names held against patterns.
-_MAX_COMPARISONS = 1_000_000
+_MAX_COMPARISONS = 500_000
 
 
 class TooMuch(Exception):
@@ -44,10 +44,11 @@ class Budget:
             raise TooMuch(message, span)
 
     def add(self, values: int, span: Span) -> None:
-        """Count what a file says with its variables put in, or what stands for a pattern."""
+        """Count what an included file says with its variables put in, or a pattern stands for."""
         self._values += values
-        if self._values > MAX_VALUES:
-            raise TooMuch(f"with this, the system says more than {MAX_VALUES:,} things", span)
+        if self._values > MAX_INCLUDED_VALUES:
+            message = f"with this, the system includes more than {MAX_INCLUDED_VALUES:,} things"
+            raise TooMuch(message, span)
 
     def compare(self, names: int, span: Span) -> None:
         """Count names that are held against a pattern."""

@@ -27,7 +27,7 @@ class _Link:
     """A file on the way from the system to what it includes, and where it includes the next."""
 
     file: File
-    span: Span | None = None
+    span: Span
 
 
 @dataclass(slots=True)
@@ -49,7 +49,8 @@ class Including:
         """Return what ``file`` says with ``arguments`` for its variables. Raises TooMuch."""
         self.folders[file.source.path] = file.path.parent
         expanded, found = expand(file.tree, arguments)
-        self.budget.add(measured(expanded).values, expanded.span)
+        if self._way:
+            self.budget.add(measured(expanded).values, self._way[-1].span)
         self.findings += found
         self.findings += check_schema(expanded, SYSTEM)
         asked = expanded.get(INCLUDE)
@@ -121,7 +122,7 @@ def _cycle(links: list[_Link]) -> Diagnostic:
     links = links[first:] + links[:first]
     paths = paths[first:] + paths[:first]
     circle = " -> ".join(map(shown, [*paths, paths[0]]))
-    spans = [link.span for link in links if link.span is not None]
+    spans = [link.span for link in links]
     labels = tuple(Label(span, "by way of this") for span in spans[1:])
     return Diagnostic(INCLUDE_CYCLE, f"this includes itself: {circle}", spans[0], labels)
 

@@ -23,6 +23,7 @@ COMMANDS = (
     "resume",
     "reset",
     "validate",
+    "config",
     "graph",
     "diff",
     "lifecycle",

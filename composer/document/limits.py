@@ -21,6 +21,9 @@ MAX_COPIES = 2_000
 #: Files that a system includes, those counted again that are included again.
 MAX_INCLUDES = 500
 
+#: Keys, values, maps and lists in all files that a system includes, and in what patterns stand for.
+MAX_INCLUDED_VALUES = 100_000
+
 #: Files that include each other, one in another.
 MAX_INCLUDE_DEPTH = 16
 

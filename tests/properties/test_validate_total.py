@@ -8,9 +8,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.properties.mutation import mutated
-from tests.properties.validating import SHIPPED, judge, shipped_contents
+from tests.properties.validating import SHIPPED, contents, judge
 
-CONTENTS = shipped_contents()
+CONTENTS = contents()
 TEXTS = [path.read_text(encoding="utf-8") for path in SHIPPED]
 
 

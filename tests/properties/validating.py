@@ -22,13 +22,34 @@ INTERFACES = Interfaces.load([interfaces_folder()])
 SHIPPED = tuple(
     path for folder in (systems_folder(), nodes_folder()) for path in sorted(folder.glob("*.yaml"))
 )
+#: What no shipped file says.
+OTHERS = (
+    {
+        "node": "loud_watchdog",
+        "extends": "watchdog",
+        "variables": {"message_type": {"default": "std_msgs/msg/String"}},
+        "parameters": {"timeout_ms": 50.0},
+        "timers": {"raise_alarm": {"log": {"level": "error", "message": "silent"}}},
+    },
+    {
+        "system": "corridor",
+        "include": [
+            {"file": "robot.yaml", "for_each": {"i": 2}, "prefix": "r${i}_", "namespace": "r${i}"},
+            {"file": "executors.yaml", "variables": {}, "overrides": {
+                "nodes": {"observer": {"lifecycle": {"timeout_ms": 10}}},
+                "executors": {"control": {"kind": "events"}},
+            }},
+        ],
+        "connections": [{"topic": "/all", "from": "r*_simulator.sensor_data"}],
+    },
+)  # fmt: skip
 RENDERERS = (report.render, sarif.render, github.render, text.render)
 
 
-def shipped_contents() -> list[Any]:
-    """Return what the shipped systems and node types say."""
+def contents() -> list[Any]:
+    """Return what the shipped systems and node types say, and what none of them says."""
     trees = (read_document(path)[0] for path in SHIPPED)
-    return [plain(tree) for tree in trees if tree is not None]
+    return [*(plain(tree) for tree in trees if tree is not None), *OTHERS]
 
 
 def judge(data: bytes) -> list[Diagnostic]:

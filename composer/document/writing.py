@@ -1,0 +1,110 @@
+"""Located tree to text: YAML 1.2 as a person would write it, and that reads as the same tree."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+
+from composer.document.scalars import resolve_plain
+from composer.tree import Mapping, Scalar, ScalarValue, Sequence, Tree
+
+_WIDTH = 100
+_INDENT = "  "
+#: What needs no quotes, whatever it stands in, if it is no number and no other word of YAML.
+_PLAIN = re.compile(r"[A-Za-z_/](?:[A-Za-z0-9_./ -]*[A-Za-z0-9_./])?")
+_SECTION = 1  # the depth of what stands under the keys of a file
+
+
+def write_document(tree: Mapping) -> str:
+    """Return a text that says what ``tree`` says.
+
+    Sections are blocks; in them, what fits into a line stands in one.
+    """
+    return "".join(f"{line}\n" for line in _block(tree, 0))
+
+
+def _block(tree: Tree, depth: int) -> Iterator[str]:
+    """Yield the lines of a map or list that has something in it."""
+    match tree:
+        case Mapping():
+            for entry in tree:
+                yield from _entry(f"{_scalar(entry.name)}:", entry.value, depth)
+        case Sequence():
+            for item in tree.items:
+                yield from _item(item, depth)
+        case Scalar():
+            yield _scalar(tree.value)
+
+
+def _entry(key: str, value: Tree, depth: int) -> Iterator[str]:
+    line = f"{key} {_flow(value)}"
+    if _is_flow(value, line, depth + 1):
+        yield line
+        return
+    yield key
+    for inner in _block(value, depth + 1):
+        yield f"{_INDENT}{inner}"
+
+
+def _item(value: Tree, depth: int) -> Iterator[str]:
+    line = f"- {_flow(value)}"
+    if _is_flow(value, line, depth + 1):
+        yield line
+        return
+    for number, inner in enumerate(_block(value, depth + 1)):
+        yield f"{_INDENT if number else '- '}{inner}"
+
+
+def _is_flow(tree: Tree, line: str, depth: int) -> bool:
+    inner = _inner(tree)
+    if not inner:
+        return True
+    if depth == _SECTION and any(_inner(part) for part in inner):
+        return False
+    return len(line) + len(_INDENT) * (depth - 1) <= _WIDTH
+
+
+def _inner(tree: Tree) -> tuple[Tree, ...]:
+    match tree:
+        case Mapping():
+            return tuple(entry.value for entry in tree)
+        case Sequence():
+            return tree.items
+        case Scalar():
+            return ()
+
+
+def _flow(tree: Tree) -> str:
+    match tree:
+        case Mapping():
+            entries = (f"{_scalar(entry.name)}: {_flow(entry.value)}" for entry in tree)
+            return f"{{{', '.join(entries)}}}"
+        case Sequence():
+            return f"[{', '.join(map(_flow, tree.items))}]"
+        case Scalar():
+            return _scalar(tree.value)
+
+
+def _scalar(value: ScalarValue) -> str:
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return value if _is_plain(value) else _quoted(value)
+        case _:
+            return repr(value)
+
+
+def _is_plain(text: str) -> bool:
+    return _PLAIN.fullmatch(text) is not None and resolve_plain(text) == text
+
+
+def _quoted(text: str) -> str:
+    """Return a text in double quotes: JSON's, with an escape for everything that is not seen."""
+    return "".join(
+        character if character.isprintable() else f"\\U{ord(character):08x}"
+        for character in json.dumps(text, ensure_ascii=False)
+    )

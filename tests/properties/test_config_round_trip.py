@@ -1,0 +1,137 @@
+"""What ``compose config`` prints is a file that means the same as what it was made from."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from composer.assembly.canonical import canonical
+from composer.document import parse_document
+from composer.document.writing import write_document
+from composer.loading import Loading, load, means_the_same
+from composer.resources import systems_folder
+from composer.source import SourceFile, Span
+from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, plain
+from tests.properties.validating import SHIPPED
+
+SPAN = Span(SourceFile("it"), 1, 1)
+#: Systems that can be anywhere in a fleet, with variables and nodes that may be changed.
+PARTS: dict[str, dict[str, Any]] = {
+    "robot.yaml": {"variables": {"start": [1.0, 2.5]}, "nodes": {"planner": {"executor": "slow"}}},
+    "fleet.yaml": {"nodes": {"tower": {"lifecycle": {"timeout_ms": 10}}}},
+    "toolbox.yaml": {"nodes": {"source": {"parameters": {"rate_hz": 2.5}}}},
+    "navigation.yaml": {},
+    "talker_listener.yaml": {"nodes": {"talker": {"timers": {"tick": {"rate_hz": 5}}}}},
+}
+
+
+@st.composite
+def fleets(draw: st.DrawFn) -> dict[str, Any]:
+    """Draw a system that includes shipped ones, in all the ways there are."""
+    includes = []
+    for number in range(draw(st.integers(1, 3))):
+        file = draw(st.sampled_from(sorted(PARTS)))
+        changes = dict(PARTS[file])
+        include: dict[str, Any] = {"file": file, "prefix": f"p{number}_${{i}}_"}
+        include["for_each"] = {"i": draw(st.sampled_from([1, 2, ["a", "b"], [True]]))}
+        if draw(st.booleans()):
+            include["namespace"] = draw(st.sampled_from(["/hall", "hall", "hall/${i}", "a_${i}"]))
+        if draw(st.booleans()) and "variables" in changes:
+            include["variables"] = changes["variables"]
+        if draw(st.booleans()) and "nodes" in changes:
+            include["overrides"] = {"nodes": changes["nodes"]}
+        includes.append(include)
+    text = draw(
+        st.sampled_from(["plain", "$${literal}", "a: b # c", "null", "0o17", "'\"", "é\t\n"])
+    )
+    own = {"on_activate": {"log": text}, "lifecycle": {"depends_on": ["p0_*"]}}
+    return {
+        "system": "drawn",
+        "description": text,
+        **({"namespace": "/robots"} if draw(st.booleans()) else {}),
+        "executors": {"slow": {"kind": "single_threaded"}},
+        "include": includes,
+        "nodes": {"own_${n}": {"for_each": {"n": draw(st.integers(1, 3))}, **own}},
+    }
+
+
+def hold(loading: Loading) -> None:
+    """Write what was loaded as one file: it must say the same, and be written so again."""
+    assert loading.tree is not None
+    text = write_document(canonical(loading.tree))
+    assert means_the_same(loading, text)
+    tree, findings = parse_document(SourceFile("it", text))
+    assert findings == []
+    assert tree is not None
+    if tree.entry("system") is not None:
+        assert all(entry.name not in {"include", "variables"} for entry in tree)
+        assert plain(canonical(loading.tree)) == plain(tree)
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.name)
+def test_shipped_file(path: Path) -> None:
+    hold(load(path))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    found = tmp_path_factory.mktemp("fleets")
+    for path in systems_folder().glob("*.yaml"):
+        (found / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    return found
+
+
+@settings(max_examples=40, deadline=None)
+@given(fleet=fleets())
+def test_drawn_system(folder: Path, fleet: dict[str, Any]) -> None:
+    path = folder / "drawn.yaml"
+    path.write_text(json.dumps(fleet), encoding="utf-8")
+    loading = load(path)
+    assert loading.system is not None
+    assert {item.rule.name for item in loading.diagnostics} & {"unknown-key", "wrong-type"} == set()
+    hold(loading)
+
+
+scalars = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-(2**63), 2**64 - 1),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.text(st.characters(exclude_categories=["Cc", "Cs", "Cf", "Co", "Cn"]), max_size=12),
+    st.text("abz019_./~{}()[]'\"+-*% :#&!|>@`,?\t\n", max_size=8),
+    st.sampled_from(["yes", "NO", "null", "~", "1e3", "0x1f", "08", "22:22", "- a", "a: b", "<<"]),
+).map(lambda value: Scalar(value, SPAN))
+names = st.text("abz019_./~{} :#*-é\t", min_size=1, max_size=8)
+
+
+def maps(values: st.SearchStrategy[Tree]) -> st.SearchStrategy[Mapping]:
+    return st.dictionaries(names, values, max_size=5).map(
+        lambda items: Mapping(
+            tuple(Entry(Scalar(name, SPAN), value) for name, value in items.items()), SPAN
+        )
+    )
+
+
+trees = st.recursive(
+    scalars,
+    lambda inner: (
+        maps(inner) | st.lists(inner, max_size=5).map(lambda items: Sequence(tuple(items), SPAN))
+    ),
+    max_leaves=30,
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(tree=maps(trees))
+def test_any_tree_is_read_as_it_was_written(tree: Mapping) -> None:
+    if not tree.entries:
+        return
+    read, findings = parse_document(SourceFile("it", write_document(tree)))
+    assert [item.message for item in findings] == []
+    assert read is not None
+    assert repr(plain(read)) == repr(plain(tree))
