@@ -4,6 +4,7 @@ The model judges nothing. A reference to something that does not exist stays in 
 written; the checks say what is wrong with it.
 """
 
+from composer.model.introspection import DEFAULT_INTROSPECTION, Introspection
 from composer.model.ports import (
     ChannelKind,
     Delivery,
@@ -50,6 +51,7 @@ from composer.model.system import (
 )
 
 __all__ = [
+    "DEFAULT_INTROSPECTION",
     "DEFAULT_SUPERVISION",
     "BehaviorReference",
     "Chain",
@@ -63,6 +65,7 @@ __all__ = [
     "Executor",
     "ExecutorKind",
     "FeedbackSteps",
+    "Introspection",
     "Isolation",
     "LogLevel",
     "NamedQos",

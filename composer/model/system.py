@@ -8,6 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+from composer.model.introspection import DEFAULT_INTROSPECTION, Introspection
 from composer.model.ports import (
     ChannelKind,
     Delivery,
@@ -115,6 +116,7 @@ class Node:
     depends_on: tuple[Dependency, ...] = ()
     autostart: Located[PrimaryState] | None = None
     supervision: Supervision = DEFAULT_SUPERVISION
+    introspection: Introspection = DEFAULT_INTROSPECTION
     unknown: tuple[UnknownKey, ...] = ()
     complete: bool = True  # False: its type is unknown or unreadable, so what it has is not known
     _ports: dict[str, Port] = field(init=False, repr=False, compare=False)

@@ -23,7 +23,7 @@ from composer.resolve.qos import QosTable
 from composer.resolve.reactions import NODE_EVENTS, Events, node_reactions
 from composer.resolve.reading import entries, key, plain_text, text
 from composer.source import Located
-from composer.tree import Entry, Mapping, Plain, plain
+from composer.tree import Entry, Mapping, Plain, Tree, plain
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +37,7 @@ class Declaration:
     timers: tuple[Timer, ...]
     state: tuple[tuple[Located[str], Plain], ...]
     reactions: Events
+    introspection: Tree | None = None
 
 
 def declare(
@@ -54,6 +55,7 @@ def declare(
         timers=timers(tree, findings),
         state=tuple((key(entry), plain(entry.value)) for entry in entries(tree.get("state"))),
         reactions=node_reactions(tree, findings),
+        introspection=tree.get("introspection"),
     )
 
 

@@ -20,6 +20,7 @@ from composer.names import expand_name, join
 from composer.resolve.connections import Joint, Joints, joint_of
 from composer.resolve.declaration import Declaration, declare, refined, refines, unknown_keys
 from composer.resolve.files import Places
+from composer.resolve.introspection import introspection
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import ParameterFiles
 from composer.resolve.parameters import with_values
@@ -42,6 +43,7 @@ class Surroundings:
     joints: Joints
     overrides: Overrides
     supervision: Supervision
+    introspection: Tree | None
     parameter_files: ParameterFiles
     findings: list[Diagnostic]
 
@@ -95,6 +97,9 @@ def node(entry: Entry, around: Surroundings) -> Node:
         depends_on=_dependencies(lifecycle.get("depends_on")),
         autostart=state(lifecycle.get("autostart")),
         supervision=supervision(lifecycle, around.supervision),
+        introspection=introspection(
+            declared.introspection, around.introspection, tree.get("introspection")
+        ),
         unknown=(*made.unknown, *unknown),
         complete=made.complete,
     )

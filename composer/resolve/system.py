@@ -18,6 +18,7 @@ from composer.resolve.chains import chains
 from composer.resolve.connections import connections
 from composer.resolve.declaration import declare
 from composer.resolve.files import Places
+from composer.resolve.introspection import introspection
 from composer.resolve.node import Surroundings, node, placed, state
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import read_parameter_files
@@ -57,7 +58,18 @@ def resolve_system(
     upkeep = supervision(lifecycle, DEFAULT_SUPERVISION)
     written = tree.get("parameter_files")
     files = read_parameter_files(written, places.home, places.catalog.project, findings)
-    around = Surroundings(places, namespace, types, qos, joints, overrides, upkeep, files, findings)
+    around = Surroundings(
+        places,
+        namespace,
+        types,
+        qos,
+        joints,
+        overrides,
+        upkeep,
+        tree.get("introspection"),
+        files,
+        findings,
+    )
     nodes = tuple(node(entry, around) for entry in entries(tree.get("nodes")))
     autostart = state(lifecycle.get("autostart"))
     delivery = choice(tree.get("delivery"), Delivery)
@@ -106,6 +118,7 @@ def resolve_node_type(
         timers=declared.timers,
         state=declared.state,
         reactions=declared.reactions,
+        introspection=introspection(declared.introspection),
         unknown=unknown,
     )
     system = System(

@@ -19,15 +19,18 @@ class NodeStatus:
     """One node. ``since_s`` is when it came into its state, in seconds since 1970.
 
     ``held_down`` is why a failed node is kept down, and empty otherwise; ``wanted`` is the state
-    that it is to be in; ``starts_active`` is whether a start of the system makes it active. Rates
-    are in hertz, over the last second, as is ``busy``: the share of a thread that its callbacks
-    took. ``slowest`` is the callback that took longest at once so far, and how long; ``overruns``
-    are calls over their ``budget_ms``, ``queue_drops`` what full queues pushed out.
+    that it is to be in; ``left_to_manager`` is what is asked of the manager and not of the node
+    (see :class:`composer.model.Introspection`); ``starts_active`` is whether a start of the system
+    makes it active. Rates are in hertz, over the last second, as is ``busy``: the share of a thread
+    that its callbacks took. ``slowest`` is the callback that took longest at once so far, and how
+    long; ``overruns`` are calls over their ``budget_ms``, ``queue_drops`` what full queues pushed
+    out.
     """
 
     node: str
     wanted: str
     starts_active: bool = True
+    left_to_manager: tuple[str, ...] = ()
     state: str = "unconfigured"
     since_s: float = 0.0
     restarts: int = 0
@@ -81,7 +84,7 @@ class Board:
         self._changed: Callable[[], None] = lambda: None
         self._counters: dict[str, tuple[float, int, int, float]] = {}
         now_s = time.time()
-        full_names = {node.name.value: node.full_name for node in system.nodes}
+        models = {node.name.value: node for node in system.nodes}
         goals = start_goals(system, PrimaryState.ACTIVE)
         self._status = SystemStatus(
             system=system.name.value,
@@ -93,9 +96,10 @@ class Board:
         )
         self._nodes = {
             name: NodeStatus(
-                full_names[name],
+                models[name].full_name,
                 PrimaryState.UNCONFIGURED.value,
                 starts_active=goals[name] is PrimaryState.ACTIVE,
+                left_to_manager=models[name].introspection.left_to_manager,
                 since_s=now_s,
             )
             for name in order

@@ -16,6 +16,7 @@ from typing import Any
 from lifecycle_msgs.msg import Transition as TransitionMessage
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 
+from composer.runtime.deputies import LIFECYCLE, Deputies
 from composer.runtime.finding import find_node, not_there
 from composer.runtime.session import Deadline, NoAnswer, RosError, Session
 
@@ -57,12 +58,31 @@ class Change:
         return f"{self.node}: {self.before} -> {self.after}"
 
 
+#: What is legal in each state, for nodes that are not asked themselves (lifecycle_msgs).
+_LEGAL = {
+    "unconfigured": (
+        Transition(TransitionMessage.TRANSITION_CONFIGURE, "configure", "configuring"),
+        Transition(TransitionMessage.TRANSITION_UNCONFIGURED_SHUTDOWN, "shutdown", "shuttingdown"),
+    ),
+    "inactive": (
+        Transition(TransitionMessage.TRANSITION_CLEANUP, "cleanup", "cleaningup"),
+        Transition(TransitionMessage.TRANSITION_ACTIVATE, "activate", "activating"),
+        Transition(TransitionMessage.TRANSITION_INACTIVE_SHUTDOWN, "shutdown", "shuttingdown"),
+    ),
+    "active": (
+        Transition(TransitionMessage.TRANSITION_DEACTIVATE, "deactivate", "deactivating"),
+        Transition(TransitionMessage.TRANSITION_ACTIVE_SHUTDOWN, "shutdown", "shuttingdown"),
+    ),
+}
+
+
 class Control:
     """Asks lifecycle nodes things, all within one time limit."""
 
     def __init__(self, session: Session, deadline: Deadline) -> None:
         self._session = session
         self._deadline = deadline
+        self._deputies = Deputies(session)
 
     def nodes(self) -> tuple[str, ...]:
         """Return the full names of all lifecycle nodes, once discovery stands still."""
@@ -92,20 +112,28 @@ class Control:
 
     def state(self, node: str) -> str:
         """Return the label of the node's state. Raises NoAnswer."""
+        if self._manager(node):
+            return self._deputies.state(node)
         response = self._call(node, GetState, "get_state", GetState.Request())
         return str(response.current_state.label)
 
     def states(self, nodes: Iterable[str]) -> dict[str, str | None]:
         """Return the label of each node's state; None for a node that did not answer in time."""
-        services = {f"{node}/get_state": node for node in nodes}
+        wanted = tuple(nodes)
+        told: dict[str, str | None] = {
+            node: self._deputies.state(node) for node in wanted if self._manager(node)
+        }
+        services = {f"{node}/get_state": node for node in wanted if node not in told}
         responses = self._session.call_each(GetState, services, GetState.Request(), self._deadline)
-        return {
+        return told | {
             node: None if response is None else str(response.current_state.label)
             for node, response in zip(services.values(), responses.values(), strict=True)
         }
 
     def transitions(self, node: str) -> tuple[Transition, ...]:
         """Return what is legal now. Raises NoAnswer."""
+        if self._manager(node):
+            return _LEGAL.get(self._deputies.state(node), ())
         request = GetAvailableTransitions.Request()
         response = self._call(node, GetAvailableTransitions, "get_available_transitions", request)
         return tuple(
@@ -125,12 +153,8 @@ class Control:
             raise TransitionRefused(
                 f"'{label}' is not possible: {node} is {before}", _possible(before, legal)
             )
-        # With the label, a state that has changed since is a refusal and not a fault in the node.
-        message = TransitionMessage(id=wanted.id, label=wanted.label)
-        request = ChangeState.Request(transition=message)
-        response = self._call(node, ChangeState, "change_state", request)
-        after = self.state(node)
-        if not response.success:
+        success, after = self._make(node, before, wanted)
+        if not success:
             raise TransitionRefused(
                 f"{node} refused '{label}': it is {after} now", "its log says why"
             )
@@ -155,16 +179,34 @@ class Control:
             state = reached
         return Change(node, before, state)
 
+    def _make(self, node: str, before: str, wanted: Transition) -> tuple[bool, str]:
+        """Have a transition made; return whether it was, and the state after it."""
+        manager = self._manager(node)
+        # With the label, a state that has changed since is a refusal and not a fault in the node.
+        label = f"{node} {wanted.label}" if manager else wanted.label
+        message = TransitionMessage(id=wanted.id, label=label)
+        request = ChangeState.Request(transition=message)
+        response = self._call(manager or node, ChangeState, "change_state", request)
+        success = bool(response.success)
+        if not manager:
+            return success, self.state(node)
+        return success, self._deputies.state_after(
+            node, before if success else None, self._deadline
+        )
+
+    def _manager(self, node: str) -> str | None:
+        """Return the manager that answers for the lifecycle of a node, if one does."""
+        return self._deputies.nodes(LIFECYCLE).get(node)
+
     def known(self) -> tuple[str, ...]:
         """Return the full names of the lifecycle nodes that are known now."""
-        services = self._session.node.get_service_names_and_types()
-        return tuple(
-            sorted(
-                name.removesuffix(_STATE_SERVICE)
-                for name, types in services
-                if name.endswith(_STATE_SERVICE) and _STATE_TYPE in types
-            )
-        )
+        self._deputies.look()
+        own = {
+            name.removesuffix(_STATE_SERVICE)
+            for name, types in self._session.node.get_service_names_and_types()
+            if name.endswith(_STATE_SERVICE) and _STATE_TYPE in types
+        }
+        return tuple(sorted(own | self._deputies.nodes(LIFECYCLE).keys()))
 
     def _call(self, node: str, service: Any, name: str, request: Any) -> Any:
         try:

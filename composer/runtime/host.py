@@ -154,6 +154,7 @@ class Host:
             self._measure,
             self._callbacks,
             lambda host, pid: self._yield_to(namespace, host, pid),
+            lambda: {node.full_name: node for node in tuple(self._crew.nodes.values())},
         )
         manager = Manager(namespace, self._board, office)
         try:

@@ -17,8 +17,10 @@ from rcl_interfaces.srv import (
 from rclpy.parameter import Parameter, parameter_value_to_python
 
 from composer.diagnostics import suggestion
+from composer.runtime.deputies import PARAMETERS, Deputies
+from composer.runtime.deputy import full_parameter_name
 from composer.runtime.inspect_names import Names
-from composer.runtime.session import Deadline, NoAnswer, RosError, Session
+from composer.runtime.session import MISSING_S, Deadline, NoAnswer, RosError, Session
 
 _NOT_SET = "not set"
 _LIST_SERVICE = "/list_parameters"
@@ -65,17 +67,23 @@ class Parameters:
         self._session = session
         self._deadline = deadline
         self.node = Names(session, deadline).find_node(node)
+        manager = _manager(session, deadline, self.node)
+        #: Whom to ask, and what its names of the node's parameters begin with.
+        self._asked, self._prefix = (
+            (manager, full_parameter_name(self.node, "")) if manager else (self.node, "")
+        )
 
     def names(self) -> tuple[str, ...]:
         """Return the names of all parameters, sorted. Raises NoAnswer."""
-        response = self._call(ListParameters, "list_parameters", ListParameters.Request())
-        return tuple(sorted(response.result.names))
+        request = ListParameters.Request(prefixes=[self.node] if self._prefix else [])
+        response = self._call(ListParameters, "list_parameters", request)
+        return tuple(sorted(name.removeprefix(self._prefix) for name in response.result.names))
 
     def values(self, names: Iterable[str]) -> dict[str, Any]:
         """Return the values of parameters; None for one without. Raises UnknownParameter."""
         wanted = list(names)
         self._check_known(wanted)
-        request = GetParameters.Request(names=wanted)
+        request = GetParameters.Request(names=self._there(wanted))
         response = self._call(GetParameters, "get_parameters", request)
         return {
             name: plain_value(value) for name, value in zip(wanted, response.values, strict=True)
@@ -85,9 +93,12 @@ class Parameters:
         """Return what the node says of parameters. Raises UnknownParameter."""
         wanted = list(names)
         self._check_known(wanted)
-        request = DescribeParameters.Request(names=wanted)
+        request = DescribeParameters.Request(names=self._there(wanted))
         response = self._call(DescribeParameters, "describe_parameters", request)
-        return tuple(map(_description, response.descriptors))
+        return tuple(
+            _description(name, found)
+            for name, found in zip(wanted, response.descriptors, strict=True)
+        )
 
     def set(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Set parameters and return what the node took.
@@ -96,8 +107,12 @@ class Parameters:
         ParameterRefused with the node's reason.
         """
         types = {item.name: item.type for item in self.describe(values)}
+        wanted = [_message(name, value, types[name]) for name, value in values.items()]
         request = SetParameters.Request(
-            parameters=[_message(name, value, types[name]) for name, value in values.items()]
+            parameters=[
+                ParameterMessage(name=f"{self._prefix}{item.name}", value=item.value)
+                for item in wanted
+            ]
         )
         response = self._call(SetParameters, "set_parameters", request)
         refused = [
@@ -107,7 +122,7 @@ class Parameters:
         ]
         if refused:
             raise ParameterRefused(f"{self.node} refused " + "; ".join(refused))
-        return {sent.name: plain_value(sent.value) for sent in request.parameters}
+        return {item.name: plain_value(item.value) for item in wanted}
 
     def load(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Set the parameters of a file; what is read-only and has its value already is left alone.
@@ -132,9 +147,13 @@ class Parameters:
                     f"{self.node} has no parameter '{name}'", suggestion(name, known)
                 )
 
+    def _there(self, names: Iterable[str]) -> list[str]:
+        """Return what parameters are called where they are asked for."""
+        return [f"{self._prefix}{name}" for name in names]
+
     def _call(self, service: Any, name: str, request: Any) -> Any:
         try:
-            return self._session.call(service, f"{self.node}/{name}", request, self._deadline)
+            return self._session.call(service, f"{self._asked}/{name}", request, self._deadline)
         except NoAnswer as error:
             raise NoAnswer(
                 f"{self.node} did not answer within {self._deadline.timeout_s:g} s",
@@ -150,11 +169,41 @@ def names_by_node(session: Session, deadline: Deadline) -> dict[str, list[str] |
         for name, _ in Names(session, deadline).services()
         if name.endswith(_LIST_SERVICE)
     }
+    deputies = Deputies(session)
+    deputies.meet(deadline)
     responses = session.call_each(ListParameters, services, ListParameters.Request(), deadline)
-    return {
+    listed = {
         node: None if responses[name] is None else sorted(responses[name].result.names)
         for name, node in services.items()
     }
+    left = deputies.nodes(PARAMETERS)
+    deputies.close()
+    told = {manager: listed.pop(manager, None) for manager in set(left.values())}
+    return listed | {node: _of_node(node, told[manager]) for node, manager in left.items()}
+
+
+def _of_node(node: str, listed: list[str] | None) -> list[str] | None:
+    """Return the parameters of a node among those that its manager lists."""
+    if listed is None:
+        return None
+    owned = full_parameter_name(node, "")
+    return [name.removeprefix(owned) for name in listed if name.startswith(owned)]
+
+
+def _manager(session: Session, deadline: Deadline, node: str) -> str | None:
+    """Return the manager that answers for a node; None where the node does itself."""
+    deputies = Deputies(session)
+
+    def asked() -> str | None:
+        names = (name for name, _ in session.node.get_service_names_and_types())
+        if f"{node}{_LIST_SERVICE}" in names:
+            return ""
+        deputies.look()
+        return deputies.nodes(PARAMETERS).get(node)
+
+    found = session.wait_for(asked, Deadline(min(MISSING_S, deadline.left_s)))
+    deputies.close()
+    return found or None
 
 
 def plain_value(value: ParameterValue) -> Any:
@@ -188,10 +237,10 @@ def _converted(value: Any, kind: str) -> Any:
             return value
 
 
-def _description(found: ParameterDescriptor) -> Description:
+def _description(name: str, found: ParameterDescriptor) -> Description:
     bounds = [*found.floating_point_range, *found.integer_range]
     return Description(
-        name=found.name,
+        name=name,
         type=_TYPES[found.type],
         description=found.description,
         constraints=found.additional_constraints,

@@ -25,7 +25,7 @@ from rclpy.type_support import check_is_valid_srv_type
 from composer.behavior import TransitionFailed
 from composer.runtime.core import Core
 from composer.runtime.log import describe, traceback_of
-from composer.runtime.loop import Reply
+from composer.runtime.loop import Reply, never_called
 from composer.runtime.tasks import Cancelled, Future, within
 
 _NAMES = {
@@ -79,7 +79,10 @@ class Lifecycle:
     the host wait for their turn.
     """
 
-    def __init__(self, core: Core, hooks: Hooks, *, timeout_s: float) -> None:
+    def __init__(
+        self, core: Core, hooks: Hooks, *, timeout_s: float, services: bool = True
+    ) -> None:
+        """Join the graph; without ``services`` with the topic ``transition_event`` alone."""
         node = core.node
         loop = core.loop
         self._node = node
@@ -92,8 +95,13 @@ class Lifecycle:
         self._under_way: Future[None] | None = None
         self._last_state = ""
         with node.handle:
-            self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, True)
-        self._services = _services(node, self._machine)
+            self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, services)
+        self._services: list[Service] = []
+        if services:
+            self._serve()
+
+    def _serve(self) -> None:
+        self._services = _services(self._node, self._machine)
         callbacks: tuple[Callable[[Any, Reply], None], ...] = (
             self._on_change_state,
             self._on_get_state,
@@ -102,7 +110,7 @@ class Lifecycle:
             partial(self._on_get_transitions, "transition_graph"),
         )
         for service, callback in zip(self._services, callbacks, strict=True):
-            loop.add_service(service, callback)
+            self._loop.add_service(service, callback)
 
     @property
     def state(self) -> str:
@@ -288,7 +296,7 @@ def _services(node: Node, machine: Any) -> list[Service]:
     """Wrap the services that rcl has made, so that the node owns and destroys them."""
     group = node.default_callback_group
     services = [
-        Service(handle, kind, handle.name, _never_called, group, QoSProfile(**handle.qos))
+        Service(handle, kind, handle.name, never_called, group, QoSProfile(**handle.qos))
         for handle, kind in (
             (machine.service_change_state, ChangeState),
             (machine.service_get_state, GetState),
@@ -302,8 +310,3 @@ def _services(node: Node, machine: Any) -> list[Service]:
         group.add_entity(service)
     node._services.extend(services)
     return services
-
-
-def _never_called(_: Any, response: Any) -> Any:
-    """Stand where rclpy wants a callback; the loop calls ours instead."""
-    return response

@@ -41,13 +41,16 @@ class Log:
     looks for its caller in the stack at every call, which takes longer than the rest.
     """
 
-    def __init__(self, node: Node, level: LogLevel, write: Write) -> None:
-        """Log what is at least ``level``. ``node`` must not have a rosout publisher of rcl's."""
+    def __init__(self, node: Node, level: LogLevel, write: Write, *, rosout: bool = True) -> None:
+        """Log what is at least ``level``. ``node`` must not have a rosout publisher of rcl's.
+
+        Without ``rosout`` to whoever shows it alone.
+        """
         self._name = node.get_fully_qualified_name().strip("/").replace("/", ".")
         self._lowest = _SEVERITIES[level]
         self._write = write
         self._clock = node.get_clock()
-        self._rosout = node.create_publisher(LogMessage, "/rosout", _ROSOUT_QOS)
+        self._rosout = node.create_publisher(LogMessage, "/rosout", _ROSOUT_QOS) if rosout else None
 
     def is_on(self, level: LogLevel) -> bool:
         """Say whether anything becomes of a message at ``level``."""
@@ -59,6 +62,8 @@ class Log:
             return
         text = str(message)
         self._write(level, self._name, text)
+        if self._rosout is None:
+            return
         with suppress(InvalidHandle):  # the last words of a node that is gone
             self._rosout.publish(
                 LogMessage(

@@ -26,6 +26,11 @@ ExceptionHandler = Callable[[str, BaseException], None]
 Reply = Callable[[Any], None]
 
 
+def never_called(_: Any, response: Any) -> Any:
+    """Stand where rclpy wants a service's callback: the loop calls another instead."""
+    return response
+
+
 class Timer(Protocol):
     """Something that will be called. Cancelling twice is harmless."""
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -24,10 +24,12 @@ from std_srvs.srv import Trigger
 from composer.names import join
 from composer.runtime.board import Board, NodeStatus, SystemStatus
 from composer.runtime.callback_messages import to_message
+from composer.runtime.deputy import Deputy
 from composer.runtime.event_loop import EventLoop
 from composer.runtime.executors import log_exception
 from composer.runtime.figures import CallbackFigures
-from composer.runtime.loop import Reply
+from composer.runtime.loop import Reply, never_called
+from composer.runtime.node import RunningNode
 
 NAME = "manager"
 COMMANDS = ("startup", "pause", "resume", "reset", "shutdown")
@@ -67,13 +69,15 @@ class Office:
     """Who is behind a manager; all of it is called on the manager's loop.
 
     ``obey`` takes commands; ``measure`` works out rates; ``callbacks`` returns what these took;
-    ``yield_to(host, pid)`` is called when a composer that runs the same system was there first.
+    ``yield_to(host, pid)`` is called when a composer that runs the same system was there first;
+    ``members`` returns the nodes, by their full names.
     """
 
     obey: Callable[[Command], None]
     measure: Callable[[], None]
     callbacks: Callable[[], tuple[CallbackFigures, ...]]
     yield_to: Callable[[str, str], None]
+    members: Callable[[], Mapping[str, RunningNode]]
 
 
 class Manager:
@@ -107,6 +111,8 @@ class Manager:
             DiagnosticArray, f"~/{STATE_TOPIC}", self._look_at_rival, STATE_QOS
         )
         self._loop.add_subscription(rivals, self._look_at_rival)
+        if any(node.left_to_manager for node in board.snapshot().nodes):
+            Deputy(self._node, self._loop, office.members, self._publish)
         self._loop.start()
         self._loop.call_every(_PERIOD_S, self._tick)
         self._loop.call_every(_LOOK_S, self._look_for_listeners)
@@ -129,7 +135,7 @@ class Manager:
         self._node.destroy_node()
 
     def _serve(self, name: str, callback: Callable[[Any, Reply], None]) -> None:
-        service = self._node.create_service(Trigger, f"~/{name}", _never_called)
+        service = self._node.create_service(Trigger, f"~/{name}", never_called)
         self._loop.add_service(service, callback)
 
     def _take(self, what: str, _: Trigger.Request, reply: Reply) -> None:
@@ -227,6 +233,7 @@ def _of_node(system: str, node: NodeStatus) -> DiagnosticStatus:
     values = {
         "state": node.state,
         "wanted": node.wanted,
+        "left_to_manager": " ".join(node.left_to_manager),
         "since": f"{node.since_s:.3f}",
         "restarts": str(node.restarts),
         "errors": str(node.errors),
@@ -252,8 +259,3 @@ def _status(
         hardware_id=system,
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )
-
-
-def _never_called(_: Any, response: Any) -> Any:
-    """Stand where rclpy wants a callback; the loop calls ours instead."""
-    return response

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node as RosNode
@@ -27,8 +27,12 @@ from composer.runtime.loop import Loop
 from composer.runtime.parameters import Parameters
 from composer.runtime.ports.port import RunningPort
 from composer.runtime.ports.timer import PeriodError, period_s
+from composer.runtime.ros_node import make_ros_node
 from composer.runtime.statistics import Statistics
 from composer.runtime.strand import Direct, Turns
+from composer.runtime.tasks import Future
+
+T = TypeVar("T")
 
 _EVENTS = {
     "configure": Event.CONFIGURE,
@@ -87,13 +91,9 @@ class RunningNode:
         self.activations = 0  # how often it became active
         self.statistics = Statistics() if statistics is None else statistics
         self._listener = listener
-        self._ros = RosNode(
-            model.name.value,
-            namespace=model.namespace.value,
-            use_global_arguments=False,
-            enable_rosout=False,  # its log has a publisher of its own
-        )
-        log = Log(self._ros, options.log_level, listener.write_log)
+        self._ros = make_ros_node(model)
+        offers = model.introspection
+        log = Log(self._ros, options.log_level, listener.write_log, rosout=offers.rosout)
         self._core = Core(
             node=self._ros,
             loop=loop,
@@ -115,7 +115,12 @@ class RunningNode:
         self._assembly = Assembly(self._core, self._standby)
         self._keeps_entities = False
         loop.add_node(self._ros)
-        self._lifecycle = Lifecycle(self._core, self, timeout_s=options.transition_timeout_s)
+        self._lifecycle = Lifecycle(
+            self._core,
+            self,
+            timeout_s=options.transition_timeout_s,
+            services=offers.lifecycle_services,
+        )
 
     @property
     def full_name(self) -> str:
@@ -150,6 +155,14 @@ class RunningNode:
     async def change(self, transition: str) -> Result:
         """Make a transition when no other one is under way. Raises nothing."""
         return await self._lifecycle.change(transition)
+
+    def ask(self, question: Callable[[RosNode], T]) -> Future[T]:
+        """Return the answer to a question about the ROS node, which is put on its loop."""
+
+        async def answer() -> T:
+            return question(self._ros)
+
+        return self.loop.run_task(answer())
 
     def keep_entities(self) -> None:
         """Keep ports when they are to be given back: the process ends, and they go with it."""

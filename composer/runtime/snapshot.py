@@ -17,6 +17,8 @@ from rclpy.node import Node
 from composer.drift import EndSeen, NodeSeen, Snapshot
 from composer.model import PortKind
 from composer.runtime.asking import Asker
+from composer.runtime.deputies import LIFECYCLE, PARAMETERS, Deputies
+from composer.runtime.deputy import full_parameter_name
 from composer.runtime.inspect_names import is_hidden
 from composer.runtime.inspect_parameters import plain_value
 from composer.runtime.inspect_topics import topic_info
@@ -42,6 +44,7 @@ class Observer:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._asker = Asker(session)
+        self._deputies = Deputies(session)
         self._met_all = Deadline(_MET_ALL_AFTER_S)
 
     def __enter__(self) -> Self:
@@ -49,6 +52,7 @@ class Observer:
 
     def __exit__(self, *_: object) -> None:
         self._asker.close()
+        self._deputies.close()
 
     def look(self, deadline: Deadline) -> Snapshot:
         """Return what is there, once discovery stands still or the deadline is there.
@@ -64,7 +68,8 @@ class Observer:
             for node, found in ends.items()
             if not is_hidden(node)
         }
-        states = self._states(services, deadline)
+        self._deputies.meet(self._patience(deadline))
+        states = self._states(services, deadline) | self._told_states()
         parameters = self._parameters(services, deadline)
         return Snapshot(
             tuple(
@@ -103,6 +108,10 @@ class Observer:
             for name, node in asked.items()
         }
 
+    def _told_states(self) -> dict[str, str | None]:
+        """Return the states of nodes without services of their own, as managers tell them."""
+        return {node: self._deputies.state(node) for node in self._deputies.nodes(LIFECYCLE)}
+
     def _parameters(
         self, services: dict[str, dict[str, str]], deadline: Deadline
     ) -> dict[str, dict[str, Plain] | None]:
@@ -130,6 +139,21 @@ class Observer:
             answer = values[f"{node}/get_parameters"]
             if answer is not None and len(answer.values) == len(wanted):
                 found[node] = dict(zip(wanted, map(plain_value, answer.values), strict=True))
+        return self._handed_out(found)
+
+    def _handed_out(
+        self, found: dict[str, dict[str, Plain] | None]
+    ) -> dict[str, dict[str, Plain] | None]:
+        """Return the parameters with those that managers answer for at their nodes."""
+        left = self._deputies.nodes(PARAMETERS)
+        managers = {manager: found.pop(manager, None) for manager in set(left.values())}
+        for node, manager in left.items():
+            told, owned = managers[manager], full_parameter_name(node, "")
+            found[node] = told and {
+                name.removeprefix(owned): value
+                for name, value in told.items()
+                if name.startswith(owned)
+            }
         return found
 
     def _patience(self, deadline: Deadline) -> Deadline:
