@@ -8,7 +8,7 @@ from functools import partial
 
 from composer.behavior import CallCancelled
 from composer.model import Executor, ExecutorKind, LogLevel, Node, PrimaryState, System
-from composer.runtime.delivery.choice import shared_topics
+from composer.runtime.delivery.choice import shared_channels
 from composer.runtime.delivery.delivery import Delivery
 from composer.runtime.executors import log_exception, make_loop
 from composer.runtime.log import describe
@@ -67,7 +67,7 @@ class Crew:
 
         A node that cannot be created leaves those before it to be closed.
         """
-        self._delivery = Delivery(shared_topics(self._system))
+        self._delivery = Delivery(shared_channels(self._system))
         for node in self._system.nodes:
             try:
                 self.nodes[node.name.value] = self._make(node)

@@ -1,11 +1,12 @@
-"""Which topics are delivered in the process: decided once, from the model alone."""
+"""Which topics and services stay in the process: decided once, from the model alone."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import TypeAlias
 
-from composer.model import Channel, ChannelKind, Delivery, System, channels
-from composer.qos import Liveliness, QosProfile
+from composer.model import Channel, ChannelKind, Delivery, Port, System, channels
+from composer.qos import Liveliness, QosProfile, incompatibilities
 from composer.runtime.manager import NAME, STATE_TOPIC
 
 #: What the runtime and rclpy publish themselves, not through ports.
@@ -13,22 +14,50 @@ _NOT_BY_PORTS = frozenset({"/rosout", "/parameter_events", "/diagnostics"})
 _ENDINGS_NOT_BY_PORTS = ("/transition_event", f"/{NAME}/{STATE_TOPIC}")
 
 
-def shared_topics(system: System) -> Mapping[str, str | None]:
-    """Return the topics with ports at both ends, and why each goes by DDS alone, if it does.
+#: What ports meet on.
+ChannelKey: TypeAlias = tuple[ChannelKind, str]
+
+
+def channel_of(port: Port) -> ChannelKey:
+    """Return what the port meets others on."""
+    return port.kind.channel, port.full_name
+
+
+def shared_channels(system: System) -> Mapping[ChannelKey, str | None]:
+    """Return the topics and services with ports at both ends, and why DDS has to do, if so.
 
     A subscription ignores all of its process's DDS publications or none, so what one port of a
     topic cannot do, the topic does not do.
     """
     return {
-        channel.name: _objection(channel, system.delivery)
+        (channel.kind, channel.name): _objection(channel, system.delivery)
         for channel in channels(system.nodes)
-        if channel.kind is ChannelKind.TOPIC and channel.sources and channel.sinks
+        if channel.kind is not ChannelKind.ACTION and channel.sources and channel.sinks
     }
 
 
 def _objection(channel: Channel, unless_said: Delivery) -> str | None:
     if any((end.port.delivery or unless_said) is Delivery.DDS for end in channel.ends):
         return "'delivery: dds' says so"
+    if channel.kind is ChannelKind.SERVICE:
+        return _objection_to_service(channel)
+    return _objection_to_topic(channel)
+
+
+def _objection_to_service(channel: Channel) -> str | None:
+    if len(channel.sources) > 1:
+        return "it has several servers"
+    server = channel.sources[0].port
+    for client in (sink.port for sink in channel.sinks):
+        if client.interface.value != server.interface.value:
+            return "its ends have different types"
+        ends = client.qos.profile, server.qos.profile
+        if incompatibilities(*ends) or incompatibilities(*reversed(ends)):
+            return "the QoS of its ends keeps them apart"
+    return None
+
+
+def _objection_to_topic(channel: Channel) -> str | None:
     if channel.name in _NOT_BY_PORTS or channel.name.endswith(_ENDINGS_NOT_BY_PORTS):
         return "not only ports publish it"
     if _is_timed(end.port.qos.profile for end in channel.ends):

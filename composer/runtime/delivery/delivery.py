@@ -8,44 +8,49 @@ from typing import Any
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
-from composer.model import Port
+from composer.model import ChannelKind, Port
+from composer.runtime.delivery.choice import ChannelKey, channel_of
 from composer.runtime.delivery.own_publications import ignore_own_publications, why_not_ignored
 from composer.runtime.delivery.queue import Queue
+from composer.runtime.delivery.server import Server
 from composer.runtime.delivery.topic import Inlet, Outlet, Topic
 
 Leave = Callable[[], None]
 
 
 class Delivery:
-    """The topics of one system that are delivered in the process.
+    """The topics and services of one system that stay in the process.
 
     Ports join with their DDS endpoint, which they have all the same, and leave before they destroy
     it: own endpoints that have matched are known at any time, so the others are outsiders.
     """
 
-    def __init__(self, shared: Mapping[str, str | None]) -> None:
-        """``shared`` tells the topics with ports at both ends, and why not, where DDS has to do.
+    def __init__(self, shared: Mapping[ChannelKey, str | None]) -> None:
+        """``shared`` tells what has ports at both ends, and why DDS has to do, where it has to.
 
         rclpy must be initialized.
         """
-        self._objections = shared
-        if None in shared.values():
+        self._objections = dict(shared)
+        self._topics: dict[ChannelKey, Topic] = {}
+        self._servers: dict[ChannelKey, Server] = {}
+        for key in [key for key, objection in shared.items() if objection is None]:
+            if key[0] is not ChannelKind.TOPIC:
+                continue
             reason = why_not_ignored()
-            if reason is not None:
-                self._objections = dict.fromkeys(shared, reason)
-        self._topics = {
-            name: Topic() for name, objection in self._objections.items() if objection is None
-        }
+            if reason is None:
+                self._topics[key] = Topic()
+            else:
+                self._objections[key] = reason
 
     def objection(self, port: Port) -> str | None:
-        """Return why DDS has to deliver what others in the process publish or hear, or None."""
-        return self._objections.get(port.full_name)
+        """Return why DDS has to do although the other end is in the process, or None."""
+        return self._objections.get(channel_of(port))
 
     def add_publisher(
         self, port: Port, publisher: Publisher
     ) -> tuple[Callable[[Any], None], Leave]:
         """Return what sends a message of the port, and what ends that."""
-        topic = self._topics.get(port.full_name)
+        topic = self._topics.get(channel_of(port))
         if topic is None:
             return publisher.publish, _nothing
         outlet = Outlet(publisher, port)
@@ -54,13 +59,29 @@ class Delivery:
 
     def add_subscription(self, port: Port, subscription: Subscription, queue: Queue) -> Leave:
         """Put into ``queue`` what is published in the process; return what ends that."""
-        topic = self._topics.get(port.full_name)
+        topic = self._topics.get(channel_of(port))
         if topic is None:
             return _nothing
         ignore_own_publications(subscription)
         inlet = Inlet(subscription.msg_type, port, queue)
         topic.add_inlet(inlet)
         return lambda: topic.remove_inlet(inlet)
+
+    def add_server(self, port: Port, server: Server) -> Leave:
+        """Let clients of the process find ``server``; return what ends that."""
+        key = channel_of(port)
+        if key not in self._objections or self._objections[key] is not None:
+            return _nothing
+        self._servers[key] = server
+        return lambda: self._forget(key, server)
+
+    def server(self, port: Port) -> Server | None:
+        """Return the server in the process that the client port reaches now, if there is one."""
+        return self._servers.get(channel_of(port))
+
+    def _forget(self, key: ChannelKey, server: Server) -> None:
+        if self._servers.get(key) is server:
+            del self._servers[key]
 
 
 def _nothing() -> None:

@@ -23,6 +23,7 @@ class ClientPort:
 
     def __init__(self, core: Core, port: Port) -> None:
         self._core = core
+        self._port = port
         self._name = port.name.value
         self._timeout_ms = DEFAULT_TIMEOUT_MS if port.timeout_ms is None else port.timeout_ms.value
         self._what = f"service '{port.full_name}'"
@@ -78,15 +79,24 @@ class ClientPort:
     async def _call(self, request: Any, timeout_ms: float) -> Any:
         try:
             waiting = Waiting(self._core, self._what, timeout_ms)
-            await waiting.until_there(self._client.service_is_ready)
+            await waiting.until_there(self._has_server)
             self._core.statistics.calls += 1
-            answer = wrap_rclpy_future(self._client.call_async(request))
-            response = await waiting.until_done(answer)
+            response = await waiting.until_done(self._ask(request))
         except CallError as error:
             self._react(Event.FAILURE, failure=str(error))
             raise
         self._react(Event.RESPONSE, response=response, request=request)
         return response
+
+    def _has_server(self) -> bool:
+        there = self._core.delivery.server(self._port) is not None
+        return there or self._client.service_is_ready()
+
+    def _ask(self, request: Any) -> Future[Any]:
+        server = self._core.delivery.server(self._port)
+        if server is not None:
+            return server.ask(request)
+        return wrap_rclpy_future(self._client.call_async(request))
 
     async def _send(self, request: Any) -> None:
         try:

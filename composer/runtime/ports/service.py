@@ -7,6 +7,7 @@ from typing import Any
 
 from composer.model import Port
 from composer.runtime.core import Core
+from composer.runtime.delivery.server import Server
 from composer.runtime.line import Line
 from composer.runtime.log import describe
 from composer.runtime.loop import Reply
@@ -73,6 +74,8 @@ class ServicePort:
             callback_group=callback_group(core, port),
         )
         core.loop.add_service(self._service, self.receive)
+        server = Server(port, self._type, core.loop.call_soon, self.receive)
+        self._leave = core.delivery.add_server(port, server)
 
     def receive(self, content: Any, reply: Reply) -> None:
         """Take a request that has come."""
@@ -93,6 +96,7 @@ class ServicePort:
 
     def destroy(self) -> None:
         """Answer what is still open and leave."""
+        self._leave()
         for request in tuple(self._open):
             self._refuse(request)
         self._core.loop.remove(self._service)

@@ -1,0 +1,127 @@
+"""Services between co-located nodes: answered without DDS, with the same outcomes as by DDS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from std_srvs.srv import SetBool
+
+from tests.ros.system_bench import Peer, RunningSystem, running, wait_until
+
+TEXT = """
+system: asking
+delivery: DELIVERY
+executors: {own: {kind: KIND}}
+nodes:
+  server:
+    behavior: asking:Server
+    executor: own
+    services: {ask: {type: std_srvs/srv/SetBool}}
+  client:
+    behavior: asking:Client
+    clients: {ask: {type: std_srvs/srv/SetBool, timeout_ms: 300}}
+"""
+MODULE = """
+from composer.behavior import Behavior, BehaviorError
+from std_srvs.srv import SetBool
+
+class Server(Behavior):
+    def on_configure(self):
+        self.asked = []
+
+    async def on_ask(self, request, response):
+        self.asked.append(request)
+        if not request.data:
+            await self.clock.sleep(60.0)
+        response.success = True
+        response.message = f"request {len(self.asked)}"
+        return response
+
+class Client(Behavior):
+    def on_configure(self):
+        self.requests = []
+        self.outcomes = []
+
+    async def ask(self, data):
+        self.requests.append(SetBool.Request(data=data))
+        try:
+            response = await self.clients.ask.call(self.requests[-1])
+        except BehaviorError as error:
+            self.outcomes.append(type(error).__name__)
+        else:
+            self.outcomes.append((response.success, response.message))
+"""
+REFUSED = (False, "/server is inactive, not active")
+
+
+def change(system: RunningSystem, node: str, transition: str, state: str) -> None:
+    running_node = system.host._crew.nodes[node]
+    running_node.loop.run_task(running_node.change(transition))
+    wait_until(lambda: running_node.state == state, f"{node} {state}")
+
+
+def ask(system: RunningSystem, data: bool = True) -> None:
+    client = system.host._crew.nodes["client"]
+    client._core.spawn(client._behavior.ask(data))
+
+
+def outcomes(system: RunningSystem, count: int) -> list[Any]:
+    """Wait for so many outcomes and return them."""
+    known: list[Any] = system.host._crew.nodes["client"]._behavior.outcomes
+    wait_until(lambda: len(known) == count, f"{count} outcomes")
+    return known
+
+
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
+@pytest.mark.parametrize("delivery", ["auto", "dds"])
+def test_every_outcome_of_a_call_is_the_same_either_way(
+    tmp_path: Path, kind: str, delivery: str
+) -> None:
+    text = TEXT.replace("KIND", kind).replace("DELIVERY", delivery)
+    with running(text, tmp_path, asking=MODULE) as system:
+        client, server = (system.host._crew.nodes[name]._behavior for name in ("client", "server"))
+        ask(system)
+        assert outcomes(system, 1)[-1] == (True, "request 1")
+        assert (server.asked[0] is client.requests[0]) is (delivery == "auto")
+
+        ask(system, data=False)
+        assert outcomes(system, 2)[-1] == "CallTimeout"
+
+        change(system, "server", "deactivate", "inactive")
+        ask(system)
+        assert outcomes(system, 3)[-1] == REFUSED
+        change(system, "server", "cleanup", "unconfigured")
+        ask(system)
+        assert outcomes(system, 4)[-1] == "ServerUnavailable"
+
+        change(system, "server", "configure", "inactive")
+        change(system, "server", "activate", "active")
+        ask(system, data=False)
+        server = system.host._crew.nodes["server"]._behavior
+        wait_until(lambda: server.asked)
+        change(system, "client", "deactivate", "inactive")
+        assert outcomes(system, 5)[-1] == "CallCancelled"
+    counted = {entry.node: entry.calls for entry in system.end().nodes}
+    assert counted == {"/client": 4, "/server": 3}
+
+
+def test_a_server_that_ends_with_a_request_open_says_so_and_outsiders_are_served(
+    tmp_path: Path,
+) -> None:
+    text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto")
+    with running(text.replace("300", "20000"), tmp_path, asking=MODULE) as system:
+        peer = Peer()
+        try:
+            answer = peer.call(SetBool, "/ask", SetBool.Request(data=True))
+        finally:
+            peer.close()
+        assert (answer.success, answer.message) == (True, "request 1")
+        ask(system, data=False)
+        server = system.host._crew.nodes["server"]._behavior
+        wait_until(lambda: len(server.asked) == 2)
+        change(system, "server", "deactivate", "inactive")
+        (success, message), *_ = outcomes(system, 1)
+    assert not success
+    assert "not active" in message
