@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
+from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
@@ -90,6 +91,13 @@ def run(
             help="Take the times of callbacks, for 'compose top'. Off only to measure its cost.",
         ),
     ] = True,
+    check_mutation: Annotated[
+        bool,
+        typer.Option(
+            "--check-mutation",
+            help="Name callbacks that change what was published or received. Slow.",
+        ),
+    ] = False,
     wait: Annotated[
         bool,
         typer.Option("--wait", help="Run in the background, and return once the system is up."),
@@ -131,10 +139,13 @@ def run(
 
         given = _arguments(system, settings or [], namespace, autostart, log_level)
         given += [] if tracing else ["--no-tracing"]
+        given += ["--check-mutation"] if check_mutation else []
         limits = _numbers({"--for": run_for, "--timeout": timeout, "--grace": grace})
         write(run_in_background(declared.name.value, [*given, *limits]))
         return
-    outcome = _run(declared, plan, _options(run_for, timeout, grace, log_level, tracing))
+    options = _options(run_for, timeout, grace, log_level)
+    options = replace(options, tracing=tracing, check_mutation=check_mutation)
+    outcome = _run(declared, plan, options)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
 
@@ -194,7 +205,7 @@ def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
 
 
 def _options(
-    run_for: float | None, timeout: float | None, grace: float, level: Level, tracing: bool
+    run_for: float | None, timeout: float | None, grace: float, level: Level
 ) -> HostOptions:
     from composer.model import LogLevel
     from composer.runtime.host import HostOptions
@@ -205,7 +216,6 @@ def _options(
         grace_s=grace,
         log_level=LogLevel(level.value),
         hard_exit=lambda: _end_hard(FINDINGS),
-        tracing=tracing,
         ends_process=True,
     )
 

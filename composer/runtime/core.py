@@ -14,6 +14,7 @@ from composer.runtime.delivery.delivery import Delivery
 from composer.runtime.gate import Gate
 from composer.runtime.log import Faults, Log
 from composer.runtime.loop import Loop
+from composer.runtime.mutation import MutationCheck
 from composer.runtime.statistics import Statistics
 from composer.runtime.strand import Strand
 from composer.runtime.tasks import Cancelled, Future
@@ -27,9 +28,9 @@ _NANOSECONDS = 1e-9
 class Core:
     """One node's ROS handle, loop, gate, log and counters.
 
-    ``delivery`` is where its ports meet those of other nodes of the process. ``names`` is what
-    every expression of the node may use: ``parameters``, ``state``, ``node``. ``group`` is the
-    callback group of its ports.
+    ``delivery`` is where its ports meet those of other nodes of the process. ``mutations`` is there
+    when changes of messages are looked for. ``names`` is what every expression of the node may
+    use: ``parameters``, ``state``, ``node``. ``group`` is the callback group of its ports.
     """
 
     node: Node
@@ -41,6 +42,7 @@ class Core:
     statistics: Statistics
     names: dict[str, Any]
     delivery: Delivery
+    mutations: MutationCheck | None = None
     tasks: set[Future[Any]] = field(default_factory=set)
     group: CallbackGroup = field(default_factory=MutuallyExclusiveCallbackGroup)
 

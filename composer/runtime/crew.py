@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 
 from composer.behavior import CallCancelled
@@ -13,6 +14,7 @@ from composer.runtime.delivery.delivery import Delivery
 from composer.runtime.executors import log_exception, make_loop
 from composer.runtime.log import describe
 from composer.runtime.loop import Loop
+from composer.runtime.mutation import SeenMessages
 from composer.runtime.node import Listener, NodeOptions, RunningNode
 from composer.runtime.parameters import ParameterError
 from composer.runtime.statistics import Statistics
@@ -32,6 +34,20 @@ class CreationFailed(Exception):
         self.node = node
 
 
+@dataclass(frozen=True, slots=True)
+class CrewOptions:
+    """How all nodes are run.
+
+    ``transition_timeout_s`` goes before what the system says; ``tracing`` is whether the times of
+    callbacks are taken; ``check_mutation`` whether it is looked for who changes messages.
+    """
+
+    log_level: LogLevel
+    transition_timeout_s: float | None
+    tracing: bool
+    check_mutation: bool
+
+
 class Crew:
     """Every node of one system, by its key, and every loop, by the name of its executor."""
 
@@ -39,21 +55,13 @@ class Crew:
         self,
         system: System,
         listen: Callable[[str], Listener],
-        *,
-        log_level: LogLevel = LogLevel.INFO,
-        transition_timeout_s: float | None = None,
-        tracing: bool = True,
+        options: CrewOptions,
     ) -> None:
-        """``listen(key)`` is who is told what a node does.
-
-        ``transition_timeout_s`` goes before what the system says; ``tracing`` is whether the times
-        of callbacks are taken.
-        """
+        """``listen(key)`` is who is told what a node does."""
         self._system = system
         self._listen = listen
-        self._log_level = log_level
-        self._transition_timeout_s = transition_timeout_s
-        self._tracing = tracing
+        self._options = options
+        self._seen_messages = SeenMessages() if options.check_mutation else None
         self._executors = {executor.name.value: executor for executor in system.executors}
         self._delivery = Delivery({})
         self.nodes: dict[str, RunningNode] = {}
@@ -155,18 +163,21 @@ class Crew:
             self.loops[name] = make_loop(executor, _take_exception)
         options = NodeOptions(
             delivery=self._delivery,
+            seen_messages=self._seen_messages,
             parallel=executor.kind is ExecutorKind.MULTI_THREADED,
-            log_level=self._log_level,
+            log_level=self._options.log_level,
             transition_timeout_s=self._timeout_s(node),
         )
-        statistics = Statistics(tracing=self._tracing) if before is None else before.statistics
+        statistics = (
+            Statistics(tracing=self._options.tracing) if before is None else before.statistics
+        )
         return RunningNode(
             node, self.loops[name], options, self._listen(node.name.value), statistics
         )
 
     def _timeout_s(self, node: Node) -> float:
-        limit_s = node.supervision.timeout_ms / 1000.0
-        return limit_s if self._transition_timeout_s is None else self._transition_timeout_s
+        before_all = self._options.transition_timeout_s
+        return node.supervision.timeout_ms / 1000.0 if before_all is None else before_all
 
     def _executor_of(self, node: Node) -> Executor:
         """Return the executor the node runs on; without one it is ``default``, an event loop."""

@@ -38,7 +38,7 @@ from composer.runtime import events
 from composer.runtime.board import Board
 from composer.runtime.claim import claimed, refusal
 from composer.runtime.commands import Commands
-from composer.runtime.crew import FINALIZED, CreationFailed, Crew
+from composer.runtime.crew import FINALIZED, CreationFailed, Crew, CrewOptions
 from composer.runtime.departure import can_leave_at_once, leave_at_once
 from composer.runtime.environment import prepare_environment
 from composer.runtime.events import NodeSummary, Outcome, Report
@@ -73,7 +73,8 @@ _FEW_NODES = 20
 class HostOptions:
     """How a system is run.
 
-    ``tracing`` is whether the times of callbacks are taken, also of those without a ``budget_ms``.
+    ``tracing`` is whether the times of callbacks are taken, also of those without a ``budget_ms``;
+    ``check_mutation`` whether messages are looked at after each callback, for who changes them.
     ``run_for_s`` ends it by itself; ``bring_up_within_s`` is the time for the whole bring-up;
     ``transition_timeout_s`` goes before what the system says; ``stop_within_s`` is the time for the
     whole tear-down. If the process still stands ``grace_s`` after the request to stop,
@@ -89,6 +90,7 @@ class HostOptions:
     grace_s: float = 10.0
     hard_exit: Callable[[], None] | None = None
     tracing: bool = True
+    check_mutation: bool = False
     ends_process: bool = False
 
 
@@ -114,9 +116,12 @@ class Host:
         self._crew = Crew(
             system,
             self._listener,
-            log_level=self._options.log_level,
-            transition_timeout_s=self._options.transition_timeout_s,
-            tracing=self._options.tracing,
+            CrewOptions(
+                log_level=self._options.log_level,
+                transition_timeout_s=self._options.transition_timeout_s,
+                tracing=self._options.tracing,
+                check_mutation=self._options.check_mutation,
+            ),
         )
         self._supervisor = Supervisor(system, self._crew, self._inbox, self._board, self._reporter)
         self._commands = Commands(system, self._crew, self._supervisor, self._board)

@@ -24,6 +24,7 @@ from composer.runtime.gate import Gate
 from composer.runtime.lifecycle import Lifecycle, Result
 from composer.runtime.log import Faults, Log, Write, describe
 from composer.runtime.loop import Loop
+from composer.runtime.mutation import MutationCheck, SeenMessages
 from composer.runtime.parameters import Parameters
 from composer.runtime.ports.port import RunningPort
 from composer.runtime.ports.timer import PeriodError, period_s
@@ -50,11 +51,13 @@ class WrongReturn(Exception):
 class NodeOptions:
     """How a node is run.
 
-    ``delivery`` is where its ports meet those of the nodes beside it; ``parallel`` is true when its
-    loop has several threads.
+    ``delivery`` is where its ports meet those of the nodes beside it; ``seen_messages`` what all of
+    them remember when changes of messages are looked for; ``parallel`` is true when its loop has
+    several threads.
     """
 
     delivery: Delivery
+    seen_messages: SeenMessages | None = None
     parallel: bool = False
     log_level: LogLevel = LogLevel.INFO
     transition_timeout_s: float = 10.0
@@ -94,16 +97,18 @@ class RunningNode:
         self._ros = make_ros_node(model)
         offers = model.introspection
         log = Log(self._ros, options.log_level, listener.write_log, rosout=offers.rosout)
+        faults = Faults(log, self.statistics, listener.on_fault)
         self._core = Core(
             node=self._ros,
             loop=loop,
             gate=Gate(model.full_name),
             strand=Turns(loop.call_soon) if options.parallel else Direct(),
             log=log,
-            faults=Faults(log, self.statistics, listener.on_fault),
+            faults=faults,
             statistics=self.statistics,
             names={"parameters": {}, "state": {}, "node": model.full_name},
             delivery=options.delivery,
+            mutations=_mutation_check(options.seen_messages, faults),
         )
         parameters = Parameters(
             self._ros, model.parameters, objection=self._objection, changed=self._changed
@@ -260,6 +265,8 @@ class RunningNode:
         result = handler(*arguments)
         if isinstance(result, Awaitable):
             result = await result
+        if self._core.mutations is not None:
+            self._core.mutations.look(name)
         if result is None or result is True:
             return
         if result is False:
@@ -313,3 +320,7 @@ def _rest(gate: Gate, state: str, is_open: bool, ports: Iterable[RunningPort]) -
     for port in ports:
         port.deactivate()
     gate.close()
+
+
+def _mutation_check(seen: SeenMessages | None, faults: Faults) -> MutationCheck | None:
+    return None if seen is None else MutationCheck(seen, faults.note)

@@ -31,12 +31,15 @@ class CallbackTimer:
         self, core: Core, statistics: CallbackStatistics, budget_ms: Located[float] | None
     ) -> None:
         self._statistics = statistics
+        self._mutations = core.mutations
         self._is_on = core.statistics.tracing or budget_ms is not None
         self._budget_s = inf if budget_ms is None else budget_ms.value / 1e3
         self._budget = Budget(core.log, statistics, self._budget_s)
 
     def around(self, work: Work[T]) -> Work[T]:
         """Return ``work``, timed. It must not raise."""
+        if self._mutations is not None:
+            work = self._mutations.around(str(self._statistics), work)
         if not self._is_on:
             return work
         times, buckets = self._statistics.times, self._statistics.times.buckets
@@ -61,6 +64,8 @@ class CallbackTimer:
 
     def steps(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
         """Return ``coroutine``, the steps of which are timed and count as one call."""
+        if self._mutations is not None:
+            coroutine = self._mutations.steps(str(self._statistics), coroutine)
         return self._to_its_end(coroutine, 0.0) if self._is_on else coroutine
 
     async def _to_its_end(self, coroutine: Coroutine[Any, Any, T], took_s: float) -> T:

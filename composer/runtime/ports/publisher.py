@@ -17,6 +17,7 @@ class PublisherPort:
         self._core = core
         self._gate = core.gate
         self._statistics = core.statistics
+        self._mutations = core.mutations
         self._name = port.name.value
         self.message_type: Any = interface_class(port.interface.value)
         self._publisher = core.node.create_publisher(
@@ -38,6 +39,8 @@ class PublisherPort:
             self._drop()
             return
         self._send(message)
+        if self._mutations is not None:
+            self._mutations.remember(message, f"published by '{self._name}'")
         self.sent += 1
         self._statistics.sent += 1
 

@@ -97,6 +97,8 @@ class SubscriptionPort:
         self._traced.dropped += 1
 
     def _work(self, message: Any) -> Coroutine[Any, Any, None] | None:
+        if self._core.mutations is not None:
+            self._core.mutations.remember(message, f"received by '{self._name}'")
         if self._reaction is not None:
             try:
                 self._reaction.run(message=message)
