@@ -18,7 +18,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
 from composer.names import join
@@ -29,16 +28,17 @@ from composer.runtime.event_loop import EventLoop
 from composer.runtime.executors import log_exception
 from composer.runtime.figures import CallbackFigures
 from composer.runtime.loop import Reply, never_called
+from composer.runtime.manager_topics import (
+    CALLBACKS_QOS,
+    CALLBACKS_TOPIC,
+    NAME,
+    STATE_QOS,
+    STATE_TOPIC,
+)
 from composer.runtime.node import RunningNode
 
-NAME = "manager"
 COMMANDS = ("startup", "pause", "resume", "reset", "shutdown")
 IS_ACTIVE = "is_active"
-STATE_TOPIC = "state"
-#: Transient local: who comes late gets the last one at once.
-STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-CALLBACKS_TOPIC = "callbacks"
-CALLBACKS_QOS = QoSProfile(depth=1)
 _DIAGNOSTICS = "/diagnostics"
 _PERIOD_S = 1.0
 #: How often it is seen whether somebody listens, who is then told at once.

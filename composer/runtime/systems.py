@@ -14,10 +14,10 @@ from composer.runtime.callback_messages import from_message
 from composer.runtime.claim import claims
 from composer.runtime.figures import CallbackFigures
 from composer.runtime.finding import NotThere, not_there
-from composer.runtime.manager import (
+from composer.runtime.manager import IS_ACTIVE
+from composer.runtime.manager_topics import (
     CALLBACKS_QOS,
     CALLBACKS_TOPIC,
-    IS_ACTIVE,
     NAME,
     STATE_QOS,
     STATE_TOPIC,

@@ -13,7 +13,7 @@ from std_srvs.srv import Trigger
 from composer.model import PrimaryState
 from composer.runtime.events import RolledBack, RollingBack, StateChanged
 from composer.runtime.host import Host, HostOptions
-from composer.runtime.manager import STATE_QOS
+from composer.runtime.manager_topics import STATE_QOS
 from composer.runtime.start_refused import StartRefused
 from tests.ros.system_bench import Peer, RunningSystem, running, system_of, wait_until
 
