@@ -200,7 +200,7 @@ class Control:
 
     def known(self) -> tuple[str, ...]:
         """Return the full names of the lifecycle nodes that are known now."""
-        self._deputies.look()
+        self._deputies.meet(self._deadline)
         own = {
             name.removesuffix(_STATE_SERVICE)
             for name, types in self._session.node.get_service_names_and_types()

@@ -36,19 +36,18 @@ class Deputies:
         self._times: dict[str, int] = {}
         self._subscriptions: dict[str, Subscription] = {}
 
-    def look(self) -> None:
-        """Listen to every such manager that is known by now."""
-        for name, types in self._session.node.get_service_names_and_types():
-            if name.endswith(_SERVICE) and _SERVICE_TYPE in types:
-                self._listen(name.removesuffix(f"/{CHANGE_STATE}"))
-
     def meet(self, deadline: Deadline) -> None:
-        """Wait until every such manager that is known has said something."""
-        self.look()
+        """Listen to every such manager that is known by now, until each has said something."""
+        known = {
+            name.removesuffix(f"/{CHANGE_STATE}")
+            for name, types in self._session.node.get_service_names_and_types()
+            if name.endswith(_SERVICE) and _SERVICE_TYPE in types
+        }
+        new = known - self._subscriptions.keys()  # nobody is waited for twice
+        for manager in new:
+            self._listen(manager)
         patience = Deadline(min(_TOLD_WITHIN_S, deadline.left_s))
-        self._session.wait_for(
-            lambda: self._subscriptions.keys() == self._told.keys() or None, patience
-        )
+        self._session.wait_for(lambda: new <= self._told.keys() or None, patience)
 
     def close(self) -> None:
         """Listen no more."""
@@ -83,13 +82,9 @@ class Deputies:
         return self.state(node)
 
     def _listen(self, manager: str) -> None:
-        if manager not in self._subscriptions:
-            self._subscriptions[manager] = self._session.node.create_subscription(
-                DiagnosticArray,
-                f"{manager}/{STATE_TOPIC}",
-                partial(self._take, manager),
-                STATE_QOS,
-            )
+        self._subscriptions[manager] = self._session.node.create_subscription(
+            DiagnosticArray, f"{manager}/{STATE_TOPIC}", partial(self._take, manager), STATE_QOS
+        )
 
     def _take(self, manager: str, message: DiagnosticArray) -> None:
         self._times[manager] = self._times.get(manager, 0) + 1

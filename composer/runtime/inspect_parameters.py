@@ -20,7 +20,7 @@ from composer.diagnostics import suggestion
 from composer.runtime.deputies import PARAMETERS, Deputies
 from composer.runtime.deputy import full_parameter_name
 from composer.runtime.inspect_names import Names
-from composer.runtime.session import MISSING_S, Deadline, NoAnswer, RosError, Session
+from composer.runtime.session import Deadline, NoAnswer, RosError, Session
 
 _NOT_SET = "not set"
 _LIST_SERVICE = "/list_parameters"
@@ -198,10 +198,10 @@ def _manager(session: Session, deadline: Deadline, node: str) -> str | None:
         names = (name for name, _ in session.node.get_service_names_and_types())
         if f"{node}{_LIST_SERVICE}" in names:
             return ""
-        deputies.look()
+        deputies.meet(deadline)
         return deputies.nodes(PARAMETERS).get(node)
 
-    found = session.wait_for(asked, Deadline(min(MISSING_S, deadline.left_s)))
+    found = session.search(asked, deadline)
     deputies.close()
     return found or None
 
