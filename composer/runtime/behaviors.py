@@ -108,6 +108,14 @@ class Named:
         return sorted(self._entries)
 
 
+class NamedPorts(Named):
+    """Ports by name: there are never others, so that each is a plain attribute, found at once."""
+
+    def __init__(self, kind: str, entries: Mapping[str, Any]) -> None:
+        super().__init__(kind, entries)
+        vars(self).update(entries)
+
+
 class NodeClock:
     """A behaviour's ``clock``; see :class:`composer.behavior.Clock`."""
 

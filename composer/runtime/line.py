@@ -8,6 +8,7 @@ from collections.abc import Callable, Coroutine
 from typing import Any, Generic, TypeVar
 
 from composer.runtime.core import Core
+from composer.runtime.strand import Direct
 
 T = TypeVar("T")
 
@@ -30,7 +31,11 @@ class Line(Generic[T]):
         self._waiting: deque[T] = deque()
         self._busy = False
         self._lock = threading.Lock()
-        self._put = self._overlap if reentrant else self._wait_or_run
+        self._put = self._wait_or_run
+        if reentrant:
+            self._put = self._overlap
+        elif isinstance(core.strand, Direct):
+            self._put = self._wait_or_run_now
 
     def put(self, item: T) -> T | None:
         """Take ``item`` in; return the one that had to make room for it, if any."""
@@ -62,6 +67,20 @@ class Line(Generic[T]):
         self._core.strand.post(self._run)
         return None
 
+    def _wait_or_run_now(self, item: T) -> T | None:
+        """Do the same on the one thread there is: nothing has to be locked."""
+        if self._busy:
+            return self._wait_or_run(item)
+        self._busy = True
+        coroutine = self._work(item)
+        if coroutine is not None:
+            self._spawn(coroutine)
+        elif self._waiting:
+            self._run()
+        else:
+            self._busy = False
+        return None
+
     def _run(self) -> None:
         """Work on what waits until something has to be awaited or nothing is left."""
         while True:
@@ -72,9 +91,12 @@ class Line(Generic[T]):
                 item = self._waiting.popleft()
             coroutine = self._work(item)
             if coroutine is not None:
-                task = self._core.spawn(self._core.strand.wrap(coroutine))
-                task.add_done_callback(self._next)
+                self._spawn(coroutine)
                 return
+
+    def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> None:
+        task = self._core.spawn(self._core.strand.wrap(coroutine))
+        task.add_done_callback(self._next)
 
     def _next(self, _: object) -> None:
         self._core.strand.post(self._run)

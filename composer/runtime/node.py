@@ -17,7 +17,7 @@ from rclpy.node import Node as RosNode
 from composer.behavior import TransitionFailed
 from composer.model import Event, LogLevel, Node
 from composer.runtime.assembly import Assembly
-from composer.runtime.behaviors import Named, NodeClock, behavior_class, method
+from composer.runtime.behaviors import Named, NamedPorts, NodeClock, behavior_class, method
 from composer.runtime.core import Core
 from composer.runtime.delivery.delivery import Delivery
 from composer.runtime.gate import Gate
@@ -238,9 +238,9 @@ class RunningNode:
         behavior.log = self._core.log
         behavior.clock = NodeClock(self._core, self._standby)
         behavior.parameters = Named("parameter", self._core.names["parameters"])
-        behavior.publishers = Named("publisher", assembly.publishers)
-        behavior.clients = Named("client", assembly.clients)
-        behavior.action_clients = Named("action client", assembly.action_clients)
+        behavior.publishers = NamedPorts("publisher", assembly.publishers)
+        behavior.clients = NamedPorts("client", assembly.clients)
+        behavior.action_clients = NamedPorts("action client", assembly.action_clients)
 
     async def _leave(self, core: Core, ports: Iterable[RunningPort]) -> None:
         """Take nothing more in, end what is under way. Publishers stay open for a last word."""

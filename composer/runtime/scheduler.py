@@ -183,10 +183,16 @@ class Scheduler:
                 self._timers.repeat(call)
 
     def _run_calls(self) -> None:
+        calls, timers = self._calls, self._timers
         for _ in range(_ROUND):  # those that calls bring about included
-            self._call(self._calls.popleft())
-            if not self._calls or monotonic() >= self._timers.next_s:
-                return
+            self._running = callback = calls.popleft()
+            try:
+                callback()
+            except BaseException as error:
+                self._report(name_of(callback), error)
+            if not calls or monotonic() >= timers.next_s:
+                break
+        self._running = None
 
     def _wait(self) -> list[tuple[int, int]]:
         self._sleeping = True

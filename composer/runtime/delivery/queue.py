@@ -44,18 +44,11 @@ class Queue:
             self._on_drop()
         messages.append(message)
         if self._idle:
-            self._call()
+            self._wake()
 
     def close(self) -> None:
         """Have nothing received any more."""
         self._receive = _ignore
-
-    def _call(self) -> None:
-        try:
-            self._idle.pop()
-        except IndexError:
-            return  # somebody was faster
-        self._call_soon(self._serve)
 
     def _take_turn(self) -> None:
         messages = self._messages
@@ -67,7 +60,14 @@ class Queue:
             else:
                 self._idle.append(True)
                 if messages:  # put there while nobody thought us idle
-                    self._call()
+                    self._wake()
+
+    def _wake(self) -> None:
+        try:
+            self._idle.pop()
+        except IndexError:
+            return  # somebody was faster
+        self._call_soon(self._serve)
 
 
 def _ignore(_: Any) -> None:

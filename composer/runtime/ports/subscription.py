@@ -36,6 +36,7 @@ class SubscriptionPort:
         self._gate = core.gate
         self._statistics = core.statistics
         self._name = port.name.value
+        self._callback = f"on_{self._name}"
         self._reaction = reaction
         self._handler = handler
         depth = port.qos.profile.queue_depth
@@ -106,4 +107,4 @@ class SubscriptionPort:
                 self._core.faults.take(f"subscription '{self._name}'", error)
         if self._handler is None:
             return None
-        return self._core.call(f"on_{self._name}", self._handler, message)
+        return self._core.call(self._callback, self._handler, message)
