@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterable, Iterator
 from collections.abc import Mapping as Map
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeAlias
 
 from composer.assembly import NodeTypeFile, assemble, inherited
 from composer.assembly.telling import once, with_includes
@@ -114,23 +115,29 @@ def findings_of(loadings: Collection[Loading]) -> list[Diagnostic]:
     """Return what is to be said of all files together, and of each, everything once.
 
     What is found in a file that is itself among them is told of it alone, and not again of the
-    systems that include or use it.
+    systems that include or use it; in another file it is told of the first of these systems.
     """
-    own = {
-        (finding.rule.code, str(finding.primary))
-        for loading in loadings
-        for finding in loading.diagnostics
-        if finding.primary.file == loading.source
-    }
+    teller: dict[_Told, Loading] = {}
+    for loading in loadings:
+        for finding in loading.diagnostics:
+            if finding.primary.file == loading.source:
+                teller[_told(finding)] = loading
     findings = project_findings(loadings)
     for loading in loadings:
         findings += (
             finding
             for finding in loading.diagnostics
-            if finding.primary.file == loading.source
-            or (finding.rule.code, str(finding.primary)) not in own
+            if teller.setdefault(_told(finding), loading) is loading
         )
     return in_order(findings)
+
+
+_Told: TypeAlias = tuple[str, str]
+
+
+def _told(finding: Diagnostic) -> _Told:
+    """Return what tells a finding from others, whatever the system that it was found in."""
+    return (finding.rule.code, str(finding.primary))
 
 
 def project_findings(loadings: Collection[Loading]) -> list[Diagnostic]:

@@ -21,6 +21,7 @@ PICTURES = (
     ("executors", View.DEPLOYMENT),
     ("trajectory_service", View.NODES),
     ("navigation", View.NODES),
+    ("fleet", View.NODES),
     ("qos_patterns", View.CONNECTIONS),
 )
 

@@ -220,6 +220,8 @@ connections:
         "wrong.yaml:5:28 unknown-port",
     ]
     assert len(load(Path("whole.yaml")).diagnostics) == 2
+    project(tmp_path, other="system: other\ninclude: [{file: wrong.yaml, prefix: other_}]\n")
+    assert len(findings_of(load_files([Path("whole.yaml"), Path("other.yaml")]))) == 2
 
 
 def test_a_circle_is_one_finding_from_wherever(

@@ -1,0 +1,27 @@
+"""Two robots from one file: each is where its include puts it, and does what is said there."""
+
+from __future__ import annotations
+
+from nav_msgs.msg import Odometry
+from rclpy.qos import QoSPresetProfiles
+
+from tests.ros.systems.running import Outsider, RunningSystem
+
+SENSOR_DATA = QoSPresetProfiles.SENSOR_DATA.value
+
+
+def test_each_robot_is_a_part_of_its_own(outsider: Outsider) -> None:
+    odometry = {
+        robot: outsider.listen(Odometry, f"/{robot}/odometry", SENSOR_DATA)
+        for robot in ("alpha", "beta")
+    }
+    with RunningSystem("systems/fleet.yaml") as system:
+        system.wait_for(r"9 of 9 nodes active")
+        system.wait_for(r"alpha_controller.*driving to")
+        system.wait_for(r"beta_controller.*driving to")
+        outsider.spin_until(lambda: all(odometry.values()))
+        code, _ = system.stop()
+    assert code == 0
+    first = {robot: heard[0].pose.pose.position.y for robot, heard in odometry.items()}
+    assert abs(first["alpha"]) < 1.0
+    assert abs(first["beta"] - 5.0) < 1.0
