@@ -12,6 +12,8 @@ T = TypeVar("T")
 
 #: What is left of any time limit once somebody is in a hurry.
 _HURRY_S = 0.05
+#: Whoever forwards signals sends a second one beside the terminal's: no person is that quick.
+_TOGETHER_S = 0.1
 
 
 class Inbox(Generic[T]):
@@ -26,6 +28,7 @@ class Inbox(Generic[T]):
         self._waiting: deque[T] = deque()
         self.reason: str | None = None
         self.hurry = False
+        self._asked_s = 0.0
 
     @property
     def closing(self) -> bool:
@@ -33,10 +36,12 @@ class Inbox(Generic[T]):
         return self.reason is not None
 
     def ask(self, reason: str) -> None:
-        """Ask for the end, from any thread or a signal handler. Asking again hurries."""
+        """Ask for the end, from any thread or a signal handler. Asking again, later, hurries."""
+        now_s = time.monotonic()
         if self.reason is None:
             self.reason = reason
-        else:
+            self._asked_s = now_s
+        elif now_s - self._asked_s > _TOGETHER_S:
             self.hurry = True
         self._news.put(None)
 
