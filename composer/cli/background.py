@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import select
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
+from typing import TextIO
 
 from composer.cli.failure import FINDINGS, Failure
 
@@ -16,11 +19,11 @@ READY_VARIABLE = "COMPOSE_READY_FD"
 _LAST_LINES = 20
 
 
-def run_in_background(system: str, arguments: Sequence[str]) -> str:
+def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> str:
     """Start ``compose run`` with ``arguments``; return what it says once the system is up.
 
     What it prints goes to a file in the folder of ROS's logs. Raises Failure, with the end of that,
-    when the process ends instead.
+    when the process ends instead, or has said nothing for ``limit_s`` seconds: it is killed then.
     """
     log = _log_path(system)
     log.parent.mkdir(parents=True, exist_ok=True)
@@ -39,20 +42,30 @@ def run_in_background(system: str, arguments: Sequence[str]) -> str:
         finally:
             os.close(writing)
         try:
-            told = news.read()
+            told = _read_within(news, limit_s)
         except KeyboardInterrupt:
             process.terminate()
             process.wait()
             raise
+    if told is None:
+        os.killpg(process.pid, signal.SIGKILL)  # it keeps limits of its own, if it can
+        process.wait()
+        raise _failure(f"the system did not come up within {limit_s:g} s and was killed:", log)
     if not told:
         process.wait()
-        tail = log.read_text(encoding="utf-8", errors="replace").splitlines()[-_LAST_LINES:]
-        raise Failure(
-            f"the system did not come up (exit code {process.returncode}):",
-            hint="\n".join([*tail, f"all of it: {log}"]),
-            exit_code=FINDINGS,
-        )
+        raise _failure(f"the system did not come up (exit code {process.returncode}):", log)
     return f"{told} (process {process.pid}, log {log})"
+
+
+def _read_within(news: TextIO, limit_s: float) -> str | None:
+    """Return what is written to a pipe until it is closed; None when nothing comes in time."""
+    ready, _, _ = select.select([news], [], [], limit_s)
+    return news.read() if ready else None
+
+
+def _failure(what: str, log: Path) -> Failure:
+    tail = log.read_text(encoding="utf-8", errors="replace").splitlines()[-_LAST_LINES:]
+    return Failure(what, hint="\n".join([*tail, f"all of it: {log}"]), exit_code=FINDINGS)
 
 
 def tell_ready(text: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import sys
 from dataclasses import replace
 from enum import StrEnum
@@ -13,6 +12,7 @@ import typer
 
 from composer.cli.failure import FINDINGS, Failure
 from composer.cli.files import system_file
+from composer.cli.hard_exit import end_now, end_within
 from composer.cli.help import examples
 from composer.cli.loaded import Namespace, SystemName, load_system
 from composer.cli.ros import require_ros
@@ -33,6 +33,11 @@ EPILOG = examples(
     "compose run pipeline --autostart inactive             then: compose lifecycle set ...",
     "compose run pipeline --wait --timeout 10              in the background, once it is up",
 )
+
+#: How long ``--wait`` waits when nobody says it.
+_WAIT_S = 60.0
+#: What a process may need before it keeps limits by itself, on a busy machine.
+_START_S = 20.0
 
 
 class Autostart(StrEnum):
@@ -109,7 +114,7 @@ def run(
             metavar="SECONDS",
             min=0.0,
             help="Take the system down again if it is not up by then.",
-            show_default="none",
+            show_default="none, 60 with --wait",
         ),
     ] = None,
     grace: Annotated[
@@ -137,11 +142,13 @@ def run(
     if wait:
         from composer.cli.background import run_in_background
 
+        up_s = _WAIT_S if timeout is None else timeout
         given = _arguments(system, settings or [], namespace, autostart, log_level)
         given += [] if tracing else ["--no-tracing"]
         given += ["--check-mutation"] if check_mutation else []
-        limits = _numbers({"--for": run_for, "--timeout": timeout, "--grace": grace})
-        write(run_in_background(declared.name.value, [*given, *limits]))
+        limits = _numbers({"--for": run_for, "--timeout": up_s, "--grace": grace})
+        limit_s = up_s + grace + _START_S
+        write(run_in_background(declared.name.value, [*given, *limits], limit_s))
         return
     options = _options(run_for, timeout, grace, log_level)
     options = replace(options, tracing=tracing, check_mutation=check_mutation)
@@ -200,7 +207,7 @@ def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
         raise Failure(str(refusal), hint=refusal.hint) from refusal
     say(summary(outcome))
     if outcome.hung:
-        _end_hard(outcome.exit_code)
+        end_now(outcome.exit_code)
     return outcome
 
 
@@ -215,13 +222,6 @@ def _options(
         bring_up_within_s=math.inf if timeout is None else timeout,
         grace_s=grace,
         log_level=LogLevel(level.value),
-        hard_exit=lambda: _end_hard(FINDINGS),
+        end_within=end_within,
         ends_process=True,
     )
-
-
-def _end_hard(exit_code: int) -> None:
-    """End the process although a thread does not."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(exit_code)

@@ -70,13 +70,15 @@ class Crew:
         self.hung: set[str] = set()
         self._keeps_entities = False
 
-    def create(self) -> None:
+    def create(self, begin: Callable[[], None] = lambda: None) -> None:
         """Create all nodes and start their loops. Raises CreationFailed; nothing is started then.
 
-        A node that cannot be created leaves those before it to be closed.
+        A node that cannot be created leaves those before it to be closed. ``begin`` is called
+        before each of them.
         """
         self._delivery = Delivery(shared_channels(self._system))
         for node in self._system.nodes:
+            begin()
             try:
                 self.nodes[node.name.value] = self._make(node)
             except ParameterError as error:

@@ -20,10 +20,8 @@ call at a time; ``str(event)`` is the line to show.
 from __future__ import annotations
 
 import math
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import rclpy
@@ -67,6 +65,8 @@ _STEP_SHARE = 0.6
 _HURRY_S = 0.2
 #: So many nodes are given back one by one within half a second.
 _FEW_NODES = 20
+#: Joining the ROS graph takes a tenth of a second, on a busy machine some tenths.
+_SHORTEST_START_LIMIT_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +77,11 @@ class HostOptions:
     ``check_mutation`` whether messages are looked at after each callback, for who changes them.
     ``run_for_s`` ends it by itself; ``bring_up_within_s`` is the time for the whole bring-up;
     ``transition_timeout_s`` goes before what the system says; ``stop_within_s`` is the time for the
-    whole tear-down. If the process still stands ``grace_s`` after the request to stop,
-    ``hard_exit`` is called, on a thread of its own: it is to end the process. ``ends_process``
-    promises that the process ends once the run has, by ``os._exit`` where the outcome says so.
+    whole tear-down. ``end_within(seconds)`` is to end the process after so long, whatever hangs in
+    it, and None to call that off. Asked for are ``grace_s`` seconds as soon as the system is to
+    stop, and that is never called off: the end of Python may hang, too. The same holds for each
+    call of the start that a middleware may never return from. ``ends_process`` promises that the
+    process ends once the run has, by ``os._exit`` where the outcome says so.
     """
 
     run_for_s: float | None = None
@@ -88,7 +90,7 @@ class HostOptions:
     transition_timeout_s: float | None = None
     stop_within_s: float = 2.0
     grace_s: float = 10.0
-    hard_exit: Callable[[], None] | None = None
+    end_within: Callable[[float | None], None] = lambda _: None
     tracing: bool = True
     check_mutation: bool = False
     ends_process: bool = False
@@ -126,6 +128,7 @@ class Host:
         self._supervisor = Supervisor(system, self._crew, self._inbox, self._board, self._reporter)
         self._commands = Commands(system, self._crew, self._supervisor, self._board)
         self._failed = False
+        self._ends = False  # the time to the end of the process is limited
         self._is_created = False
         self._summary: tuple[NodeSummary, ...] = ()
         self._farewells: list[Command] = []
@@ -135,6 +138,7 @@ class Host:
 
     def stop(self, reason: str) -> None:
         """Ask for the end, from any thread or a signal handler. Asking again hurries."""
+        self._limit_end()
         self._inbox.ask(reason)
 
     def run(self) -> Outcome:
@@ -145,6 +149,7 @@ class Host:
         prepare_environment()
         namespace = manager_namespace(self._system.namespace, self._system.name.value)
         with claimed(namespace), stop_signals(self.stop):
+            self._limit_start()
             _start_ros()
             try:
                 self._run(namespace)
@@ -166,15 +171,25 @@ class Host:
             if self._create():
                 self._live()
         finally:
-            with self._hard_exit():
-                self._tear_down()
-                self._close(manager)
+            self._limit_end()
+            self._tear_down()
+            self._close(manager)
 
     # --- up
 
+    def _limit_start(self) -> None:
+        """Limit the next call that joins the ROS graph; signals have no effect before its end."""
+        if not self._ends:
+            self._options.end_within(max(self._options.grace_s, _SHORTEST_START_LIMIT_S))
+
+    def _lift_limit(self) -> None:
+        if not self._ends:
+            self._options.end_within(None)
+
     def _create(self) -> bool:
         try:
-            self._crew.create()
+            self._crew.create(self._limit_start)
+            self._lift_limit()
         except CreationFailed as error:
             at_s = self._reporter.elapsed_s
             self._reporter.tell(events.RollingBack(at_s, error.node, str(error)))
@@ -267,6 +282,12 @@ class Host:
 
     # --- down
 
+    def _limit_end(self) -> None:
+        """Limit the time from now to the end of the process, once."""
+        if not self._ends:
+            self._ends = True
+            self._options.end_within(self._options.grace_s)
+
     def _tear_down(self) -> None:
         if not self._inbox.closing:
             self._inbox.ask("it cannot go on")
@@ -286,17 +307,6 @@ class Host:
             if not self._supervisor.tear_down(self._down, self._end_s, share_s):
                 self._failed = True
         self._summary = tuple(_summary(node) for node in self._crew.nodes.values())
-
-    @contextmanager
-    def _hard_exit(self) -> Iterator[None]:
-        """End the process if the block does not end within the grace period."""
-        watchdog = threading.Timer(self._options.grace_s, self._options.hard_exit or (lambda: None))
-        watchdog.daemon = True
-        watchdog.start()
-        try:
-            yield
-        finally:
-            watchdog.cancel()
 
     def _close(self, manager: Manager) -> None:
         for item in (*self._farewells, *self._inbox.rest()):
