@@ -169,10 +169,18 @@ class Conductor:
         phase.running.remove(item)
         phase.done.add(item.step.number)
         self.moving.discard(item.step.node)
+        self._note_where(item)
         failure = self._failure(item)
         if failure is not None:
             phase.failures.append(failure)
             self._tell_failed(failure)
+
+    def _note_where(self, item: _Running) -> None:
+        """Note where a step has left its node; one that goes on has left it nowhere yet."""
+        if item.future.done() and not item.future.cancelled():
+            self._crew.left[item.step.node] = item.future.result().state
+        else:
+            self._crew.left.pop(item.step.node, None)
 
     def _failure(self, item: _Running) -> StepFailed | None:
         """Return what went wrong with a step that is done or has had its time."""

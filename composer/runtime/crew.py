@@ -69,6 +69,8 @@ class Crew:
         #: The loops with a callback that does not return; nothing can be asked of their nodes.
         self.hung: set[str] = set()
         self._keeps_entities = False
+        #: Where nodes are as far as the main thread knows, which moves them; by their keys.
+        self.left: dict[str, str] = {}
 
     def create(self, begin: Callable[[], None] = lambda: None) -> None:
         """Create all nodes and start their loops. Raises CreationFailed; nothing is started then.
@@ -104,6 +106,14 @@ class Crew:
             if node.loop.name not in self.hung and node.state in _PRIMARY
         }
 
+    def settled(self) -> Mapping[str, PrimaryState]:
+        """Return the states of nodes that nobody else has moved; of others news is on its way."""
+        return {
+            name: state
+            for name, state in self.states().items()
+            if self.left.get(name, state.value) == state.value
+        }
+
     def is_lost(self, name: str) -> bool:
         """Say whether nothing can be asked of the node, since its loop hangs."""
         return self.nodes[name].loop.name in self.hung
@@ -122,6 +132,7 @@ class Crew:
             return
         try:
             self.nodes[name] = old.loop.run(partial(self._remake, old), _MADE_ANEW_WITHIN_S)
+            self.left[name] = PrimaryState.UNCONFIGURED.value
         except Exception as error:
             reason = f"it cannot be made anew: {describe(error)}"
             raise CreationFailed(old.full_name, reason) from error

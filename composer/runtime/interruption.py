@@ -20,6 +20,7 @@ from composer.runtime.loop import Loop
 from composer.runtime.node import RunningNode
 
 _OURS = str(Path(__file__).parent)
+_TRANSITIONS = (RunningNode.on_transition.__code__, RunningNode.on_error.__code__)
 
 
 class CallbackInterrupted(BaseException):
@@ -98,7 +99,7 @@ def _callback(
         owner = owners.get(id(subject)) or owners.get(id(getattr(subject, "_core", None)))
         if owner is not None:
             node, outermost = owner, frame
-            in_transition = subject is owner
+            in_transition = frame.f_code in _TRANSITIONS
     if node is None or outermost is None:
         return None
     call = _plain(outermost)

@@ -127,9 +127,14 @@ class Lifecycle:
     @property
     def legal(self) -> Mapping[str, int]:
         """The transitions that may be requested now, with their ids."""
+        try:
+            with self._machine:
+                available = self._machine.available_transitions
+        except InvalidHandle:
+            return {}
         return {
             _NAMES[transition_id]: transition_id
-            for transition_id, *_ in self._machine.available_transitions
+            for transition_id, *_ in available
             if transition_id in _NAMES
         }
 

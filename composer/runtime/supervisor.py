@@ -116,6 +116,13 @@ class Supervisor:
         """Take every node to where it is wanted now; failures on the way become faults."""
         return self._reach(self._upkeep, self._crew.states(), why)
 
+    def _mend_settled(self, why: str = "") -> tuple[StepFailed, ...]:
+        """Do the same with all nodes but those that have just failed or been moved, too.
+
+        They would be brought up again before anybody has dealt with that.
+        """
+        return self._reach(self._upkeep, self._crew.settled(), why)
+
     def _reach(
         self, upkeep: Upkeep, states: Mapping[str, PrimaryState], why: str
     ) -> tuple[StepFailed, ...]:
@@ -161,11 +168,12 @@ class Supervisor:
             self.take_fault(Fault(name, FaultKind.TRANSITION, str(error), now_s))
             return
         full_name = self._crew.nodes[name].full_name
-        if not self.mend(f"restart {attempt} of {full_name}") and not self._inbox.closing:
+        if not self._mend_settled(f"restart {attempt} of {full_name}") and not self._inbox.closing:
             self._reporter.tell(Restarted(self._reporter.elapsed_s, full_name, attempt))
 
     def take_fault(self, fault: Fault) -> None:
         """Do what is to be done about a failed node."""
+        self._crew.left[fault.node] = self._crew.nodes[fault.node].state
         verdict = judge(self._system, self._upkeep, fault)
         if verdict is None or self._is_overtaken(fault):
             return
@@ -183,7 +191,7 @@ class Supervisor:
             self._show()
             self._inbox.ask(f"{node.full_name} failed: {verdict.reason}")
             return
-        self.mend("")
+        self._mend_settled()
         self._force_down(fault.node)
         if self._crew.is_lost(fault.node) and fault.kind is not FaultKind.LOST:
             self._upkeep = self._upkeep.release(fault.node)
@@ -199,6 +207,7 @@ class Supervisor:
         """
         if self._crew.nodes[moved.node].state != moved.state:
             return  # it has gone on since, and that is news of its own
+        self._crew.left[moved.node] = moved.state
         states = self._crew.states()
         state = _PRIMARY.get(moved.state, PrimaryState.UNCONFIGURED)
         self._upkeep = self._upkeep.release(moved.node).want({moved.node: state})
@@ -219,7 +228,7 @@ class Supervisor:
         self._crew.hung.discard(returned.loop)
         for name in self._stranded.pop(returned.loop, ()):
             self._upkeep = self._upkeep.release(name)
-        self.mend(f"executor '{returned.loop}' goes on")
+        self._mend_settled(f"executor '{returned.loop}' goes on")
 
     def _is_overtaken(self, fault: Fault) -> bool:
         """Say whether somebody has taken the node elsewhere since it failed."""
