@@ -21,12 +21,13 @@ ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION
 endif
 
-.PHONY: help run test check lint format pictures bench fuzz clean
+.PHONY: help run test soak check lint format pictures bench fuzz clean
 .NOTPARALLEL:
 
 help:
 	@echo "make run      run $(SYSTEM) (SYSTEM=... for another)"
 	@echo "make test     run the tests"
+	@echo "make soak     run the tests that take half an hour"
 	@echo "make check    run what CI runs: lint, types, layers, tests"
 	@echo "make format   format the Python code"
 	@echo "make pictures draw the pictures of the documentation"
@@ -42,6 +43,11 @@ run: $(STAMPS)/composer $(STAMPS)/interfaces
 test: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks
 	@echo "==> pytest"
 	@$(BIN)/python -m pytest
+
+# What shows only after hundreds of starts, ends and transitions.
+soak: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks
+	@echo "==> pytest -m soak (half an hour)"
+	@$(BIN)/python -m pytest --soak -m soak
 
 check: lint test
 

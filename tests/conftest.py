@@ -26,6 +26,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="write what the golden tests get as what they expect; read the difference then",
     )
+    parser.addoption("--soak", action="store_true", help="run what takes many minutes, too")
 
 
 def pytest_configure() -> None:
@@ -55,13 +56,22 @@ def pytest_pycollect_makemodule(
     return None
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if not config.getoption("--soak"):
+        _leave_out(config, items, "soak")
     may_skip = _may_skip()
     for item in items:
         if item.path.is_relative_to(TESTS_WITH_ROS):
             item.add_marker(pytest.mark.ros)
         if may_skip and item.get_closest_marker("ros"):
             item.add_marker(pytest.mark.skip(reason=NO_ROS))
+
+
+def _leave_out(config: pytest.Config, items: list[pytest.Item], marker: str) -> None:
+    left_out = [item for item in items if item.get_closest_marker(marker)]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
 
 
 def _hold_domain_id() -> tuple[int, TextIO]:

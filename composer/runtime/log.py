@@ -11,6 +11,7 @@ from typing import TypeAlias
 from rcl_interfaces.msg import Log as LogMessage
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
@@ -28,6 +29,8 @@ _SEVERITIES = {
 _ROSOUT_QOS = QoSProfile(
     depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=Duration(seconds=10)
 )
+#: What there is to hear of a node, or of a whole context, that is gone.
+_GONE = (InvalidHandle, rclpy_implementation.RCLError)
 _AGAIN_AFTER_S = 1.0
 
 #: Takes (level, name of the logger, message).
@@ -64,7 +67,7 @@ class Log:
         self._write(level, self._name, text)
         if self._rosout is None:
             return
-        with suppress(InvalidHandle):  # the last words of a node that is gone
+        with suppress(*_GONE):
             self._rosout.publish(
                 LogMessage(
                     stamp=self._clock.now().to_msg(),

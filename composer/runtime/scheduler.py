@@ -75,7 +75,10 @@ class Scheduler:
         """Run a coroutine; the future is its outcome. Cancelling the future closes it."""
         task = Task(coroutine, self.call_soon, self._report, self._tasks.discard)
         self._tasks.add(task)
-        return task.start()
+        future = task.start()
+        if self._stopped:
+            task.abandon()
+        return future
 
     def run(self, function: Callable[[], T], timeout_s: float | None = None) -> T:
         """Call ``function`` on the loop and wait for it (at once when already there).
@@ -109,7 +112,11 @@ class Scheduler:
             return True
         self._poller.wake()
         self._thread.join(timeout_s)
-        return not self._thread.is_alive()
+        if not self._thread.is_alive():
+            return True
+        for task in tuple(self._tasks):
+            task.abandon()
+        return False
 
     def where(self) -> str:
         """Return the Python stack of the callback that runs now; empty when none does."""

@@ -10,7 +10,6 @@ import threading
 from collections import deque
 from collections.abc import Callable, Coroutine, Generator
 from functools import partial
-from types import coroutine as awaitable_generator
 from typing import Any, Protocol, TypeVar
 
 from composer.runtime.tasks import Future, awaited_rclpy_future, wrap_rclpy_future
@@ -105,12 +104,41 @@ class Around(Protocol):
         """End the step."""
 
 
-async def in_steps(around: Around, coroutine: Coroutine[Any, Any, T]) -> T:
-    """Drive ``coroutine`` step by step, from one wait to the next."""
-    return await _steps(around, coroutine)
+def in_steps(around: Around, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
+    """Return what drives ``coroutine`` step by step, from one wait to the next."""
+    return _InSteps(around, coroutine)
 
 
-@awaitable_generator
+class _InSteps(Coroutine[Any, Any, T]):
+    """Ended before it has begun, it ends the coroutine that it drives as well.
+
+    That would be garbage, and Python's complaint that it was never awaited.
+    """
+
+    __slots__ = ("_driven", "_steps")
+
+    def __init__(self, around: Around, driven: Coroutine[Any, Any, T]) -> None:
+        self._driven = driven
+        self._steps = _steps(around, driven)
+
+    def __await__(self) -> Generator[Any, Any, T]:
+        return self._steps
+
+    def send(self, value: Any) -> Any:
+        return self._steps.send(value)
+
+    def throw(self, *raised: Any) -> Any:
+        try:
+            return self._steps.throw(*raised)
+        except BaseException:
+            self._driven.close()
+            raise
+
+    def close(self) -> None:
+        self._steps.close()
+        self._driven.close()
+
+
 def _steps(around: Around, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
     raised: BaseException | None = None
     try:

@@ -161,6 +161,7 @@ class Task(Generic[T]):
 
     __slots__ = (
         "_awaited",
+        "_begun",
         "_call_soon",
         "_coroutine",
         "_finished",
@@ -184,6 +185,7 @@ class Task(Generic[T]):
         self._report = partial(report, name_of(coroutine))
         self._lock = threading.Lock()  # a cancellation may meet a running step on another thread
         self._awaited: object = None
+        self._begun = False
         self._finished = False
         self.future: Future[T] = Future(self._report)
         self.future.add_done_callback(self._cancel)
@@ -205,7 +207,21 @@ class Task(Generic[T]):
             self._end()
         self.future.cancel()
 
+    def abandon(self) -> None:
+        """End the coroutine if it has not begun: the loop has stopped, or hangs and never will."""
+        if not self._lock.acquire(blocking=False):
+            return
+        try:
+            if self._begun or self._finished:
+                return
+            self._coroutine.close()
+            self._end()
+        finally:
+            self._lock.release()
+        self.future.cancel()
+
     def _begin(self) -> None:
+        self._begun = True
         if not self.future.cancelled():
             self._step(None)
 

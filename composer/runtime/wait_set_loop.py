@@ -126,7 +126,10 @@ class WaitSetLoop:
         """Run a coroutine; the future is its outcome. Cancelling the future closes it."""
         task = Task(coroutine, self.call_soon, self.report, self._tasks.discard)
         self._tasks.add(task)
-        return task.start()
+        future = task.start()
+        if self._stopped:
+            task.abandon()
+        return future
 
     def run(self, function: Callable[[], T], timeout_s: float | None = None) -> T:
         """Call ``function`` on the loop and wait for it (at once when already there).
@@ -172,6 +175,9 @@ class WaitSetLoop:
         self._stopped = True
         if ended:
             self._finish_calls()
+        else:
+            for task in tuple(self._tasks):
+                task.abandon()
         return ended
 
     def where(self) -> str:

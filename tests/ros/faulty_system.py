@@ -19,7 +19,7 @@ executors: {EXECUTORS}
 nodes:
   metronome:
     publishers: {beat: {type: std_msgs/msg/Int64, external: true}}
-    timers: {beat: {period_ms: 50, publish: {beat: {data: "{count}"}}}}
+    timers: {beat: {period_ms: 100, publish: {beat: {data: "{count}"}}}}
 """
 NODE = """
   NAME:

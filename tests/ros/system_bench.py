@@ -153,6 +153,12 @@ class Peer:
         self._thread.join(PATIENCE_S)
         self.node.destroy_node()
 
+    def join(self, name: str) -> Node:
+        """Return one more node of the same participant."""
+        node = Node(f"{name}_{os.getpid()}", context=self.context)
+        self._executor.add_node(node)
+        return node
+
     def listen(self, kind: Any, topic: str, qos: QoSProfile | int = 10) -> list[Any]:
         """Return the list that messages will be in, once a publisher has been found."""
         heard: list[Any] = []

@@ -169,7 +169,7 @@ class Metronome:
 
     def rate_hz(self) -> float:
         """How often it has beaten since it was asked last."""
-        wait_until(lambda: len(self._arrivals_s) > 20)
+        wait_until(lambda: len(self._arrivals_s) > 10)
         arrivals_s, self._arrivals_s = self._arrivals_s, self._arrivals_s[-1:]
         return (len(arrivals_s) - 1) / (arrivals_s[-1] - arrivals_s[0])
 
