@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Coroutine, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
@@ -94,6 +95,7 @@ class Lifecycle:
         self._lock = threading.Lock()
         self._under_way: Future[None] | None = None
         self._last_state = ""
+        self._waiting: list[Reply] = []  # who asked for the transition under way, if from outside
         with node.handle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, services)
         self._services: list[Service] = []
@@ -143,6 +145,10 @@ class Lifecycle:
         while (under_way := self._begin()) is not None:
             await under_way
         return await self._change(transition)
+
+    def give_up(self) -> None:
+        """Answer who asked for the transition under way: it hangs. May be called on any thread."""
+        self._answer(success=False)
 
     def destroy(self) -> None:
         """Give back the services and the state machine, which holds the node."""
@@ -249,8 +255,14 @@ class Lifecycle:
         self._loop.run_task(self._answer_change_state(_requested(request, self.legal), reply))
 
     async def _answer_change_state(self, transition: str, reply: Reply) -> None:
+        self._waiting.append(reply)
         result = await self._change(transition)
-        reply(ChangeState.Response(success=result.success))
+        self._answer(success=result.success)
+
+    def _answer(self, *, success: bool) -> None:
+        """Answer once: popping is atomic."""
+        with suppress(IndexError):
+            self._waiting.pop()(ChangeState.Response(success=success))
 
     def _on_get_state(self, _: GetState.Request, reply: Reply) -> None:
         state_id, label = self._machine.current_state

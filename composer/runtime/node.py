@@ -142,6 +142,10 @@ class RunningNode:
         for core in self.cores:
             core.gate.incoming = False
 
+    def give_up(self) -> None:
+        """Tell who waits for a transition that it hangs, from any thread."""
+        self._lifecycle.give_up()
+
     def sent(self, publisher: str) -> int:
         """Return how many messages went through a publisher since the node was configured."""
         port = self._assembly.publishers.get(publisher)

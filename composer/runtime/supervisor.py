@@ -186,6 +186,7 @@ class Supervisor:
         )
         self._upkeep = self._upkeep.fail(fault)
         if fault.kind is FaultKind.LOST:
+            node.give_up()
             self._strand(fault.node)
         if verdict.action is OnFailure.SHUTDOWN:
             self._show()

@@ -163,6 +163,7 @@ class Task(Generic[T]):
         "_awaited",
         "_begun",
         "_call_soon",
+        "_cancelling",
         "_coroutine",
         "_finished",
         "_lock",
@@ -186,6 +187,7 @@ class Task(Generic[T]):
         self._lock = threading.Lock()  # a cancellation may meet a running step on another thread
         self._awaited: object = None
         self._begun = False
+        self._cancelling = False  # a cancellation has met a running step
         self._finished = False
         self.future: Future[T] = Future(self._report)
         self.future.add_done_callback(self._cancel)
@@ -230,15 +232,24 @@ class Task(Generic[T]):
             self._call_soon(self._throw)
 
     def _throw(self) -> None:
-        with self._lock:
+        # Not to wait for a running step: it may hang, and this thread is the loop's next best.
+        self._cancelling = True
+        if not self._lock.acquire(blocking=False):
+            return
+        try:
+            self._cancelling = False
             if not self._finished:
                 self._advance(partial(self._coroutine.throw, Cancelled()))
+        finally:
+            self._lock.release()
 
     def _step(self, awaited: object) -> None:
         with self._lock:
             # A cancelled task may be woken by what it no longer waits for.
             if not self._finished and self._awaited is awaited:
                 self._advance(partial(self._coroutine.send, None))
+        if self._cancelling:
+            self._throw()
 
     def _advance(self, resume: Callable[[], object]) -> None:
         while True:

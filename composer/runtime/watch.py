@@ -117,6 +117,7 @@ class Watch:
                     if seen is not None:
                         self._take_end(seen)
                     seen = _Seen(callback, name, now_s)
+                seen.callback = callback  # the same call, but by now it may be somewhere else
                 self._callbacks[callback.thread] = seen
                 self._judge(seen, now_s)
         for seen in before.values():
