@@ -159,6 +159,10 @@ class Peer:
         self._executor.add_node(node)
         return node
 
+    def run(self, function: Callable[[], Any]) -> Any:
+        """Call it on the thread that serves the node; rclpy's action clients want that."""
+        return finished(self._executor.create_task(function))
+
     def listen(self, kind: Any, topic: str, qos: QoSProfile | int = 10) -> list[Any]:
         """Return the list that messages will be in, once a publisher has been found."""
         heard: list[Any] = []

@@ -140,8 +140,8 @@ class Subject:
         if place == "ask":
             return self._ask.call_async(Trigger.Request())
         if place == "drive":
-            accepted = finished(self._drive.send_goal_async(Navigate.Goal()))
-            return accepted.get_result_async()
+            goal = finished(self._peer.run(lambda: self._drive.send_goal_async(Navigate.Goal())))
+            return self._peer.run(goal.get_result_async)
         if place == "input":
             self._input.publish(String())
         return None  # the timer is called anyway, and so is what hears of changed parameters
