@@ -12,6 +12,8 @@ A behaviour is a plain class beside its node type. Handlers bind by name::
         def on_configure(self): ...                          # and on_activate, on_deactivate,
                                                              # on_cleanup, on_shutdown, on_error
 
+What a handler receives is shared with others and is not to be changed, nor is what was published.
+
 Every handler may be ``async def``. Lifecycle handlers return nothing; raising makes the
 transition fail: :class:`TransitionFailed` refuses it (the node stays where it was), any other
 exception is an error (the node's ``on_error`` runs with it, and the node is unconfigured after).
@@ -55,7 +57,7 @@ class Publisher(Protocol):
     """A publisher port. What is published while the node is not active is dropped and counted."""
 
     def publish(self, message: Any) -> None:
-        """Send ``message``. It must not be changed afterwards."""
+        """Send ``message``. It must not be changed afterwards: receivers get this very object."""
 
     @property
     def message_type(self) -> Any:

@@ -61,6 +61,7 @@ class Assembly:
 
         Raises MessageError, PeriodError, and what rclpy raises.
         """
+        self._tell_of_dds(model)
         for port in model.ports_of(PortKind.PUBLISHER):
             self.publishers[port.name.value] = PublisherPort(self._core_of(port), port)
         for port in model.ports_of(PortKind.CLIENT):
@@ -78,6 +79,12 @@ class Assembly:
         for event, declared in model.reactions:
             self.transitions[event] = self._compile(declared)
         self.always_on.extend(self._always_on(model))
+
+    def _tell_of_dds(self, model: Node) -> None:
+        for port in model.ports:
+            objection = self.core.delivery.objection(port)
+            if objection is not None:
+                self.core.log.debug(f"{port.kind} '{port.name}' uses DDS alone: {objection}")
 
     def _core_of(self, declared: Port | Timer) -> Core:
         return self.standby if declared.always_on else self.core

@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 from std_msgs.msg import Int64
 
+from composer.model import LogLevel
+from composer.runtime.host import HostOptions
 from tests.ros.system_bench import RunningSystem, running, wait_until
 
 SENT = 30
@@ -120,7 +122,8 @@ connections:
 
 
 def test_a_connection_may_ask_for_copies_or_for_dds(tmp_path: Path) -> None:
-    with running(COPIED, tmp_path, table=MODULE) as system:
+    options = HostOptions(log_level=LogLevel.DEBUG)
+    with running(COPIED, tmp_path, options=options, table=MODULE) as system:
         source = system.host._crew.nodes["source"]
         publishers = source._assembly.publishers
         sinks = {name: behavior(system, name) for name in ("shared", "copied", "by_dds")}
@@ -134,4 +137,9 @@ def test_a_connection_may_ask_for_copies_or_for_dds(tmp_path: Path) -> None:
         source.loop.run(publish_and_change)
         wait_until(lambda: all(sink.heard for sink in sinks.values()))
         heard = {name: [item.data for item in sink.heard] for name, sink in sinks.items()}
+    said = [line for line in system.log() if "uses DDS alone" in line]
+    assert said == [
+        f"{end} uses DDS alone: 'delivery: dds' says so"
+        for end in ("publisher 'by_dds'", "subscription 'input'")
+    ]
     assert heard == {"shared": [2], "copied": [1], "by_dds": [1]}

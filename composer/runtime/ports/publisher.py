@@ -27,9 +27,6 @@ class PublisherPort:
             callback_group=core.group,
         )
         self._send, self._leave = core.delivery.add_publisher(port, self._publisher)
-        objection = core.delivery.objection(port)
-        if objection is not None:
-            core.log.debug(f"publisher '{port.name}' publishes by DDS alone: {objection}")
         self._warned = False
         self.sent = 0
 
