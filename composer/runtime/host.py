@@ -148,7 +148,8 @@ class Host:
         """
         prepare_environment()
         namespace = manager_namespace(self._system.namespace, self._system.name.value)
-        with claimed(namespace), stop_signals(self.stop):
+        ends_process = self._options.ends_process
+        with claimed(namespace), stop_signals(self.stop, ends_process=ends_process):
             self._limit_start()
             _start_ros()
             try:

@@ -12,8 +12,11 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
-def stop_signals(stop: Callable[[str], None]) -> Iterator[None]:
+def stop_signals(stop: Callable[[str], None], *, ends_process: bool) -> Iterator[None]:
     """Call ``stop(name of the signal)`` for each signal, on the main thread.
+
+    Where the process ends after this, as the signals ask for, they are ignored from then on: it is
+    to say how the run was, and not to die of an impatient Ctrl-C.
 
     ``stop`` must not take a lock that the main thread may hold. On any other thread than the main
     one nothing is installed, since Python allows it there alone.
@@ -30,4 +33,4 @@ def stop_signals(stop: Callable[[str], None]) -> Iterator[None]:
         yield
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_IGN if ends_process else handler)

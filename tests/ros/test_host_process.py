@@ -137,7 +137,7 @@ def test_a_process_with_a_hanging_callback_ends_in_time(
         run.process.send_signal(signal.SIGINT)
         run.wait_for("stopping: SIGINT")
         code, took_s = run.end(impatient=is_impatient)
-    assert code == 1
+    assert code == 1, run.text()
     assert took_s < (1.6 if is_impatient else 2.0)
     assert "/hanging is stuck and did not deactivate in" in run.text()
     assert "on_tick" in run.text()
