@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from composer.assembly.budget import Budget, TooMuch
-from composer.assembly.joining import INCLUDE, joined
+from composer.assembly.joining import INCLUDE, Part, joined
 from composer.assembly.overriding import overridden
 from composer.assembly.placing import placed
 from composer.assembly.reading import File, Include, Reader, read_include
@@ -61,7 +61,7 @@ class Including:
         ]
         return self._filled_in(joined(expanded, parts, self.findings))
 
-    def _part(self, item: Tree, includer: File) -> Mapping | None:
+    def _part(self, item: Tree, includer: File) -> Part | None:
         include = read_include(item, self.findings)
         if include is None:
             return None
@@ -75,7 +75,7 @@ class Including:
         finally:
             self._way.pop()
 
-    def _included(self, file: File, include: Include) -> Mapping:
+    def _included(self, file: File, include: Include) -> Part:
         span = include.file.span
         if len(self._way) > MAX_INCLUDE_DEPTH:
             raise TooMuch(f"files include each other more than {MAX_INCLUDE_DEPTH} deep", span)
@@ -85,7 +85,8 @@ class Including:
         if include.overrides is not None:
             tree = overridden(tree, include.overrides, file.source, self.findings)
             self.findings += check_schema(tree, SYSTEM)
-        return placed(tree, include.position, self._folder(), file.path.parent)
+        whole = placed(tree, include.position, self._folder(), file.path.parent)
+        return Part(whole, span)
 
     def _is_on_the_way(self, file: File) -> bool:
         """Say whether ``file`` includes itself by way of the last files, and tell it."""

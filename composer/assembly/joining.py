@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 from composer.assembly.rules import INCLUDE_CONFLICT
 from composer.diagnostics import Diagnostic, Label, shown
 from composer.expand.rules import DUPLICATE_NODE_NAME
+from composer.source import Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, plain
 
 INCLUDE = "include"
@@ -18,14 +20,23 @@ _MAPS = {
     "chains": "chain",
 }
 _LISTS = ("parameter_files", "connections")
+_SEVERAL = 2
 
 
-def joined(own: Mapping, parts: Iterable[Mapping], findings: list[Diagnostic]) -> Mapping:
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What came of a file, and where it is included."""
+
+    tree: Mapping
+    span: Span
+
+
+def joined(own: Mapping, parts: Iterable[Part], findings: list[Diagnostic]) -> Mapping:
     """Return ``own`` with everything that is in ``parts`` as well, before what it says itself.
 
     Of two things of one name the first stays, and what is told of them is added to ``findings``.
     """
-    whole = [*parts, own]
+    whole = [*_once(parts, findings), Part(own, own.span)]
     if len(whole) == 1 and own.entry(INCLUDE) is None:
         return own
     sections = {
@@ -38,31 +49,51 @@ def joined(own: Mapping, parts: Iterable[Mapping], findings: list[Diagnostic]) -
     return Mapping((*kept, *added), own.span)
 
 
-def _joined_maps(name: str, whole: list[Mapping], findings: list[Diagnostic]) -> Entry | None:
+def _once(parts: Iterable[Part], findings: list[Diagnostic]) -> Iterator[Part]:
+    """Yield the parts but for those from a file whose nodes are there under these names already."""
+    known: dict[tuple[str, str], Part] = {}
+    for part in parts:
+        nodes = part.tree.get("nodes")
+        entries = nodes.entries if isinstance(nodes, Mapping) else ()
+        names = [(entry.name, str(entry.key.span)) for entry in entries]
+        earlier = next((known[name] for name in names if name in known), None)
+        if earlier is None:
+            known.update(dict.fromkeys(names, part))
+            yield part
+            continue
+        label = Label(earlier.span, "here as well")
+        message = "this file is included twice, with the same names for its nodes"
+        hint = "give each include a 'prefix' of its own"
+        related = (label,) if str(earlier.span) != str(part.span) else ()
+        findings.append(Diagnostic(DUPLICATE_NODE_NAME, message, part.span, related, hint))
+
+
+def _joined_maps(name: str, whole: list[Part], findings: list[Diagnostic]) -> Entry | None:
     sections = _sections(name, whole)
     if not all(isinstance(section.value, Mapping) for section in sections):
         return sections[-1]
+    if len(sections) < _SEVERAL:
+        return next(iter(sections), None)
     found: dict[str, Entry] = {}
-    for section in sections:
-        for entry in section.value if isinstance(section.value, Mapping) else ():
+    for part in whole:
+        section = part.tree.get(name)
+        for entry in section if isinstance(section, Mapping) else ():
             earlier = found.setdefault(entry.name, entry)
             if earlier is not entry:
                 findings.extend(_conflict(name, entry, earlier))
-    if not sections:
-        return None
     return Entry(sections[-1].key, Mapping(tuple(found.values()), sections[-1].value.span))
 
 
-def _joined_lists(name: str, whole: list[Mapping]) -> Entry | None:
+def _joined_lists(name: str, whole: list[Part]) -> Entry | None:
     sections = _sections(name, whole)
-    if len(sections) < 2:
+    if len(sections) < _SEVERAL:
         return next(iter(sections), None)
     items = [item for section in sections for item in _items(section.value)]
     return Entry(sections[-1].key, Sequence(tuple(items), sections[-1].value.span))
 
 
-def _sections(name: str, whole: list[Mapping]) -> list[Entry]:
-    found = (part.entry(name) for part in whole)
+def _sections(name: str, whole: list[Part]) -> list[Entry]:
+    found = (part.tree.entry(name) for part in whole)
     return [entry for entry in found if entry is not None]
 
 
@@ -83,10 +114,10 @@ def _conflict(section: str, entry: Entry, earlier: Entry) -> Iterator[Diagnostic
         yield Diagnostic(INCLUDE_CONFLICT, message, entry.key.span, (label,), hint)
 
 
-def _misfits(own: Mapping, parts: list[Mapping]) -> Iterator[Diagnostic]:
+def _misfits(own: Mapping, parts: list[Part]) -> Iterator[Diagnostic]:
     """Yield what parts say of the system as a whole, where the system says something else."""
     for part in parts:
-        theirs = _implied_dependencies(part)
+        theirs = _implied_dependencies(part.tree)
         ours = _implied_dependencies(own)
         if theirs is None or theirs.value is (ours.value if ours is not None else True):
             continue

@@ -284,3 +284,13 @@ def test_no_link_leads_out(tmp_path: Path) -> None:
         "'loop.yaml' is outside the project",
         "'\\0' does not exist",
     ]
+
+
+def test_a_file_that_is_included_twice_under_the_same_names(tmp_path: Path) -> None:
+    twice = "camera.yaml\n  - {file: camera.yaml, namespace: left}"
+    [finding] = [
+        item for item in included(tmp_path, twice).diagnostics if item.rule.name not in QUIET
+    ]
+    assert (str(finding.primary), finding.rule.name) == ("whole.yaml:4:12", "duplicate-node-name")
+    by_name = "camera.yaml, prefix: a_}\n  - {file: camera.yaml, prefix: b_}"
+    system_of(included(tmp_path, "{file: " + by_name))
