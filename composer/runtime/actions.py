@@ -11,8 +11,19 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
+from action_msgs.msg import GoalInfo
+from action_msgs.srv import CancelGoal
 from rclpy.action.client import ActionClient
-from rclpy.action.server import ActionServer, CancelResponse, GoalResponse
+from rclpy.action.server import (
+    ActionServer,
+    CancelResponse,
+    GoalEvent,
+    GoalResponse,
+    RCLError,
+    ServerGoalHandle,
+)
+from rclpy.task import Future as RclpyFuture
+from unique_identifier_msgs.msg import UUID
 
 from composer.runtime import readiness
 from composer.runtime.readiness import Announcement, Handle, Signal
@@ -193,3 +204,63 @@ def _contained(
             return fail(error, argument)
 
     return call_and_await if inspect.iscoroutinefunction(callback) else call
+
+
+async def take_goal(server: Any, goal_id: UUID, goal: Any, tell: Callable[[bool], None]) -> None:
+    """Take a goal that did not come by DDS; ``tell`` is told first whether it is accepted.
+
+    As ``ActionServer._execute_goal_request`` does, but for the answer.
+    """
+    response = server._goal_callback(goal)
+    if inspect.isawaitable(response):
+        response = await response
+    if response is not GoalResponse.ACCEPT:
+        tell(False)
+        return
+    info = GoalInfo(goal_id=goal_id, stamp=server._node.get_clock().now().to_msg())
+    with server._lock:
+        handle = ServerGoalHandle(server, info, goal)
+    identity = bytes(goal_id.uuid)
+    server._goal_handles[identity] = handle
+    server._result_futures[identity] = RclpyFuture()
+    server.add_future(server._result_futures[identity])
+    tell(True)
+    server._handle.publish_status()
+    accepted = server._handle_accepted_callback(handle)
+    if inspect.isawaitable(accepted):
+        await accepted
+
+
+async def cancel_goal(server: Any, goal_id: UUID) -> Any:
+    """Ask for the end of a goal otherwise than by DDS; return the response, as by DDS."""
+    asked = CancelGoal.Request(goal_info=GoalInfo(goal_id=goal_id))
+    with server._lock:
+        response = server._handle.process_cancel_request(asked, CancelGoal.Response)
+    found, response.goals_canceling = response.goals_canceling, []
+    for info in found:
+        handle = server._goal_handles.get(bytes(info.goal_id.uuid))
+        if handle is not None and await _agrees(server, handle):
+            response.goals_canceling.append(info)
+    return response
+
+
+async def _agrees(server: Any, handle: ServerGoalHandle) -> bool:
+    response = server._cancel_callback(handle)
+    if inspect.isawaitable(response):
+        response = await response
+    if response is not CancelResponse.ACCEPT:
+        return False
+    try:
+        handle._update_state(GoalEvent.CANCEL_GOAL)
+    except RCLError:
+        return False  # it has ended just now
+    return True
+
+
+def when_ended(server: Any, identity: bytes, tell: Callable[[Any], None]) -> None:
+    """Have ``tell`` called with the response to a request for the goal's result, as by DDS."""
+    future = server._result_futures.get(identity)
+    if future is None:  # ended long ago
+        tell(server.action_type.Impl.GetResultService.Response())
+    else:
+        future.add_done_callback(lambda done: tell(done.result()))

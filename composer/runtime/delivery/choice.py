@@ -1,4 +1,4 @@
-"""Which topics and services stay in the process: decided once, from the model alone."""
+"""Which topics, services and actions stay in the process: decided once, from the model alone."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def channel_of(port: Port) -> ChannelKey:
 
 
 def shared_channels(system: System) -> Mapping[ChannelKey, str | None]:
-    """Return the topics and services with ports at both ends, and why DDS has to do, if so.
+    """Return what has ports at both ends, and why DDS has to do, where it has to.
 
     A subscription ignores all of its process's DDS publications or none, so what one port of a
     topic cannot do, the topic does not do.
@@ -36,19 +36,19 @@ def shared_channels(system: System) -> Mapping[ChannelKey, str | None]:
     return {
         (channel.kind, channel.name): _objection(channel, system.delivery)
         for channel in channels(system.nodes)
-        if channel.kind is not ChannelKind.ACTION and channel.sources and channel.sinks
+        if channel.sources and channel.sinks
     }
 
 
 def _objection(channel: Channel, unless_said: Delivery) -> str | None:
     if any((end.port.delivery or unless_said) is Delivery.DDS for end in channel.ends):
         return "'delivery: dds' says so"
-    if channel.kind is ChannelKind.SERVICE:
-        return _objection_to_service(channel)
-    return _objection_to_topic(channel)
+    if channel.kind is ChannelKind.TOPIC:
+        return _objection_to_topic(channel)
+    return _objection_to_server(channel)
 
 
-def _objection_to_service(channel: Channel) -> str | None:
+def _objection_to_server(channel: Channel) -> str | None:
     if len(channel.sources) > 1:
         return "it has several servers"
     server = channel.sources[0].port

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
 from composer.model import ChannelKind, Port
+from composer.runtime.delivery.action import LocalActionServer
 from composer.runtime.delivery.choice import ChannelKey, channel_of
 from composer.runtime.delivery.own_publications import ignore_own_publications, why_not_ignored
 from composer.runtime.delivery.queue import Queue
 from composer.runtime.delivery.server import Server
 from composer.runtime.delivery.topic import Inlet, Outlet, Topic
 
+S = TypeVar("S")
+
 Leave = Callable[[], None]
 
 
 class Delivery:
-    """The topics and services of one system that stay in the process.
+    """The topics, services and actions of one system that stay in the process.
 
     Ports join with their DDS endpoint, which they have all the same, and leave before they destroy
     it: own endpoints that have matched are known at any time, so the others are outsiders.
@@ -33,6 +36,7 @@ class Delivery:
         self._objections = dict(shared)
         self._topics: dict[ChannelKey, Topic] = {}
         self._servers: dict[ChannelKey, Server] = {}
+        self._action_servers: dict[ChannelKey, LocalActionServer] = {}
         for key in [key for key, objection in shared.items() if objection is None]:
             if key[0] is not ChannelKind.TOPIC:
                 continue
@@ -69,19 +73,31 @@ class Delivery:
 
     def add_server(self, port: Port, server: Server) -> Leave:
         """Let clients of the process find ``server``; return what ends that."""
-        key = channel_of(port)
-        if key not in self._objections or self._objections[key] is not None:
-            return _nothing
-        self._servers[key] = server
-        return lambda: self._forget(key, server)
+        return self._add(self._servers, port, server)
 
     def server(self, port: Port) -> Server | None:
         """Return the server in the process that the client port reaches now, if there is one."""
         return self._servers.get(channel_of(port))
 
-    def _forget(self, key: ChannelKey, server: Server) -> None:
-        if self._servers.get(key) is server:
-            del self._servers[key]
+    def add_action_server(self, port: Port, server: LocalActionServer) -> Leave:
+        """Let action clients of the process find ``server``; return what ends that."""
+        return self._add(self._action_servers, port, server)
+
+    def action_server(self, port: Port) -> LocalActionServer | None:
+        """Return the server in the process that the action client port reaches now, if any."""
+        return self._action_servers.get(channel_of(port))
+
+    def _add(self, servers: dict[ChannelKey, S], port: Port, server: S) -> Leave:
+        key = channel_of(port)
+        if key not in self._objections or self._objections[key] is not None:
+            return _nothing
+        servers[key] = server
+
+        def leave() -> None:
+            if servers.get(key) is server:
+                del servers[key]
+
+        return leave
 
 
 def _nothing() -> None:

@@ -65,6 +65,7 @@ class ActionClientPort:
 
     def __init__(self, core: Core, port: Port) -> None:
         self._core = core
+        self._port = port
         self._name = port.name.value
         self._timeout_ms = DEFAULT_TIMEOUT_MS if port.timeout_ms is None else port.timeout_ms.value
         limit = port.result_timeout_ms
@@ -154,12 +155,9 @@ class ActionClientPort:
     ) -> SentGoal:
         try:
             waiting = Waiting(self._core, self._what, timeout_ms)
-            await waiting.until_there(self._client.server_is_ready)
+            await waiting.until_there(self._has_server)
             self._core.statistics.calls += 1
-            sending = self._client.send_goal_async(
-                goal, feedback_callback=partial(self._on_feedback, goal, on_feedback)
-            )
-            handle = await waiting.until_done(wrap_rclpy_future(sending))
+            handle = await waiting.until_done(self._ask(goal, on_feedback))
             if not handle.accepted:
                 raise GoalRejected(f"{self._what} did not take the goal")
         except CallError as error:
@@ -169,6 +167,20 @@ class ActionClientPort:
         ended = self._core.spawn(self._end(goal, handle))
         ended.add_done_callback(lambda done: done.exception())  # nobody has to want the result
         return SentGoal(self, handle, ended)
+
+    def _has_server(self) -> bool:
+        there = self._core.delivery.action_server(self._port) is not None
+        return there or self._client.server_is_ready()
+
+    def _ask(self, goal: Any, on_feedback: OnFeedback | None) -> Future[Any]:
+        take = partial(self._on_feedback, goal, on_feedback)
+        server = self._core.delivery.action_server(self._port)
+        if server is None:
+            return wrap_rclpy_future(
+                self._client.send_goal_async(goal, lambda message: take(message.feedback))
+            )
+        call_soon = self._core.loop.call_soon
+        return server.send_goal(goal, lambda feedback: call_soon(partial(take, feedback)))
 
     async def _end(self, goal: Any, handle: Any) -> Ended:
         try:
@@ -198,9 +210,9 @@ class ActionClientPort:
             if Event.FAILURE not in self._reactions:
                 self._core.faults.note(f"action client '{self._name}'", str(error))
 
-    def _on_feedback(self, goal: Any, on_feedback: OnFeedback | None, message: Any) -> None:
+    def _on_feedback(self, goal: Any, on_feedback: OnFeedback | None, feedback: Any) -> None:
         if self._core.gate.incoming:
-            self._feedback.put((goal, on_feedback, message.feedback))
+            self._feedback.put((goal, on_feedback, feedback))
 
     def _take_feedback(
         self, item: tuple[Any, OnFeedback | None, Any]

@@ -11,6 +11,7 @@ from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, Serv
 from composer.behavior import CallCancelled
 from composer.model import FeedbackSteps, Port
 from composer.runtime.core import Core
+from composer.runtime.delivery.action import LocalActionServer
 from composer.runtime.line import Line
 from composer.runtime.messages import Build, compile_message, interface_class
 from composer.runtime.ports.goal import RunningGoal
@@ -76,6 +77,8 @@ class ActionServerPort:
             cancel_service_qos_profile=profile,
         )
         core.loop.add_action_server(self._server)
+        self._local = LocalActionServer(port, self._server, core.loop.run_task)
+        self._leave = core.delivery.add_action_server(port, self._local)
 
     def activate(self) -> None:
         """Do nothing: goals get in as soon as the gate is open."""
@@ -98,6 +101,7 @@ class ActionServerPort:
 
     def destroy(self) -> None:
         """End what is left and leave."""
+        self._leave()
         for goal in tuple(self._goals.values()):
             self._force(goal)
         self._core.loop.remove(self._server)
@@ -133,7 +137,7 @@ class ActionServerPort:
         return None if self._core.gate.incoming else self._core.gate.refusal
 
     def _take(self, handle: ServerGoalHandle) -> None:
-        goal = RunningGoal(handle)
+        goal = RunningGoal(handle, self._local.give_feedback)
         self._core.statistics.calls += 1
         self._goals[goal.identity] = goal
         self._line.put(goal)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from action_msgs.msg import GoalStatus
@@ -17,8 +18,12 @@ class RunningGoal:
     too, because it leaves *active* or because its handler says so.
     """
 
-    def __init__(self, handle: ServerGoalHandle) -> None:
+    def __init__(
+        self, handle: ServerGoalHandle, give_feedback: Callable[[bytes, Any], None]
+    ) -> None:
+        """``give_feedback`` takes the goal's identity, and feedback for who is in the process."""
         self._handle = handle
+        self._give_feedback = give_feedback
         self._leaving = False
         self.task: Future[Any] | None = None
         self.ended: Future[None] = Future()
@@ -61,6 +66,7 @@ class RunningGoal:
         """Send feedback to the client. Raises TypeError when it is not the action's Feedback."""
         if self.is_open:
             self._handle.publish_feedback(feedback)
+            self._give_feedback(self.identity, feedback)
 
     def succeed(self) -> None:
         """End the goal as succeeded."""
