@@ -6,7 +6,9 @@ class decorator, ``__getattr__``) is said to be unknown, and nobody may then cla
 is missing.
 """
 
+from composer.behavior_source.bodies import Call
 from composer.behavior_source.finding import BehaviorSource, find_behavior
+from composer.behavior_source.publishing import published_port
 from composer.behavior_source.syntax import Method
 
-__all__ = ["BehaviorSource", "Method", "find_behavior"]
+__all__ = ["BehaviorSource", "Call", "Method", "find_behavior", "published_port"]

@@ -5,19 +5,16 @@ from __future__ import annotations
 import ast
 import re
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
+from composer.behavior_source.bodies import Call, Function, dotted, imported_names, read_body
 from composer.behavior_source.modules import Unreadable, read_text
+from composer.behavior_source.places import start_of
 from composer.behavior_source.publishing import Publishing, publishing_of
 from composer.source import SourceFile, Span
-
-#: Columns are not counted exactly in a line that nobody can read: it costs its square.
-_LONGEST_LINE = 10_000
-
-Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +23,7 @@ class Method:
 
     ``arguments`` are the names that can be given by position, without ``self``; the last
     ``optional`` of them have defaults. ``known`` is false when a decorator or an assignment hides
-    the signature. ``publishing`` is what it publishes to.
+    the signature. ``calls`` is what it calls, ``publishing`` what it publishes to.
     """
 
     name: str
@@ -37,6 +34,7 @@ class Method:
     keywords: tuple[str, ...] = ()  # keyword-only arguments without a default
     is_async: bool = False
     known: bool = True
+    calls: tuple[Call, ...] = field(default=(), compare=False)
     publishing: Publishing = field(default_factory=Publishing)
 
     def accepts(self, count: int) -> bool:
@@ -95,11 +93,12 @@ def read_module(path: Path, shown: str) -> Module:
 def _read_module(path: Path, shown: str, _changed_ns: int, _bytes: int) -> Module:
     source = SourceFile(shown, read_text(path))
     statements = tuple(_top_level(_parse(source.text)))
+    names = dict(_imported_names(statements))
     classes = (item for item in statements if isinstance(item, ast.ClassDef))
     imports = dict(_imports(statements))
     return Module(
         path=path,
-        classes={item.name: _class(item, source) for item in classes},
+        classes={item.name: _class(item, names, source) for item in classes},
         imports=imports,
         assigned=frozenset(name.id for item in statements for name in _assigned(item)),
         dynamic="*" in imports or any(_is_getattr(item) for item in statements),
@@ -144,9 +143,17 @@ def _imports(statements: Iterable[ast.stmt]) -> Iterator[tuple[str, Import]]:
                 yield bound, Import(alias.name, "")
 
 
-def _class(node: ast.ClassDef, source: SourceFile) -> Class:
+def _imported_names(statements: Iterable[ast.stmt]) -> Iterator[tuple[str, str]]:
+    for statement in statements:
+        if isinstance(statement, ast.Import | ast.ImportFrom):
+            yield from imported_names(statement)
+
+
+def _class(node: ast.ClassDef, names: Mapping[str, str], source: SourceFile) -> Class:
     statements = tuple(_top_level(node.body))
-    methods = {method.name: method for item in statements for method in _methods(item, source)}
+    methods = {
+        method.name: method for item in statements for method in _methods(item, names, source)
+    }
     dynamic = bool(node.decorator_list or node.keywords) or "__getattr__" in methods
     return Class(
         node.name,
@@ -157,12 +164,12 @@ def _class(node: ast.ClassDef, source: SourceFile) -> Class:
     )
 
 
-def _methods(statement: ast.stmt, source: SourceFile) -> Iterator[Method]:
+def _methods(statement: ast.stmt, names: Mapping[str, str], source: SourceFile) -> Iterator[Method]:
     if isinstance(statement, Function):
-        yield _method(statement, source)
+        yield _method(statement, names, source)
         return
     for target in _assigned(statement):
-        yield Method(target.id, _span(target, len(target.id), source), known=False)
+        yield Method(target.id, start_of(target, len(target.id), source), known=False)
 
 
 def _assigned(statement: ast.stmt) -> Iterator[ast.Name]:
@@ -179,7 +186,8 @@ def _is_getattr(statement: ast.stmt) -> bool:
     return isinstance(statement, Function) and statement.name == "__getattr__"
 
 
-def _method(node: Function, source: SourceFile) -> Method:
+def _method(node: Function, names: Mapping[str, str], source: SourceFile) -> Method:
+    body = read_body(node, names, source)
     decorators = {_dotted(decorator) for decorator in node.decorator_list}
     positional = [item.arg for item in (*node.args.posonlyargs, *node.args.args)]
     static = "staticmethod" in decorators
@@ -196,7 +204,8 @@ def _method(node: Function, source: SourceFile) -> Method:
         ),
         is_async=isinstance(node, ast.AsyncFunctionDef),
         known=decorators <= _TRANSPARENT and bool(positional or static),
-        publishing=publishing_of(node),
+        calls=body.calls,
+        publishing=publishing_of(node, body),
     )
 
 
@@ -205,28 +214,11 @@ _TRANSPARENT = frozenset({"staticmethod", "classmethod", "override", "typing.ove
 
 def _dotted(node: ast.expr) -> str:
     """Return a dotted name as written; the subscript of ``Base[T]`` left out; "" for the rest."""
-    if isinstance(node, ast.Subscript):
-        node = node.value
-    parts = []
-    while isinstance(node, ast.Attribute):
-        parts.append(node.attr)
-        node = node.value
-    if not isinstance(node, ast.Name):
-        return ""
-    return ".".join((node.id, *reversed(parts)))
+    return dotted(node.value if isinstance(node, ast.Subscript) else node)
 
 
 def _name_span(node: Function | ast.ClassDef, keyword: str, source: SourceFile) -> Span:
     """Return the place of the name behind ``def`` or ``class``."""
-    span = _span(node, len(node.name), source)
+    span = start_of(node, len(node.name), source)
     found = re.search(rf"{keyword}\s+({re.escape(node.name)})\b", source.line(span.line))
     return Span(source, span.line, found.start(1) + 1, span.length) if found else span
-
-
-def _span(node: ast.stmt | ast.expr, length: int, source: SourceFile) -> Span:
-    """Return a place in characters; Python counts columns in UTF-8 bytes."""
-    line = source.line(node.lineno)
-    column = node.col_offset
-    if not line.isascii() and len(line) <= _LONGEST_LINE:
-        column = len(line.encode()[:column].decode(errors="replace"))
-    return Span(source, node.lineno, column + 1, length)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from composer.behavior_source import BehaviorSource
+from composer.behavior_source import BehaviorSource, Call
 from composer.checks.behaviors import GENERAL_HANDLERS, behaviors, handlers
 from composer.checks.context import Context
-from composer.checks.python_calls import Call, calls_of
+from composer.checks.python_calls import calls_of
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.source import Span
 

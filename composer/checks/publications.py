@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from composer.behavior_source import BehaviorSource
+from composer.behavior_source import BehaviorSource, Call, published_port
 from composer.checks.behaviors import GENERAL_HANDLERS, behaviors, handlers
 from composer.checks.context import Context
-from composer.checks.python_calls import Call, calls_of
+from composer.checks.python_calls import calls_of, handed_on
 from composer.model import Node, Port, PortKind, Reaction, Timer
 
-_PUBLISH = re.compile(r"self\.publishers\.(?P<port>\w+)\.publish")
 _ENTRIES = ("on_", "accept_")
 
 
@@ -93,7 +91,7 @@ def _published_by_method(source: BehaviorSource) -> Mapping[str, frozenset[str]]
     """Return the publishers that the methods of a behaviour use.
 
     A method that handlers lead to is not listed on its own. What a function within a method
-    publishes is listed under no name: it may run at any time.
+    publishes, or who got hold of a publisher, is listed under no name: it may run at any time.
     """
     calls = {method.name: tuple(calls_of(source, method)) for method in source.methods}
     handled = {
@@ -109,10 +107,11 @@ def _published_by_method(source: BehaviorSource) -> Mapping[str, frozenset[str]]
         if name.startswith(_ENTRIES) or name not in handled
     }
     deferred = _ports_in(call for found in calls.values() for call in found if call.deferred)
-    return {name: ports for name, ports in {**direct, "": deferred}.items() if ports}
+    whenever = deferred | handed_on(source)
+    return {name: ports for name, ports in {**direct, "": whenever}.items() if ports}
 
 
 def _ports_in(calls: Iterable[Call]) -> frozenset[str]:
     """Return the ports of calls such as ``self.publishers.status.publish``."""
-    matches = (_PUBLISH.fullmatch(call.name) for call in calls)
-    return frozenset(found["port"] for found in matches if found is not None)
+    found = (published_port(call.name) for call in calls)
+    return frozenset(port for port in found if port is not None)

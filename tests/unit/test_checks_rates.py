@@ -93,6 +93,9 @@ PUBLISH = "self.publishers.chatter.publish(None)"
         ({"on_reset": f"{PUBLISH}; return response"}, None),
         ({"helper": PUBLISH}, None),
         ({"on_fast": f"send = lambda: {PUBLISH}"}, None),
+        ({"on_fast": "send = self.publishers.chatter.publish; send(None)"}, 50.0),
+        ({"on_slow": "out = self.publishers.chatter; self.log.info('hello'); out.publish(1)"}, 1.0),
+        ({"on_configure": "self.send = self.publishers.chatter.publish"}, None),
     ],
 )
 def test_behaviours_are_read_for_what_they_publish(

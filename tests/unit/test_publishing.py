@@ -8,8 +8,10 @@ from textwrap import dedent, indent
 
 import pytest
 
+from composer.behavior_source.bodies import read_body
 from composer.behavior_source.publishing import Publishing, publishing_of
 from composer.graph.rates import publishing_rates_hz
+from composer.source import SourceFile
 from tests.unit.resolving import system_of
 
 
@@ -17,7 +19,7 @@ def publishing(body: str) -> Publishing:
     text = f"def on_tick(self):\n{indent(dedent(body), '    ')}"
     (function,) = ast.parse(text).body
     assert isinstance(function, ast.FunctionDef)
-    return publishing_of(function)
+    return publishing_of(function, read_body(function, {}, SourceFile("a.py", text)))
 
 
 @pytest.mark.parametrize(
@@ -26,6 +28,9 @@ def publishing(body: str) -> Publishing:
         "self.publishers.out.publish(x)",
         "x = 1\nif x:\n    x = 2\nself.publishers.out.publish(x)",
         "for x in y:\n    z()\nself.publishers.out.publish(x)\nreturn",
+        "publish = self.publishers.out.publish\npublish(x)",
+        "out = self.publishers.out\nout.publish(x)",
+        "publishers = self.publishers\nout = publishers.out\nsend = out.publish\nsend(x)",
     ],
 )
 def test_a_statement_that_is_always_reached_publishes_each_time(body: str) -> None:
@@ -40,11 +45,26 @@ def test_a_statement_that_is_always_reached_publishes_each_time(body: str) -> No
         "for x in y:\n    self.publishers.out.publish(x)",
         "assert x\nself.publishers.out.publish(x)",
         "self.publishers.out.publish(x)\nself.publishers.out.publish(x)",
-        "send(self.publishers.out)",
+        "out = self.publishers.out\nif x:\n    out.publish(x)",
+        "self.publishers.out.topic",
     ],
 )
 def test_what_depends_on_something_is_only_named(body: str) -> None:
     assert publishing(body) == Publishing((), ("out",))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "send(self.publishers.out)",
+        "self.send = self.publishers.out.publish",
+        "out = self.publishers.out\nsend(out)",
+        "out = self.publishers.out\nout = other\nout.publish(x)",
+        "def send(out=self.publishers.out):\n    out.publish(x)",
+    ],
+)
+def test_what_is_kept_or_given_away_may_be_used_by_anybody(body: str) -> None:
+    assert publishing(body) == Publishing((), ("out",), ("out",))
 
 
 @pytest.mark.parametrize("body", ["out.publish(x)", "self.out.publish(x)", "self.publishers"])
