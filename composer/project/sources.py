@@ -33,18 +33,20 @@ class Written:
 
 def find_settings(folder: Path) -> Written | None:
     """Return the settings of the nearest of ``folder`` and the folders above that has any."""
-    for root in (folder, *folder.parents):
-        own, table = _stamp(root / SETTINGS_FILE), _stamp(root / PYPROJECT_FILE)
-        written = _written(root, own, table) if own or table else None
-        if written is not None:
+    # Asked of every file, and for all folders above it: a Path for each is what takes time.
+    root = str(folder)
+    while True:
+        own, table = _stamp(f"{root}/{SETTINGS_FILE}"), _stamp(f"{root}/{PYPROJECT_FILE}")
+        written = _written(root or "/", own, table) if own or table else None
+        if written is not None or not root.strip("/"):
             return written
-    return None
+        root = root.rpartition("/")[0]
 
 
 _Stamp: TypeAlias = tuple[int, int]
 
 
-def _stamp(path: Path) -> _Stamp | None:
+def _stamp(path: str) -> _Stamp | None:
     """Return what changes when a file does; None where there is none."""
     try:
         status = os.lstat(path)
@@ -54,8 +56,9 @@ def _stamp(path: Path) -> _Stamp | None:
 
 
 @lru_cache(maxsize=32)
-def _written(root: Path, own_stamp: _Stamp | None, table_stamp: _Stamp | None) -> Written | None:
-    """Read what is in ``root``: once while it stays as it is, for every file of a project asks."""
+def _written(folder: str, own_stamp: _Stamp | None, table_stamp: _Stamp | None) -> Written | None:
+    """Read what is in ``folder``: once while it stays so, for every file of a project asks."""
+    root = Path(folder)
     own = _own_file(root) if own_stamp is not None else None
     table = _table(root) if table_stamp is not None else None
     if own is None or table is None:

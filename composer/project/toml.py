@@ -7,7 +7,6 @@ belongs to, each value behind its key: right for all that people write, and neve
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -31,6 +30,8 @@ def read_table(source: SourceFile) -> tuple[Mapping | None, list[Diagnostic]] | 
     header = _HEADER.search(source.text)
     if header is None:
         return None
+    import tomllib  # noqa: PLC0415 - most projects have no such table
+
     try:
         table = tomllib.loads(source.text)["tool"]["composer"]
     except tomllib.TOMLDecodeError as error:
