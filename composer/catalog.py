@@ -63,8 +63,9 @@ class Catalog:
         return next((path for path in candidates if path.is_file()), None)
 
     def _leads_out(self, path: Path) -> bool:
-        is_own = path.parent == nodes_folder().resolve()
-        return not is_own and path.is_symlink() and not self.project.holds(path)
+        if not path.is_symlink() or path.parent == nodes_folder().resolve():
+            return False
+        return not self.project.holds(path)
 
 
 def interface_folders(project: Project) -> tuple[Path, ...]:

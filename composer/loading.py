@@ -73,24 +73,35 @@ def load(
     ``node.parameter=value``; ``namespace`` takes the place of the system's own. ``interfaces`` may
     be given by who loads many files of one project: reading them is what takes time.
     """
-    tree, source, findings = read_document(path, shown)
-    if path.name == SETTINGS_FILE:  # what is wrong with it is told of its project
-        tree, findings = None, []
     overrides, found = read_overrides(parameter_overrides, namespace)
     known = _Known.of(_real_folder(path), interfaces)
-    return _load(tree, source, [*findings, *found], known, overrides)
+    return _load_file(path, shown, known, overrides, found)
 
 
 def load_files(paths: Iterable[Path]) -> list[Loading]:
     """Load the files, each called as it is given; files of one project share its interfaces."""
     shared: dict[tuple[Path, ...], Interfaces] = {}
+    by_folder: dict[Path, _Known] = {}
     loadings = []
     for path in paths:
-        folders = interface_folders(Project.at(_real_folder(path)))
-        if folders not in shared:
-            shared[folders] = Interfaces.load(folders)
-        loadings.append(load(path, shown=str(path), interfaces=shared[folders]))
+        folder = _real_folder(path)
+        if folder not in by_folder:
+            by_folder[folder] = _Known.shared(folder, shared)
+        loadings.append(_load_file(path, str(path), by_folder[folder]))
     return loadings
+
+
+def _load_file(
+    path: Path,
+    shown: str | None,
+    known: _Known,
+    overrides: Overrides | None = None,
+    found: Iterable[Diagnostic] = (),
+) -> Loading:
+    tree, source, findings = read_document(path, shown)
+    if path.name == SETTINGS_FILE:  # what is wrong with it is told of its project
+        tree, findings = None, []
+    return _load(tree, source, [*findings, *found], known, overrides or Overrides())
 
 
 def load_bytes(
@@ -167,6 +178,15 @@ class _Known:
         if known is None:
             known = Interfaces.load(interface_folders(project))
         return cls(folder, project, Catalog.of(project), known)
+
+    @classmethod
+    def shared(cls, folder: Path, shared: dict[tuple[Path, ...], Interfaces]) -> _Known:
+        """Return the same with the interfaces that other folders of the project have, too."""
+        project = Project.at(folder)
+        folders = interface_folders(project)
+        if folders not in shared:
+            shared[folders] = Interfaces.load(folders)
+        return cls(folder, project, Catalog.of(project), shared[folders])
 
 
 def _load(

@@ -59,7 +59,7 @@ def find_behavior(reference: BehaviorReference) -> BehaviorSource:
     """Read what ``reference`` names as far as syntax tells. Never raises, never imports."""
     reader = _Reader(reference.folder, Project.at(reference.folder))
     try:
-        path = module_file(reference.module, reference.folder)
+        path = module_file(reference.module, reference.folder, reader.project)
         module = reader.module(path) if path is not None else None
     except Unreadable as error:
         return BehaviorSource(reference, module_found=True, problem=str(error))
@@ -155,8 +155,9 @@ class _Reader:
 
     def _imported_file(self, module: Module, imported: Import) -> Path | None:
         if not imported.level:
-            beside = module_file(imported.module, module.path.parent)
-            return beside or module_file(imported.module, self.folder)
+            home = module.path.parent
+            beside = module_file(imported.module, home, Project.at(home))
+            return beside or module_file(imported.module, self.folder, self.project)
         path = relative_module_file(imported.module, imported.level, module.path)
         if path is None or (self.project.holds(module.path) and not self.project.holds(path)):
             return None

@@ -22,16 +22,15 @@ class Unreadable(Exception):
     """The file of a module cannot be read as Python; the text says why."""
 
 
-def module_file(module: str, folder: Path) -> Path | None:
+def module_file(module: str, folder: Path, project: Project) -> Path | None:
     """Return the file of ``module``, a dotted name, or None.
 
-    It is looked for beside the YAML file (``folder``), in the project's folders of node types, and
-    where Python would find it. Raises Unreadable for a link that leads out of the project.
+    It is looked for beside the YAML file (``folder``), in the folders of node types of its project,
+    and where Python would find it. Raises Unreadable for a link that leads out of the project.
     """
     parts = module.split(".")
     if not all(part.isidentifier() for part in parts):
         return None
-    project = Project.at(folder)
     for base in dict.fromkeys((folder, *project.node_folders)):
         found = _below(base, parts)
         if found is not None:

@@ -7,10 +7,10 @@ thing only, and stays silent where what it needs is itself wrong: that finding i
 
 from __future__ import annotations
 
-import pkgutil
 from collections.abc import Callable, Iterator
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 
 from composer.checks.context import Context, place
 from composer.checks.words import with_short_echoes
@@ -36,9 +36,8 @@ def run_checks(context: Context) -> list[Diagnostic]:
 @cache
 def all_checks() -> tuple[Check, ...]:
     """Return the ``check`` function of every rule, by the names of their modules."""
-    modules = (
-        import_module(f"{__name__}.{found.name}") for found in pkgutil.iter_modules(__path__)
-    )
+    names = sorted(path.stem for path in Path(__file__).parent.glob("[a-z]*.py"))
+    modules = (import_module(f"{__name__}.{name}") for name in names)
     return tuple(module.check for module in modules if hasattr(module, "check"))
 
 

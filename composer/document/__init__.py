@@ -7,6 +7,7 @@ back whenever there is one, also beside findings, so that later stages can say w
 from __future__ import annotations
 
 from contextlib import closing
+from functools import lru_cache
 from pathlib import Path
 
 import yaml
@@ -23,6 +24,8 @@ from composer.document.words import described
 from composer.source import SourceFile, Span
 from composer.tree import Mapping, Scalar, Tree
 
+#: What is larger is a system that nobody else reads.
+_KEPT_BYTES = 32_768
 _WHAT_A_FILE_IS = "begin with 'system: <name>' or 'node: <name>'"
 
 __all__ = ["parse_bytes", "parse_document", "read_document"]
@@ -46,11 +49,21 @@ def parse_bytes(data: bytes, shown: str) -> tuple[Mapping | None, SourceFile, li
     if len(data) > MAX_BYTES:
         source = SourceFile(shown)
         return None, source, [too_large(source)]
+    parse = _parsed_before if len(data) <= _KEPT_BYTES else _parsed
+    tree, source, findings = parse(data, shown)
+    return tree, source, list(findings)
+
+
+def _parsed(data: bytes, shown: str) -> tuple[Mapping | None, SourceFile, tuple[Diagnostic, ...]]:
     source, findings = decode(data, shown)
     if findings:
-        return None, source, findings
+        return None, source, tuple(findings)
     tree, findings = parse_document(source)
-    return tree, source, findings
+    return tree, source, tuple(findings)
+
+
+#: A node type is parsed once, and not for each system that uses it.
+_parsed_before = lru_cache(maxsize=64)(_parsed)
 
 
 def parse_document(source: SourceFile) -> tuple[Mapping | None, list[Diagnostic]]:

@@ -75,7 +75,7 @@ def test_a_fault_of_ours_is_told_shortly_and_with_a_traceback_only_on_request(
         raise RuntimeError("out of paper")
 
     monkeypatch.delenv("COMPOSE_DEBUG", raising=False)
-    monkeypatch.setattr("composer.loading.load", fail)
+    monkeypatch.setattr("composer.loading.load_files", fail)
     (tmp_path / "any.yaml").write_text("system: any\n")
     done = compose("validate", str(tmp_path / "any.yaml"))
     assert done.code == cli.INTERNAL
