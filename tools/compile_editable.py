@@ -18,7 +18,7 @@ class CompileEditable(BuildHookInterface):  # type: ignore[type-arg]
 
     PLUGIN_NAME = "custom"
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+    def initialize(self, version: str, _build_data: dict[str, Any]) -> None:
         """Do so for the version of a wheel that is called editable, and nothing for others."""
         if version == "editable":
             compileall.compile_dir(Path(self.root, "composer"), quiet=1)

@@ -32,9 +32,12 @@ class Publishing:
 def publishing_of(function: Function, body: Body) -> Publishing:
     """Return to what a method publishes, as far as its text tells."""
     named = [*body.names.values(), *(call.name for call in body.calls), *body.mentioned]
+    somewhere = tuple(dict.fromkeys(port for port, _ in _publishers(named)))
+    if not somewhere:
+        return Publishing()
     return Publishing(
         always=_once_each(_straight_on(function, body)),
-        somewhere=tuple(dict.fromkeys(port for port, _ in _publishers(named))),
+        somewhere=somewhere,
         handed_on=tuple(
             dict.fromkeys(
                 port for port, rest in _publishers(body.mentioned) if rest in {"", _PUBLISH}

@@ -19,7 +19,6 @@ from composer.document.events import excess, parse_events
 from composer.document.files import decode, read_bytes, too_large
 from composer.document.limits import MAX_BYTES
 from composer.document.rules import KEY_WITHOUT_VALUE, NOT_A_MAP
-from composer.document.syntax import explain
 from composer.document.words import described
 from composer.source import SourceFile, Span
 from composer.tree import Mapping, Scalar, Tree
@@ -84,6 +83,8 @@ def parse_document(source: SourceFile) -> tuple[Mapping | None, list[Diagnostic]
     except Stopped as stopped:
         return None, [*builder.findings, stopped.finding]
     except (yaml.YAMLError, ValueError) as error:
+        from composer.document.syntax import explain  # noqa: PLC0415 - for files that are wrong
+
         return None, _with_syntax(builder.findings, explain(error, source, builder.open_bracket))
     return _root(builder.root, builder.findings, source)
 

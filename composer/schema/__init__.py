@@ -8,17 +8,13 @@ from __future__ import annotations
 
 import json
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from composer.diagnostics import Diagnostic
 from composer.resources import schemas_folder
-from composer.schema.findings import findings_of
-from composer.schema.places import Places
+from composer.schema import rules  # noqa: F401 - they are known before the first is broken
 from composer.schema.shape import Test, shape
 from composer.tree import Mapping, plain
-
-if TYPE_CHECKING:
-    from jsonschema import Draft7Validator
 
 __all__ = ["KINDS", "REPORT", "SCHEMAS", "check_schema", "kind_of", "schema"]
 
@@ -27,8 +23,6 @@ KINDS = ("system", "node")
 SCHEMAS = (*KINDS, "project")
 #: What is written, not read: the report of ``compose validate --format json``.
 REPORT = "report"
-
-_DEFINITIONS = "#/definitions/"
 
 
 def kind_of(tree: Mapping) -> str | None:
@@ -44,7 +38,10 @@ def check_schema(tree: Mapping, kind: str) -> list[Diagnostic]:
     content = plain(tree)
     if _shape(kind)(content):
         return []
-    return findings_of(_validator(kind).iter_errors(content), Places(tree))
+    # What explains mistakes takes a tenth of a second to import, and most files are right.
+    from composer.schema.validation import explain  # noqa: PLC0415
+
+    return explain(content, tree, kind, schema(kind))
 
 
 def schema(name: str) -> dict[str, Any]:
@@ -59,40 +56,3 @@ def schema(name: str) -> dict[str, Any]:
 @cache
 def _shape(kind: str) -> Test:
     return shape(schema(kind))
-
-
-@cache
-def _validator(kind: str) -> Draft7Validator:
-    # Imported here, for it takes a tenth of a second, and most files are right.
-    from jsonschema import Draft7Validator  # noqa: PLC0415
-    from jsonschema.validators import extend  # noqa: PLC0415
-    from referencing import Registry  # noqa: PLC0415
-
-    whole = schema(kind)
-    definitions = whole.pop("definitions")
-    # 10.0 is an integer to JSON Schema, and not to ROS.
-    types = Draft7Validator.TYPE_CHECKER.redefine("integer", _is_integer)
-    strict = extend(Draft7Validator, type_checker=types)  # type: ignore[no-untyped-call]
-    # An empty registry fetches nothing; with references filled in there is nothing to fetch.
-    filled_in = _filled_in(whole, definitions)
-    validator: Draft7Validator = strict(filled_in, registry=Registry())
-    return validator
-
-
-def _is_integer(_: object, value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _filled_in(part: Any, definitions: dict[str, Any]) -> Any:
-    """Return ``part`` with definitions in place of references to them: that halves the time.
-
-    What stands beside a ``$ref`` describes it, and means nothing to a validator (draft-07).
-    """
-    match part:
-        case {"$ref": reference}:
-            return _filled_in(definitions[reference.removeprefix(_DEFINITIONS)], definitions)
-        case dict():
-            return {key: _filled_in(value, definitions) for key, value in part.items()}
-        case list():
-            return [_filled_in(item, definitions) for item in part]
-    return part
