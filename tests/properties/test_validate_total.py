@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from composer.assembly.canonical import canonical
+from composer.document.writing import write_document
+from composer.loading import findings_of, load
 from tests.properties.mutation import mutated
-from tests.properties.validating import SHIPPED, contents, judge
+from tests.properties.validating import INTERFACES, SHIPPED, contents, hold, judge
 
 CONTENTS = contents()
 TEXTS = [path.read_text(encoding="utf-8") for path in SHIPPED]
@@ -56,6 +61,50 @@ def test_files_with_mistakes(data: bytes) -> None:
 @example(b"system: a\nnodes: {b: {type: [x]}}\n")
 def test_files_with_pieces_out_of_place(data: bytes) -> None:
     judge(data)
+
+
+#: The first is included under two names; the second extended by the type of a node.
+WHOLE = """\
+system: whole
+include:
+  - {file: part.yaml, for_each: {i: 2}, prefix: "p${i}_", namespace: "p${i}"}
+nodes:
+  one: {type: child}
+  two: {lifecycle: {depends_on: ["*_*"]}}
+"""
+CHILD = """\
+node: child
+extends: base
+variables: {message_type: {default: std_msgs/msg/String}, qos: {default: state}}
+parameters: {rate_hz: 2.0}
+"""
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("project")
+    (folder / "nodes").mkdir()
+    (folder / "whole.yaml").write_text(WHOLE, encoding="utf-8")
+    (folder / "nodes" / "child.yaml").write_text(CHILD, encoding="utf-8")
+    return folder
+
+
+@settings(max_examples=60, deadline=None)
+@given(part=MISTAKEN | MISWRITTEN, base=MISTAKEN | MISWRITTEN)
+def test_mistakes_in_what_is_included_and_extended(project: Path, part: bytes, base: bytes) -> None:
+    (project / "part.yaml").write_bytes(part)
+    (project / "nodes" / "base.yaml").write_bytes(base)
+    names = ["whole.yaml", "part.yaml", "nodes/child.yaml"]
+    loadings = [load(project / name, shown=name, interfaces=INTERFACES) for name in names]
+    for loading in loadings:
+        hold(loading.diagnostics)
+        if loading.tree is not None:
+            write_document(canonical(loading.tree))
+    found = findings_of(loadings)
+    hold(found)
+    assert {finding.rule for loading in loadings for finding in loading.diagnostics} == {
+        finding.rule for finding in found if finding.rule.name != "unused-node-type"
+    }
 
 
 def test_shipped_files_are_clean() -> None:

@@ -58,12 +58,17 @@ def judge(data: bytes) -> list[Diagnostic]:
     with redirect_stdout(said), redirect_stderr(said):
         found = load_bytes(data, ROOT, shown="systems/it.yaml", interfaces=INTERFACES).diagnostics
     assert said.getvalue() == ""
+    hold(found)
+    return found
+
+
+def hold(found: list[Diagnostic]) -> None:
+    """Hold findings to what is promised of them: their places, their order, their reports."""
     assert found == sorted(found, key=lambda finding: finding.sort_key)
     for finding in found:
         _hold(finding)
     for render in RENDERERS:
         _hold_text(render(found))
-    return found
 
 
 def _hold(finding: Diagnostic) -> None:
