@@ -9,7 +9,7 @@ from composer.assembly.rules import INCLUDE_CONFLICT
 from composer.diagnostics import Diagnostic, Label, shown
 from composer.expand.rules import DUPLICATE_NODE_NAME
 from composer.source import Span
-from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, plain
+from composer.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, plain
 
 INCLUDE = "include"
 #: Sections of parts that become one, each with what its entries are called.
@@ -21,6 +21,11 @@ _MAPS = {
 }
 _LISTS = ("parameter_files", "connections")
 _SEVERAL = 2
+#: What holds for a system as a whole, and what that is where nothing is said.
+_OF_THE_WHOLE: dict[tuple[str, ...], ScalarValue] = {
+    ("lifecycle", "implied_dependencies"): True,
+    ("delivery",): "auto",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,17 +122,18 @@ def _conflict(section: str, entry: Entry, earlier: Entry) -> Iterator[Diagnostic
 def _misfits(own: Mapping, parts: list[Part]) -> Iterator[Diagnostic]:
     """Yield what parts say of the system as a whole, where the system says something else."""
     for part in parts:
-        theirs = _implied_dependencies(part.tree)
-        ours = _implied_dependencies(own)
-        if theirs is None or theirs.value is (ours.value if ours is not None else True):
-            continue
-        message = "an included file has other 'implied_dependencies' than the system"
-        labels = (Label(ours.span, "the system's"),) if ours is not None else ()
-        hint = "say the same in the including file's 'lifecycle'"
-        yield Diagnostic(INCLUDE_CONFLICT, message, theirs.span, labels, hint)
+        for path, usual in _OF_THE_WHOLE.items():
+            theirs, ours = _said(part.tree, path), _said(own, path)
+            if theirs is None or theirs.value == (usual if ours is None else ours.value):
+                continue
+            message = f"an included file has another '{path[-1]}' than the system"
+            labels = (Label(ours.span, "the system's"),) if ours is not None else ()
+            hint = f"say '{'.'.join(path)}' in the including file, or nowhere"
+            yield Diagnostic(INCLUDE_CONFLICT, message, theirs.span, labels, hint)
 
 
-def _implied_dependencies(tree: Mapping) -> Scalar | None:
-    lifecycle = tree.get("lifecycle")
-    said = lifecycle.get("implied_dependencies") if isinstance(lifecycle, Mapping) else None
-    return said if isinstance(said, Scalar) and isinstance(said.value, bool) else None
+def _said(tree: Mapping, path: tuple[str, ...]) -> Scalar | None:
+    found: Tree | None = tree
+    for name in path:
+        found = found.get(name) if isinstance(found, Mapping) else None
+    return found if isinstance(found, Scalar) and "${" not in str(found.value) else None

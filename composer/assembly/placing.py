@@ -1,7 +1,7 @@
 """An included system put in its place: below a namespace, its nodes with a prefix.
 
-What a file says about all of its nodes (namespace, lifecycle) is said of each of them, so that it
-does not become what the including system says.
+What a file says about all of its nodes (namespace, lifecycle, introspection) is said of each of
+them, so that it does not become what the including system says.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 _CHANNELS = frozenset({"topic", "service", "action"})
 _ENDS = frozenset({"from", "to", "server", "clients"})
+#: What stands in a file for all nodes, and in a node for that one.
+_OF_ALL_NODES = ("lifecycle", "introspection")
 #: What ``lifecycle`` says of the system as a whole, and not for each of its nodes.
 _OF_THE_SYSTEM = frozenset({"implied_dependencies"})
 
@@ -34,8 +36,7 @@ class Position:
 def placed(tree: Mapping, position: Position, includer: Path, folder: Path) -> Mapping:
     """Return an assembled system, whose file is in ``folder``, as a part of one in ``includer``."""
     names = _Names(position.prefix, _below(position.namespace, tree.get("namespace")))
-    lifecycle = tree.get("lifecycle")
-    defaults = _defaults(lifecycle) if isinstance(lifecycle, Mapping) else None
+    defaults = _defaults(tree)
     changes: dict[str, _Change] = {
         "nodes": lambda part: names.of_nodes(part, defaults),
         "connections": names.of_connections,
@@ -73,9 +74,19 @@ def _seen_from(includer: Path, folder: Path, tree: Tree) -> Tree:
             return tree
 
 
-def _defaults(lifecycle: Mapping) -> Mapping | None:
-    entries = tuple(entry for entry in lifecycle if entry.name not in _OF_THE_SYSTEM)
-    return Mapping(entries, lifecycle.span) if entries else None
+def _defaults(tree: Mapping) -> dict[str, Mapping]:
+    """Return what a file says of all its nodes, by the key that it has in a node."""
+    found = {}
+    for name in _OF_ALL_NODES:
+        said = tree.get(name)
+        entries = tuple(entry for entry in _entries(said) if entry.name not in _OF_THE_SYSTEM)
+        if said is not None and entries:
+            found[name] = Mapping(entries, said.span)
+    return found
+
+
+def _entries(tree: Tree | None) -> tuple[Entry, ...]:
+    return tree.entries if isinstance(tree, Mapping) else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +94,7 @@ class _Names:
     prefix: str
     namespace: Located[str] | None
 
-    def of_nodes(self, tree: Tree, defaults: Mapping | None) -> Tree:
+    def of_nodes(self, tree: Tree, defaults: dict[str, Mapping]) -> Tree:
         if not isinstance(tree, Mapping):
             return tree
         return Mapping(tuple(self._node(entry, defaults) for entry in tree), tree.span)
@@ -107,12 +118,13 @@ class _Names:
         )
         return Mapping(tuple(chains), tree.span)
 
-    def _node(self, entry: Entry, defaults: Mapping | None) -> Entry:
+    def _node(self, entry: Entry, defaults: dict[str, Mapping]) -> Entry:
         key = self._renamed_key(entry.key)
         if not isinstance(entry.value, Mapping):
             return Entry(key, entry.value)
         tree = _changed_map(entry.value, self._in_node)
-        said = [self._namespace_entry(entry.value, key.span), _lifecycle(tree, defaults, key.span)]
+        said = [_over(tree.entry(name), name, defaults[name], key.span) for name in defaults]
+        said.append(self._namespace_entry(entry.value, key.span))
         changes = {change.name: change for change in said if change is not None}
         kept = tuple(changes.pop(inner.name, inner) for inner in tree)
         return Entry(key, Mapping((*kept, *changes.values()), tree.span))
@@ -170,13 +182,10 @@ class _Names:
         return renamed if isinstance(renamed, Scalar) else key
 
 
-def _lifecycle(node: Mapping, defaults: Mapping | None, span: Span) -> Entry | None:
-    """Return a node's ``lifecycle`` laid over what its file says for all nodes."""
-    if defaults is None:
-        return None
-    own = node.entry("lifecycle")
+def _over(own: Entry | None, name: str, defaults: Mapping, span: Span) -> Entry | None:
+    """Return what a node says under ``name`` laid over what its file says for all nodes."""
     if own is None:
-        return Entry(Scalar("lifecycle", span, verbatim=False), defaults)
+        return Entry(Scalar(name, span, verbatim=False), defaults)
     if not isinstance(own.value, Mapping):
         return None
     return Entry(own.key, merged(defaults, own.value))

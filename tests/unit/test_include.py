@@ -16,6 +16,7 @@ variables: {rate_hz: 10, topic: image}
 qos_profiles: {frames: {extends: sensor_data, depth: 2}}
 executors: {vision: {kind: single_threaded}}
 lifecycle: {on_failure: restart, timeout_ms: 5000}
+introspection: {rosout: false}
 nodes:
   driver:
     executor: vision
@@ -76,13 +77,17 @@ def test_what_a_file_says_of_all_nodes_is_said_of_its_nodes_only(tmp_path: Path)
     rest = "nodes: {operator: {on_activate: {log: started}}}\n"
     system = system_of(included(tmp_path, "camera.yaml", rest))
     found = {
-        node.name.value: (node.supervision.timeout_ms, str(node.supervision.on_failure))
+        node.name.value: (
+            node.supervision.timeout_ms,
+            str(node.supervision.on_failure),
+            node.introspection.rosout,
+        )
         for node in system.nodes
     }
     assert found == {
-        "driver": (5000, "restart"),
-        "viewer": (100, "restart"),
-        "operator": (10000, "None"),
+        "driver": (5000, "restart", False),
+        "viewer": (100, "restart", False),
+        "operator": (10000, "None", True),
     }
     assert system.supervision.on_failure is None
 
@@ -170,7 +175,7 @@ file: camera.yaml
     assert gain is not None
     assert (str(gain.type), gain.default.value if gain.default else None) == ("double", 2.5)
     assert gain.maximum is not None
-    assert str(gain.maximum.span) == "camera.yaml:9:62"
+    assert str(gain.maximum.span) == "camera.yaml:10:62"
     assert driver.timers[0].period.unit.value == "period_ms"
     assert system.qos_profiles[0].qos.profile.depth == 7
     assert system.executors[0].kind.value == "events"
@@ -263,11 +268,16 @@ def test_parameter_files_are_those_beside_the_included_file(tmp_path: Path) -> N
     assert speed.value.value == 2.0
 
 
-def test_implied_dependencies_are_those_of_the_whole(tmp_path: Path) -> None:
+def test_what_holds_for_the_whole(tmp_path: Path) -> None:
     part = "system: part\nlifecycle: {implied_dependencies: false}\nnodes: {a: {}}\n"
     assert told(included(tmp_path, "part.yaml", part=part).diagnostics) == [
         "part.yaml:2:35 include-conflict"
     ]
+    direct = "system: part\ndelivery: dds\nnodes: {a: {}}\n"
+    assert told(included(tmp_path, "part.yaml", part=direct).diagnostics) == [
+        "part.yaml:2:11 include-conflict"
+    ]
+    assert told(included(tmp_path, "part.yaml", "delivery: dds\n", part=direct).diagnostics) == []
     same = "lifecycle: {implied_dependencies: false}\n"
     assert told(included(tmp_path, "part.yaml", same, part=part).diagnostics) == []
 
