@@ -11,7 +11,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from benchmarks import pipeline, start_up, systems, validation
+from benchmarks import pipeline, start_up, systems, targets, validation
 from benchmarks.figures import Row, as_json, table
 
 RESULTS = Path(__file__).parent / "results"
@@ -19,8 +19,14 @@ BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
     "commands": ("wall time of commands that start nothing", start_up.measure),
     "validation": ("growth of compose validate with the size of a system", validation.measure),
     "pipeline": ("CPU of systems/pipeline.yaml", pipeline.measure),
-    "chain": ("CPU per message, start-up and memory of N nodes", systems.chain),
+    "ring": ("CPU per message as fast as it goes, start-up and memory of N nodes", systems.ring),
+    "growth": ("CPU per message of 300 nodes against 10", systems.growth),
+    "streams": ("CPU per message at a rate, chains and stars, small and large", systems.streams),
+    "hops": ("latency from node to node", systems.hops),
     "timers": ("jitter of a timer", systems.timers),
+    "calls": ("services and actions", systems.calls),
+    "outside": ("DDS to another process", systems.outside),
+    "tracing": ("what the times of callbacks cost", systems.tracing),
 }
 
 
@@ -50,6 +56,7 @@ def _run(names: list[str], *, long: bool) -> None:
         found = measure(long=long)
         print(table(found), end="\n\n", flush=True)  # at once: an interrupted run tells this much
         rows += found
+    print(targets.table(rows), end="\n\n")
     print("Medians of the rounds; a ratio is ours / theirs of one round, below 1 is less for ours.")
     print(
         f"Load of the machine: {load_before:.1f} before, {os.getloadavg()[0]:.1f} after;", end=" "

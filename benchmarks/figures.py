@@ -66,12 +66,19 @@ def table(rows: Sequence[Row]) -> str:
     """Return the rows as aligned text, a ratio below 1 meaning that the composer needs less."""
     head = ("case", "unit", "ours", "against", "theirs", "ratio", "least - most", "rounds")
     lines = [head, *(_cells(row) for row in rows)]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(head))]
+    return aligned(lines, right=(2, 4, 5, 6, 7))
+
+
+def aligned(lines: Sequence[Sequence[str]], right: Sequence[int]) -> str:
+    """Return lines with their cells in columns, those of ``right`` aligned there."""
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join(
-        "  ".join(_align(cell, width, column) for column, (cell, width) in _columns(line, widths))
-        .rstrip()
+        "  ".join(
+            cell.rjust(width) if column in right else cell.ljust(width)
+            for column, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
         for line in lines
-    )  # fmt: skip
+    )
 
 
 def as_json(rows: Sequence[Row]) -> list[dict[str, Any]]:
@@ -105,11 +112,3 @@ def _cells(row: Row) -> tuple[str, ...]:
 
 def _figure(found: Spread | None) -> str:
     return "failed" if found is None else f"{found.median:.4g}"
-
-
-def _columns(line: Sequence[str], widths: Sequence[int]) -> Iterable[tuple[int, tuple[str, int]]]:
-    return enumerate(zip(line, widths, strict=True))
-
-
-def _align(cell: str, width: int, column: int) -> str:
-    return cell.ljust(width) if column in (0, 1, 3) else cell.rjust(width)

@@ -9,7 +9,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -49,14 +50,34 @@ def wall_time_s(*arguments: str, folder: Path) -> float:
     return time.perf_counter() - start_s
 
 
-def run_program(name: str, *arguments: str, timeout_s: float) -> dict[str, Any]:
-    """Run ``benchmarks.programs.<name>`` and return what it measured. Raises ProgramFailed."""
-    command = [sys.executable, "-m", f"benchmarks.programs.{name}", *arguments]
+@contextmanager
+def started(name: str, *arguments: str, variables: Mapping[str, str]) -> Iterator[None]:
+    """Let ``benchmarks.programs.<name>`` run for the length of the block."""
+    with subprocess.Popen(
+        _command(name, *arguments),
+        cwd=ROOT,
+        env=variables,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    ) as process:
+        try:
+            yield
+        finally:
+            process.kill()
+
+
+def run_program(
+    name: str, *arguments: str, timeout_s: float, variables: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """Run ``benchmarks.programs.<name>`` and return what it measured. Raises ProgramFailed.
+
+    ``variables`` is its environment; a ROS domain of its own unless given.
+    """
     try:
         done = subprocess.run(
-            command,
+            _command(name, *arguments),
             cwd=ROOT,
-            env=environment(),
+            env=environment() if variables is None else variables,
             capture_output=True,
             text=True,
             timeout=timeout_s,
@@ -70,3 +91,7 @@ def run_program(name: str, *arguments: str, timeout_s: float) -> dict[str, Any]:
             return result
     last = (done.stderr.strip().splitlines() or ["nothing on stderr"])[-1]
     raise ProgramFailed(f"exit code {done.returncode}: {last}")
+
+
+def _command(name: str, *arguments: str) -> list[str]:
+    return [sys.executable, "-m", f"benchmarks.programs.{name}", *arguments]

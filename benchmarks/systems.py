@@ -1,48 +1,28 @@
-"""Systems of N nodes, composed and by hand, in turn: messages, start-up, memory, timers."""
+"""Systems of N nodes, composed and by hand, in turn."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
 from benchmarks.figures import Row, percentile
-from benchmarks.processes import ProgramFailed, run_program
+from benchmarks.turns import (
+    COMPOSED,
+    EVENTS,
+    MULTI,
+    SINGLE,
+    UNTRACED,
+    Case,
+    Figure,
+    rows,
+    take_turns,
+)
 
-COMPOSED = "composed"
-SINGLE = "SingleThreadedExecutor"
-MULTI = "MultiThreadedExecutor"
-EVENTS = "EventsExecutor"
-
-Rounds = Mapping[str, Sequence[Mapping[str, Any] | None]]
-_PATIENCE_S = 60.0
-
-
-def take_turns(ways: Sequence[str], rounds: int, nodes: int, *arguments: str) -> Rounds:
-    """Run each way once a round and return what each measured; None where one gave no result.
-
-    Every other round goes backwards, so that nobody always runs first.
-    """
-    found: dict[str, list[Mapping[str, Any] | None]] = {way: [] for way in ways}
-    for turn in range(rounds):
-        for way in ways if turn % 2 == 0 else tuple(reversed(ways)):
-            found[way].append(_run(way, nodes, *arguments))
-    return found
+CPU = "CPU us/message"
 
 
-def rows(
-    case: str, unit: str, rounds: Rounds, figure: Callable[[Mapping[str, Any]], float | None]
-) -> list[Row]:
-    """Return a row for each way by hand."""
-    figures = {
-        way: tuple(None if result is None else figure(result) for result in results)
-        for way, results in rounds.items()
-    }
-    ours = figures.pop(COMPOSED)
-    return [Row(case, unit, way, ours, theirs) for way, theirs in figures.items()]
-
-
-def chain(*, long: bool) -> list[Row]:
+def ring(*, long: bool) -> list[Row]:
     """Measure one message on its way round N nodes, and how these start."""
     sizes, rounds, seconds = ((3, 10, 30, 100, 300), 7, 3.0) if long else ((10, 100), 3, 0.6)
     found: list[Row] = []
@@ -51,49 +31,143 @@ def chain(*, long: bool) -> list[Row]:
         ways = (
             (COMPOSED, SINGLE, MULTI, EVENTS) if long or nodes <= 10 else (COMPOSED, SINGLE, EVENTS)
         )
-        turns = take_turns(ways, rounds, nodes, "--seconds", str(seconds))
-        found += rows(f"chain, N={nodes}", "CPU us/message", turns, _cpu_us_per_message)
+        turns = take_turns(ways, Case("ring", nodes, seconds, rounds))
+        found += rows(f"ring, N={nodes}", CPU, turns, cpu_us)
         started = {way: turns[way] for way in (COMPOSED, SINGLE)}
         found += rows(f"start, N={nodes}", "s", started, lambda result: result["start_s"])
         found += rows(f"memory, N={nodes}", "MB", started, lambda result: result["memory_mb"])
     return found
 
 
-def timers(*, long: bool) -> list[Row]:
-    """Measure how far the time between two calls of a timer is from its period."""
-    sizes, rounds, seconds = ((10, 100), 7, 10.0) if long else ((10,), 3, 1.0)
+def growth(*, long: bool) -> list[Row]:
+    """Measure what a message costs the composer in a large system and in a small one."""
+    rounds, seconds = (7, 3.0) if long else (3, 0.6)
+    small, large = 10, 300
+    found: dict[int, list[float | None]] = {small: [], large: []}
+    for turn in range(rounds):
+        for nodes in (small, large) if turn % 2 == 0 else (large, small):
+            result = take_turns((COMPOSED,), Case("ring", nodes, seconds, 1))[COMPOSED][0]
+            found[nodes].append(None if result is None else cpu_us(result))
+    ours, theirs = tuple(found[large]), tuple(found[small])
+    return [Row(f"ring, N={large}", CPU, f"the composer, N={small}", ours, theirs)]
+
+
+def streams(*, long: bool) -> list[Row]:
+    """Measure messages that come at a rate, through chains and from the middle of stars."""
+    rounds, seconds = (7, 3.0) if long else (3, 1.0)
     found: list[Row] = []
-    for nodes in sizes:
-        for rate_hz in (100.0, 500.0):
-            ways = (COMPOSED, SINGLE, EVENTS) if long else (COMPOSED, SINGLE)
-            arguments = ("--seconds", str(seconds), "--timer-hz", str(rate_hz))
-            turns = take_turns(ways, rounds, nodes, *arguments)
-            for share in (0.5, 0.99):
-                case = f"timer {rate_hz:g} Hz p{share * 100:g}, N={nodes}"
-                figure = _jitter_us(rate_hz, share)
-                found += rows(case, "jitter us", turns, figure)
-            found += rows(
-                f"timer {rate_hz:g} Hz, N={nodes}", "% left out", turns, _left_out(rate_hz)
-            )
+    for shape, nodes, message in _streams(long=long):
+        rate_hz = 30.0 if message == "Image" else 100.0
+        case = Case(shape, nodes, seconds, rounds, rate_hz, message)
+        ways = (COMPOSED, SINGLE, EVENTS) if long and nodes <= 30 else (COMPOSED, EVENTS)
+        turns = take_turns(ways, case)
+        found += rows(f"{shape}, {message} {rate_hz:g} Hz, N={nodes}", CPU, turns, cpu_us)
+        found += rows(
+            f"{shape}, {message} {rate_hz:g} Hz, N={nodes}",
+            "% lost",
+            turns,
+            _lost(case),
+        )
     return found
 
 
-def _run(way: str, nodes: int, *arguments: str) -> Mapping[str, Any] | None:
-    program, executor = ("composed", "events") if way == COMPOSED else ("hand_written", way)
-    command = (program, executor, "--nodes", str(nodes), *arguments)
-    try:
-        return run_program(*command, timeout_s=_PATIENCE_S)
-    except ProgramFailed:
-        if way == COMPOSED:
-            raise  # ours has to work
-        return None
+def _streams(*, long: bool) -> list[tuple[str, int, str]]:
+    if not long:
+        few = [("chain", 10, "String"), ("chain", 100, "String"), ("chain", 10, "Image")]
+        return [*few, ("star", 10, "String")]
+    return [
+        (shape, nodes, message)
+        for message in ("String", "LaserScan", "Image")
+        for shape in ("chain", "star")
+        for nodes in (3, 10, 30, 100, 300)
+        if nodes <= 30 or message == "String"
+    ]
 
 
-def _cpu_us_per_message(result: Mapping[str, Any]) -> float | None:
+def hops(*, long: bool) -> list[Row]:
+    """Measure how long a message takes from one node to another, among N that are idle."""
+    sizes, rounds, seconds = ((10, 100), 7, 3.0) if long else ((100,), 3, 1.0)
+    rates_hz = (100.0, 500.0, 1000.0) if long else (1000.0,)
+    found: list[Row] = []
+    for nodes in sizes:
+        for rate_hz in rates_hz:
+            turns = take_turns((COMPOSED, EVENTS), Case("hop", nodes, seconds, rounds, rate_hz))
+            for share in (0.5, 0.99):
+                case = f"hop {rate_hz:g} Hz p{share * 100:g}, N={nodes}"
+                found += rows(case, "latency us", turns, _took_us(share))
+    return found
+
+
+def timers(*, long: bool) -> list[Row]:
+    """Measure how far the time between two calls of a timer is from its period."""
+    sizes, rounds, seconds = ((10, 100), 7, 10.0) if long else ((100,), 3, 1.0)
+    rates_hz = (100.0, 500.0, 1000.0) if long else (500.0,)
+    found: list[Row] = []
+    for nodes in sizes:
+        for rate_hz in rates_hz:
+            ways = (COMPOSED, SINGLE, EVENTS) if long else (COMPOSED, EVENTS)
+            turns = take_turns(ways, Case("timer", nodes, seconds, rounds, rate_hz))
+            for share in (0.5, 0.99):
+                case = f"timer {rate_hz:g} Hz p{share * 100:g}, N={nodes}"
+                found += rows(case, "jitter us", turns, _jitter_us(rate_hz, share))
+            name = f"timer {rate_hz:g} Hz, N={nodes}"
+            found += rows(name, "% left out", turns, _left_out(rate_hz))
+    return found
+
+
+def calls(*, long: bool) -> list[Row]:
+    """Measure calls and goals, each begun when the one before has ended."""
+    rounds, seconds = (7, 3.0) if long else (3, 0.6)
+    found: list[Row] = []
+    for shape in ("service", "action"):
+        for nodes in (2, 100) if long else (10,):
+            ways = (COMPOSED, SINGLE, EVENTS) if long and nodes <= 10 else (COMPOSED, EVENTS)
+            turns = take_turns(ways, Case(shape, nodes, seconds, rounds))
+            case = f"{shape}, N={nodes}"
+            found += rows(f"{case}, p50", "round trip us", turns, _took_us(0.5))
+            found += rows(case, "CPU us/call", turns, cpu_us)
+    return found
+
+
+def outside(*, long: bool) -> list[Row]:
+    """Measure messages between two processes, one in flight: the CPU of one of them."""
+    rounds, seconds = (7, 3.0) if long else (3, 1.0)
+    ways = (COMPOSED, SINGLE, EVENTS) if long else (COMPOSED, EVENTS)
+    turns = take_turns(ways, Case("ring", 2, seconds, rounds, apart=True))
+    return rows("DDS to another process", CPU, turns, cpu_us)
+
+
+def tracing(*, long: bool) -> list[Row]:
+    """Measure what it costs to take the times of callbacks."""
+    rounds, seconds = (9, 2.0) if long else (5, 0.6)
+    turns = take_turns((COMPOSED, UNTRACED), Case("ring", 10, seconds, rounds))
+    return rows("ring, N=10", CPU, turns, cpu_us)
+
+
+def cpu_us(result: Mapping[str, Any]) -> float | None:
+    """Return the CPU for each message; None when none was delivered."""
     return 1e6 * result["cpu_s"] / result["delivered"] if result["delivered"] else None
 
 
-def _jitter_us(rate_hz: float, share: float) -> Callable[[Mapping[str, Any]], float | None]:
+def _lost(case: Case) -> Figure:
+    """Return what tells the messages that did not come: CPU alone would not show them."""
+    expected_hz = case.rate_hz * (case.nodes - 1)
+
+    def figure(result: Mapping[str, Any]) -> float | None:
+        return 100.0 * max(0.0, 1.0 - result["delivered"] / (result["wall_s"] * expected_hz))
+
+    return figure
+
+
+def _took_us(share: float) -> Figure:
+    def figure(result: Mapping[str, Any]) -> float | None:
+        took_ns = result["took_ns"]
+        return percentile(took_ns, share) / 1000.0 if took_ns else None
+
+    return figure
+
+
+def _jitter_us(rate_hz: float, share: float) -> Figure:
     def figure(result: Mapping[str, Any]) -> float | None:
         ticks = result["ticks_ns"]
         gaps_ns = [after - before for before, after in pairwise(ticks)]
@@ -104,7 +178,7 @@ def _jitter_us(rate_hz: float, share: float) -> Callable[[Mapping[str, Any]], fl
     return figure
 
 
-def _left_out(rate_hz: float) -> Callable[[Mapping[str, Any]], float | None]:
+def _left_out(rate_hz: float) -> Figure:
     """Return what tells the calls that never came: jitter alone would not show them."""
 
     def figure(result: Mapping[str, Any]) -> float | None:

@@ -13,33 +13,32 @@ import yaml
 
 # What both sides import is imported before the clock starts.
 from benchmarks.programs import behaviors
-from benchmarks.programs.work import (
-    KICK_PERIOD_S,
-    Task,
-    hand_over,
-    measure,
-    task_from_arguments,
-    topic,
-)
+from benchmarks.programs.payloads import TYPES
+from benchmarks.programs.task import Place, Task, places, task_from_arguments
+from benchmarks.programs.work import KICK_PERIOD_S, hand_over, measure
 from composer.loading import load
 from composer.plan import bring_up, tear_down
 from composer.runtime.events import BroughtUp, Event
-from composer.runtime.host import Host
+from composer.runtime.host import Host, HostOptions
+
+_KICK = {"kick": {"period_ms": KICK_PERIOD_S * 1000.0}}
+_ASK = {"ask": {"type": "std_srvs/srv/Trigger", "service": "/ask"}}
+_GO = {"go": {"type": "composer_interfaces/action/Navigate", "action": "/go"}}
 
 
 def system_tree(task: Task) -> dict[str, Any]:
-    """Return the system file: a ring of relays, the first of which has a timer."""
-    nodes = {f"relay_{index}": _relay(task, index) for index in range(task.nodes)}
+    """Return the system file."""
     return {
-        "system": "ring",
+        "system": "measured",
         "executors": {"chosen": {"kind": task.executor}},
-        "nodes": nodes,
+        "nodes": {f"node_{place.index}": _node(task, place) for place in places(task)},
     }
 
 
 def main() -> None:
     """Bring the system up, measure, tell."""
     task = task_from_arguments()
+    behaviors.TASKS.append(task)
     up = threading.Event()
 
     def listen(event: Event) -> None:
@@ -47,14 +46,15 @@ def main() -> None:
             up.set()
 
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "ring.yaml")
+        path = Path(folder, "measured.yaml")
         path.write_text(yaml.safe_dump(system_tree(task), sort_keys=False), encoding="utf-8")
         started_s = time.perf_counter()
         loading = load(path)
         if loading.system is None or not loading.runnable:
             sys.exit("; ".join(str(finding) for finding in loading.diagnostics))
         system = loading.system
-        host = Host(system, bring_up(system), tear_down(system), report=listen)
+        options = HostOptions(tracing=task.tracing)
+        host = Host(system, bring_up(system), tear_down(system), options, report=listen)
         threading.Thread(target=host.run, daemon=True).start()
         if not up.wait(120.0):
             sys.exit("the system did not come up")
@@ -62,28 +62,37 @@ def main() -> None:
     hand_over(figures)
 
 
-def _relay(task: Task, index: int) -> dict[str, Any]:
-    relay: dict[str, Any] = {
-        "behavior": _name(behaviors.Relay),
+def _node(task: Task, place: Place) -> dict[str, Any]:
+    behavior, more = _part(task, place)
+    node: dict[str, Any] = {
+        "behavior": f"{behavior.__module__}:{behavior.__name__}",
         "executor": "chosen",
-        "subscriptions": {
-            "input": {"type": "std_msgs/msg/String", "topic": topic(index, task.nodes)}
-        },
-        "publishers": {
-            "output": {"type": "std_msgs/msg/String", "topic": topic(index + 1, task.nodes)}
-        },
     }
-    if index == 0 and task.timer_hz is None:
-        relay["behavior"] = _name(behaviors.Starter)
-        relay["timers"] = {"kick": {"period_ms": KICK_PERIOD_S * 1000.0}}
-    elif index == 0:
-        relay["behavior"] = _name(behaviors.Ticker)
-        relay["timers"] = {"tick": {"rate_hz": task.timer_hz}}
-    return relay
+    port = {"type": TYPES[task.message]}
+    if place.hears is not None and behavior is not behaviors.Source:
+        node["subscriptions"] = {"input": {**port, "topic": place.hears}}
+    if place.sends is not None:
+        node["publishers"] = {"output": {**port, "topic": place.sends}}
+    return node | more
 
 
-def _name(behavior: type[Any]) -> str:
-    return f"{behavior.__module__}:{behavior.__name__}"
+def _part(task: Task, place: Place) -> tuple[type[Any], dict[str, Any]]:
+    """Return the behaviour of a node, and what it has besides input and output."""
+    source = (behaviors.Source, {"timers": {"tick": {"rate_hz": task.rate_hz}}})
+    parts: dict[tuple[str, int], tuple[type[Any], dict[str, Any]]] = {
+        ("ring", 0): (behaviors.Starter, {"timers": _KICK}),
+        ("chain", 0): source,
+        ("star", 0): source,
+        ("hop", 0): source,
+        ("hop", 1): (behaviors.Meter, {}),
+        ("timer", 0): (behaviors.Ticker, {"timers": {"tick": {"rate_hz": task.rate_hz}}}),
+        ("service", 0): (behaviors.Asker, {"timers": _KICK, "clients": _ASK}),
+        ("service", 1): (behaviors.Answerer, {"services": _ASK}),
+        ("action", 0): (behaviors.Sender, {"timers": _KICK, "action_clients": _GO}),
+        ("action", 1): (behaviors.Worker, {"action_servers": _GO}),
+    }
+    passing = behaviors.Listener if place.sends is None else behaviors.Relay
+    return parts.get((task.shape, place.index), (passing, {}))
 
 
 if __name__ == "__main__":

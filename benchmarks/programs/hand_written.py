@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
+from typing import Any
 
 import rclpy
+from composer_interfaces.action import Navigate
+from rclpy.action import ActionClient, ActionServer
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
-from benchmarks.programs.work import (
-    COUNTS,
-    PAYLOAD,
-    Task,
-    hand_over,
-    measure,
-    needs_kick,
-    task_from_arguments,
-    topic,
-)
+from benchmarks.programs.payloads import CLASSES, age_ns, make
+from benchmarks.programs.task import Place, Task, places, task_from_arguments
+from benchmarks.programs.work import COUNTS, hand_over, measure, needs_kick
 
 THREADS = 2
 QUEUE_DEPTH = 10
@@ -33,38 +30,147 @@ EXECUTORS = {
 
 
 class Relay(LifecycleNode):
-    """Passes messages on."""
+    """Hears messages and passes them on, as its place says."""
 
-    def __init__(self, task: Task, index: int) -> None:
-        super().__init__(f"relay_{index}")
+    def __init__(self, task: Task, place: Place) -> None:
+        super().__init__(f"node_{place.index}")
         self.task = task
-        self.index = index
+        self.place = place
         self.seen = 0
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        nodes = self.task.nodes
-        self.output = self.create_lifecycle_publisher(
-            String, topic(self.index + 1, nodes), QUEUE_DEPTH
-        )
-        self.create_subscription(String, topic(self.index, nodes), self.on_input, QUEUE_DEPTH)
+        kind = CLASSES[self.task.message]
+        if self.place.sends is not None:
+            self.output = self.create_lifecycle_publisher(kind, self.place.sends, QUEUE_DEPTH)
+        if self.place.hears is not None and not self.is_source:
+            self.create_subscription(kind, self.place.hears, self.callback(), QUEUE_DEPTH)
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        if self.index == 0 and self.task.timer_hz is not None:
-            self.create_timer(1.0 / self.task.timer_hz, self.on_tick)
+        if self.place.index == 0 and self.task.is_timed:
+            tick = self.on_tick if self.task.shape == "timer" else self.send
+            self.create_timer(1.0 / self.task.rate_hz, tick)
         return super().on_activate(state)
 
-    def on_input(self, message: String) -> None:
+    @property
+    def is_source(self) -> bool:
+        return self.place.index == 0 and self.task.shape in ("chain", "star", "hop")
+
+    def callback(self) -> Callable[[Any], None]:
+        if not self.place.relays:
+            return self.on_aged_input
+        return self.on_last_input if self.place.sends is None else self.on_input
+
+    def on_input(self, message: Any) -> None:
         COUNTS.delivered += 1
         self.output.publish(message)
 
+    def on_last_input(self, message: Any) -> None:
+        COUNTS.delivered += 1
+
+    def on_aged_input(self, message: Any) -> None:
+        COUNTS.delivered += 1
+        COUNTS.took_ns.append(age_ns(message))
+
+    def send(self) -> None:
+        self.output.publish(make(self.task.message))
+
     def kick(self) -> None:
-        if self.task.timer_hz is None and needs_kick(self.seen):
-            self.output.publish(String(data=PAYLOAD))
+        if self.task.shape == "ring" and needs_kick(self.seen):
+            self.send()
         self.seen = COUNTS.delivered
 
     def on_tick(self) -> None:
         COUNTS.ticks_ns.append(time.monotonic_ns())
+
+
+class Asker(Relay):
+    """Calls a service, again and again."""
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.client = self.create_client(Trigger, "/ask")
+        self.is_under_way = False
+        return super().on_configure(state)
+
+    def kick(self) -> None:
+        if not self.is_under_way and self.client.service_is_ready():
+            self.is_under_way = True
+            self.ask()
+
+    def ask(self) -> None:
+        self.began_ns = time.monotonic_ns()
+        self.client.call_async(Trigger.Request()).add_done_callback(self.on_answer)
+
+    def on_answer(self, answer: Any) -> None:
+        COUNTS.took_ns.append(time.monotonic_ns() - self.began_ns)
+        COUNTS.delivered += 1
+        self.ask()
+
+
+class Answerer(Relay):
+    """Answers."""
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.create_service(Trigger, "/ask", self.on_ask)
+        return super().on_configure(state)
+
+    def on_ask(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = True
+        return response
+
+
+class Sender(Relay):
+    """Sends goals, again and again."""
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.client = ActionClient(self, Navigate, "/go")
+        self.is_under_way = False
+        return super().on_configure(state)
+
+    def kick(self) -> None:
+        if not self.is_under_way and self.client.server_is_ready():
+            self.is_under_way = True
+            self.go()
+
+    def go(self) -> None:
+        self.began_ns = time.monotonic_ns()
+        self.client.send_goal_async(Navigate.Goal()).add_done_callback(self.on_accepted)
+
+    def on_accepted(self, sending: Any) -> None:
+        sending.result().get_result_async().add_done_callback(self.on_result)
+
+    def on_result(self, result: Any) -> None:
+        COUNTS.took_ns.append(time.monotonic_ns() - self.began_ns)
+        COUNTS.delivered += 1
+        self.go()
+
+
+class Worker(Relay):
+    """Reaches goals."""
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.server = ActionServer(self, Navigate, "/go", self.on_go)
+        return super().on_configure(state)
+
+    def on_go(self, goal: Any) -> Navigate.Result:
+        goal.succeed()
+        return Navigate.Result()
+
+
+PARTS = {
+    ("service", 0): Asker,
+    ("service", 1): Answerer,
+    ("action", 0): Sender,
+    ("action", 1): Worker,
+}
+
+
+def spin(executor: Any, task: Task) -> None:
+    """Let the executor work. Timers of EventsExecutor do not run in its ``spin``, whatever else."""
+    if task.is_timed and task.executor == "EventsExecutor":
+        while True:
+            executor.spin_once(timeout_sec=1.0)
+    executor.spin()
 
 
 def main() -> None:
@@ -72,7 +178,7 @@ def main() -> None:
     task = task_from_arguments()
     started_s = time.perf_counter()
     rclpy.init()
-    nodes = [Relay(task, index) for index in range(task.nodes)]
+    nodes = [PARTS.get((task.shape, place.index), Relay)(task, place) for place in places(task)]
     for node in nodes:
         node.trigger_configure()
     for node in reversed(nodes):
@@ -80,8 +186,7 @@ def main() -> None:
     executor = EXECUTORS[task.executor]()
     for node in nodes:
         executor.add_node(node)
-    threading.Thread(target=executor.spin, daemon=True).start()
-    # From here and not by a timer: EventsExecutor's did not always run, which is its own matter.
+    threading.Thread(target=spin, args=(executor, task), daemon=True).start()
     hand_over(measure(task, started_s, nodes[0].kick))
 
 

@@ -1,12 +1,7 @@
-"""What all the measured systems do alike, and how it is counted.
-
-A ring of nodes passes one message on and on; or one node's timer ticks. The same functions are
-called by the composer's nodes and by the hand-written ones, so that counting costs all the same.
-"""
+"""How it is counted what a system does: by the same functions whoever runs it."""
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import sys
@@ -17,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.processes import RESULT_MARK
+from benchmarks.programs.task import Task
 
-PAYLOAD = "x" * 32
 KICK_PERIOD_S = 0.2
 _BYTES_PER_MB = 1_000_000
 _PATIENCE_S = 5.0
@@ -27,38 +22,14 @@ _WARM_UP_S = 0.3
 
 @dataclass(slots=True)
 class Counts:
-    """What callbacks write and the main thread reads."""
+    """What callbacks write and the main thread reads. ``took_ns`` are latencies and round trips."""
 
     delivered: int = 0
     ticks_ns: list[int] = field(default_factory=list)
+    took_ns: list[int] = field(default_factory=list)
 
 
 COUNTS = Counts()
-
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """How large the system is, and what is measured for how long; no timer means the ring."""
-
-    executor: str
-    nodes: int
-    seconds: float
-    timer_hz: float | None
-
-
-def task_from_arguments() -> Task:
-    """Read the command line."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("executor")
-    parser.add_argument("--nodes", type=int, required=True)
-    parser.add_argument("--seconds", type=float, required=True)
-    parser.add_argument("--timer-hz", type=float)
-    return Task(**vars(parser.parse_args()))
-
-
-def topic(index: int, nodes: int) -> str:
-    """Return the topic that node ``index`` of the ring listens to."""
-    return f"/stage_{index % nodes}"
 
 
 def needs_kick(seen: int) -> bool:
@@ -85,15 +56,18 @@ def measure(
         "start_s": time.perf_counter() - started_s,
         "memory_mb": memory_mb(),
     }
+    if task.part == 1:
+        time.sleep(3600.0)  # until the other half has measured
     _wait_for_work(kick)
     time.sleep(_WARM_UP_S)
-    delivered, ticks = COUNTS.delivered, len(COUNTS.ticks_ns)
+    delivered, ticks, took = COUNTS.delivered, len(COUNTS.ticks_ns), len(COUNTS.took_ns)
     cpu_s, wall_s = time.process_time(), time.perf_counter()
     time.sleep(task.seconds)
     figures["cpu_s"] = time.process_time() - cpu_s
     figures["wall_s"] = time.perf_counter() - wall_s
     figures["delivered"] = COUNTS.delivered - delivered
     figures["ticks_ns"] = COUNTS.ticks_ns[ticks:]
+    figures["took_ns"] = COUNTS.took_ns[took:]
     return figures
 
 
@@ -106,7 +80,7 @@ def hand_over(figures: dict[str, Any]) -> None:
 
 def _wait_for_work(kick: Callable[[], None]) -> None:
     until_s = time.monotonic() + _PATIENCE_S
-    while not (COUNTS.delivered or COUNTS.ticks_ns):
+    while not (COUNTS.delivered or COUNTS.ticks_ns or COUNTS.took_ns):
         if time.monotonic() > until_s:
             print(f"nothing moved within {_PATIENCE_S:g} s", file=sys.stderr, flush=True)
             os._exit(1)
