@@ -29,7 +29,7 @@ _GO = {"go": {"type": "composer_interfaces/action/Navigate", "action": "/go"}}
 def system_tree(task: Task) -> dict[str, Any]:
     """Return the system file."""
     return {
-        "system": "measured",
+        "system": "measured" if task.part is None else f"measured_{task.part}",
         "executors": {"chosen": {"kind": task.executor}},
         "nodes": {f"node_{place.index}": _node(task, place) for place in places(task)},
     }
@@ -68,7 +68,7 @@ def _node(task: Task, place: Place) -> dict[str, Any]:
         "behavior": f"{behavior.__module__}:{behavior.__name__}",
         "executor": "chosen",
     }
-    port = {"type": TYPES[task.message]}
+    port = {"type": TYPES[task.message], "external": task.part is not None}
     if place.hears is not None and behavior is not behaviors.Source:
         node["subscriptions"] = {"input": {**port, "topic": place.hears}}
     if place.sends is not None:

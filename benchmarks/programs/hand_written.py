@@ -166,8 +166,9 @@ PARTS = {
 
 
 def spin(executor: Any, task: Task) -> None:
-    """Let the executor work. Timers of EventsExecutor do not run in its ``spin``, whatever else."""
-    if task.is_timed and task.executor == "EventsExecutor":
+    """Let the executor work. EventsExecutor's ``spin`` does not wake up for timers or outsiders."""
+    wakes_by_itself = task.part is None and not task.is_timed
+    if task.executor == "EventsExecutor" and not wakes_by_itself:
         while True:
             executor.spin_once(timeout_sec=1.0)
     executor.spin()
