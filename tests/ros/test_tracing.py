@@ -44,7 +44,7 @@ def work():
 class Server:
     async def on_number(self, message):
         work()
-        await self.clock.sleep(0.02)
+        await self.clock.sleep(0.4)
         work()
 
     def on_ask(self, request, response):
@@ -81,8 +81,7 @@ def test_every_kind_of_callback_is_timed_and_held_against_its_budget(tmp_path: P
         assert callback.overruns <= callback.times.count
         assert f"{callback} took " in text
     # What an async callback waits does not count, and what it does after waiting does.
-    number = server["subscription"].times
-    assert 0.004 <= number.percentile_s(0.5) < 0.02
+    assert 0.004 <= server["subscription"].times.longest_s < 0.4
     assert client["timer"].lateness.count == client["timer"].times.count
     outcome = system.stop()
     told = {(item.node, item.kind): item for item in outcome.callbacks}
