@@ -95,19 +95,6 @@ def test_a_signal_ends_the_pipeline_in_order(tmp_path: Path, number: signal.Sign
     assert places == sorted(places)
 
 
-@pytest.mark.parametrize("delay_ms", [0, 20, 60, 100, 150, 250])
-def test_a_signal_at_any_moment_of_the_start_ends_it(tmp_path: Path, delay_ms: int) -> None:
-    """The moments are spread, not waited for: whatever is going on, the end is the same."""
-    with compose_run(tmp_path, pipeline()) as run:
-        run.wait_for(" inactive" if delay_ms % 40 else "[compose]")
-        time.sleep(delay_ms / 1000.0)
-        run.process.send_signal(signal.SIGTERM)
-        code, took_s = run.end()
-    assert code == 0, run.text()
-    assert took_s < 2.0
-    assert "Traceback" not in run.text()
-
-
 HANGING = """
 system: hanging
 nodes:
