@@ -27,7 +27,7 @@ endif
 help:
 	@echo "make run      run $(SYSTEM) (SYSTEM=... for another)"
 	@echo "make test     run the tests"
-	@echo "make soak     run the tests that take half an hour"
+	@echo "make soak     run the tests that take some minutes each"
 	@echo "make check    run what CI runs: lint, types, layers, tests"
 	@echo "make format   format the Python code"
 	@echo "make pictures draw the pictures of the documentation"
@@ -46,7 +46,7 @@ test: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks
 
 # What shows only after hundreds of starts, ends and transitions.
 soak: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks
-	@echo "==> pytest -m soak (half an hour)"
+	@echo "==> pytest -m soak (ten minutes)"
 	@$(BIN)/python -m pytest --soak -m soak
 
 check: lint test
