@@ -201,7 +201,9 @@ def _load(
     findings = [*found, *resolved.findings]
     if system is not None:
         refused = tuple(item.primary for item in findings if item.severity is Severity.ERROR)
-        context = Context(system, known.interfaces, known.catalog, refused)
+        context = Context(
+            system, known.interfaces, known.catalog, refused, is_partial=resolved.is_partial
+        )
         findings.extend(run_checks(context))
         findings = once(findings, (node.name for node in system.nodes))
     findings = with_includes(findings, resolved.included)
@@ -242,6 +244,7 @@ class _Resolved:
     system: System | None = None
     findings: tuple[Diagnostic, ...] = ()
     included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
+    is_partial: bool = False
 
 
 def _resolved(
@@ -273,7 +276,8 @@ def _resolved_system(
         folders=whole.folders,
         overrides=overrides,
     )
-    return _Resolved(whole.tree, system, (*whole.findings, *found), whole.included)
+    findings = (*whole.findings, *found)
+    return _Resolved(whole.tree, system, findings, whole.included, whole.is_partial)
 
 
 def _resolved_node_type(

@@ -13,7 +13,9 @@ from composer.assembly.budget import Budget, TooMuch
 from composer.assembly.including import Including, system_file
 from composer.assembly.inheritance import Inherited, NodeTypeFile, inherited
 from composer.assembly.reading import Reader
+from composer.assembly.rules import INCLUDE_CYCLE, INVALID_INCLUDE
 from composer.diagnostics import Diagnostic
+from composer.expand.rules import DUPLICATE_NODE_NAME, TOO_LARGE
 from composer.project import Project
 from composer.source import SourceFile, Span
 from composer.tree import Mapping
@@ -21,16 +23,22 @@ from composer.tree import Mapping
 __all__ = ["Assembly", "Inherited", "NodeTypeFile", "assemble", "inherited"]
 
 
+#: What leaves nodes out, or gives them other names.
+_LEAVING_OUT = (INVALID_INCLUDE, INCLUDE_CYCLE, DUPLICATE_NODE_NAME, TOO_LARGE)
+
+
 @dataclass(frozen=True, slots=True)
 class Assembly:
     """A system put together. ``tree`` is None when it says more than can be gone through.
 
     By what the files are called, ``folders`` are where they are, ``included`` where each was
-    included.
+    included. ``is_partial`` is true when nodes may be missing, or have other names than are meant,
+    for reasons that are told.
     """
 
     tree: Mapping | None
     findings: list[Diagnostic]
+    is_partial: bool = False
     folders: Map[str, Path] = field(default_factory=dict)
     included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
 
@@ -48,4 +56,14 @@ def assemble(tree: Mapping, source: SourceFile, folder: Path, project: Project) 
         whole = including.whole(system_file(tree, source, folder), {})
     except TooMuch as stopped:
         return Assembly(None, [stopped.finding])
-    return Assembly(whole, findings, including.folders, including.included)
+    is_partial = (
+        including.is_partial
+        or any(item.rule in _LEAVING_OUT for item in findings)
+        or _has_unmade_copies(whole)
+    )
+    return Assembly(whole, findings, is_partial, including.folders, including.included)
+
+
+def _has_unmade_copies(tree: Mapping) -> bool:
+    nodes = tree.get("nodes")
+    return isinstance(nodes, Mapping) and any("${" in entry.name for entry in nodes)

@@ -34,13 +34,14 @@ class _Link:
 class Including:
     """Puts systems together. What was met on the way is kept.
 
-    ``folders`` are where the files are, ``included`` where each was included, by what the files
-    are called.
+    ``is_partial`` is true when something that is included could not be had. By what the files are
+    called, ``folders`` are where they are, ``included`` where each was included.
     """
 
     reader: Reader
     budget: Budget
     findings: list[Diagnostic]
+    is_partial: bool = False
     folders: dict[str, Path] = field(default_factory=dict)
     included: dict[str, tuple[Span, ...]] = field(default_factory=dict)
     _way: list[_Link] = field(default_factory=list)
@@ -64,10 +65,12 @@ class Including:
     def _part(self, item: Tree, includer: File) -> Part | None:
         include = read_include(item, self.findings)
         if include is None:
+            self.is_partial = True
             return None
         self.budget.include(include.file.span)
         file = self.reader.read(include.file, includer.path.parent, includer.source)
         if file is None:
+            self.is_partial = True
             return None
         self._way.append(_Link(includer, include.file.span))
         try:
@@ -83,8 +86,10 @@ class Including:
         self.included[file.source.path] = (*known, span)
         tree = self.whole(file, include.arguments)
         if include.overrides is not None:
-            tree = overridden(tree, include.overrides, file.source, self.findings)
-            self.findings += check_schema(tree, SYSTEM)
+            # What is not there cannot be missed.
+            findings: list[Diagnostic] = [] if self.is_partial else self.findings
+            tree = overridden(tree, include.overrides, file.source, findings)
+            findings += check_schema(tree, SYSTEM)
         whole = placed(tree, include.position, self._folder(), file.path.parent)
         return Part(whole, span)
 
@@ -93,6 +98,7 @@ class Including:
         numbers = [number for number, link in enumerate(self._way) if link.file.path == file.path]
         if not numbers:
             return False
+        self.is_partial = True
         self.findings.append(_cycle(self._way[numbers[0] :]))
         return True
 

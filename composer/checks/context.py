@@ -25,13 +25,15 @@ class Context:
     """A system, and what there is to hold it against.
 
     ``refused`` are the places of the errors that earlier stages found: what they stand in came into
-    the model in part or not at all.
+    the model in part or not at all. With ``is_partial`` that may be whole nodes, profiles and
+    executors, so that no name is known to be wrong.
     """
 
     system: System
     interfaces: Interfaces
     catalog: Catalog
     refused: tuple[Span, ...] = ()
+    is_partial: bool = False
     _answers: dict[Callable[[Context], Any], Any] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )

@@ -44,7 +44,7 @@ def doubt(context: Context) -> Doubt:
     homes = _homes(context)
     files = {span.file.path for span in context.refused} - homes.keys()
     suspects = {node.name.value for node in system.nodes if _files(node) & files}
-    elsewhere = False
+    elsewhere = context.is_partial
     misspelt: set[tuple[str, str]] = set()
     for span in context.refused:
         home = homes.get(span.file.path)

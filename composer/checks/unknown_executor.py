@@ -40,7 +40,7 @@ DEFAULT = "default"
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the executor of every node that names one."""
     known = {executor.name.value for executor in context.system.executors} | {DEFAULT}
-    for node in context.system.nodes:
+    for node in context.system.nodes if not context.is_partial else ():
         name = node.executor
         if name is None or name.value in known or is_opaque(name.value):
             continue

@@ -35,6 +35,8 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the ends of connections, at what nodes depend on, at the command line."""
+    if context.is_partial:
+        return
     for endpoint in endpoints(context.system):
         yield from _endpoint(context, endpoint)
     for node in context.system.nodes:

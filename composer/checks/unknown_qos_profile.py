@@ -49,6 +49,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
 def unknown_profiles(context: Context) -> tuple[Located[str], ...]:
     """Return the uses of names that no profile has."""
     known = known_profiles(context)
+    if context.is_partial:
+        return ()
     return tuple(
         reference.name
         for reference in context.system.qos_references

@@ -42,7 +42,7 @@ nodes:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the names in parameter files that are no node's."""
     names = [node.full_name for node in context.system.nodes]
-    for name in context.system.unmatched_parameters:
+    for name in context.system.unmatched_parameters if not context.is_partial else ():
         yield Diagnostic(
             RULE,
             f"no node of this system is called '{name}'",

@@ -87,6 +87,7 @@ nodes:
   a_${{i}}:
     for_each: {loops}
     timers: {{tick: {{rate_hz: 1, log: "${{i}} ticks"}}}}
+  b: {{lifecycle: {{depends_on: [a_0]}}}}
 """
     [finding] = findings_in(text, tmp_path)
     assert (finding.rule.name, str(finding.primary)) == (rule, f"system.yaml:{place}")

@@ -304,3 +304,32 @@ def test_a_file_that_is_included_twice_under_the_same_names(tmp_path: Path) -> N
     assert (str(finding.primary), finding.rule.name) == ("whole.yaml:4:12", "duplicate-node-name")
     by_name = "camera.yaml, prefix: a_}\n  - {file: camera.yaml, prefix: b_}"
     system_of(included(tmp_path, "{file: " + by_name))
+
+
+@pytest.mark.parametrize(
+    ("include", "rule"),
+    [
+        ("{file: camra.yaml, prefix: left_}", "invalid-include"),
+        ("{file: camera.yaml, prefix: left-}", "invalid-include"),
+        ("{file: '${file}', prefix: left_}", "unknown-variable"),
+        ("{file: broken.yaml, prefix: left_}", "yaml-syntax"),
+        ("{file: circle.yaml, prefix: left_}", "include-cycle"),
+        ("{file: circle.yaml, overrides: {nodes: {left_viewer: {}}}}", "include-cycle"),
+    ],
+)
+def test_nothing_is_a_consequence_of_what_is_not_there(
+    tmp_path: Path, include: str, rule: str
+) -> None:
+    rest = """\
+nodes:
+  recorder:
+    executor: vision
+    lifecycle: {depends_on: [left_viewer, "left_*"]}
+    publishers: {notes: {type: std_msgs/msg/String, qos: frames}}
+    subscriptions: {image: {type: std_msgs/msg/String, qos: frames, log: "{message.data}"}}
+connections:
+  - {topic: image, from: left_driver.image, to: recorder.image}
+"""
+    circle = "system: circle\ninclude: [whole.yaml]\n"
+    loading = included(tmp_path, include, rest, broken="system: [\n", circle=circle)
+    assert [line.split()[1] for line in told(loading.diagnostics)] == [rule]
