@@ -333,3 +333,9 @@ connections:
     circle = "system: circle\ninclude: [whole.yaml]\n"
     loading = included(tmp_path, include, rest, broken="system: [\n", circle=circle)
     assert [line.split()[1] for line in told(loading.diagnostics)] == [rule]
+
+
+def test_the_settings_of_the_project_hold_for_what_is_included(tmp_path: Path) -> None:
+    unheard = "system: part\nnodes:\n  a: {publishers: {chatter: {type: std_msgs/msg/String, "
+    files = {"part": unheard + "qos: command}}}\n", "composer": "ignore: [unheard-publisher]\n"}
+    assert told(included(tmp_path, "part.yaml", **files).diagnostics) == []
