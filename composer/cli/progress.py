@@ -82,6 +82,7 @@ def summary(outcome: Outcome) -> str:
     called = [callback for callback in outcome.callbacks if callback.count or callback.dropped]
     if called:
         parts.append(callback_table(called, _CALLBACKS))
+    parts += [f"chain {chain.chain}: {chain.text}" for chain in outcome.chains]
     return "\n".join(parts)
 
 

@@ -44,7 +44,8 @@ def table(report: SystemReport, callbacks: list[CallbackRates], lines: int | Non
         f"(host {report.host}, process {report.pid}), callbacks {busy * 100:.1f} % busy"
     )
     text = columns([_HEAD, *map(_row, callbacks)], numbers_from=2)
-    shown = [title, *text.splitlines()]
+    chains = [f"chain {chain.chain}: {chain.text}" for chain in report.chains]
+    shown = [title, *chains, *text.splitlines()]
     if lines is not None and len(shown) > lines:
         shown = [*shown[: lines - 1], f"{len(shown) - lines + 1} more"]
     return "\n".join(shown)
@@ -56,6 +57,7 @@ def as_json(report: SystemReport, callbacks: list[CallbackRates]) -> dict[str, A
         "system": report.name,
         "time": report.callbacks_at_s,
         "activity": report.activity,
+        "chains": [asdict(chain) for chain in report.chains],
         "callbacks": [
             asdict(item.figures) | {"calls_hz": item.calls_hz, "busy": item.busy}
             for item in callbacks

@@ -1,4 +1,4 @@
-"""The figures of callbacks as a manager tells them: ``diagnostic_msgs/msg/DiagnosticArray``."""
+"""Figures of callbacks and chains as managers tell them: diagnostic_msgs/msg/DiagnosticArray."""
 
 from __future__ import annotations
 
@@ -7,35 +7,48 @@ from dataclasses import fields
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from composer.runtime.figures import CallbackFigures
+from composer.runtime.figures import CallbackFigures, ChainFigures
 
+Figures = CallbackFigures | ChainFigures
 #: Which type each field has, for the way back from text.
 _TYPES = {
     field.name: {"int": int, "float": float}.get(str(field.type), str)
-    for field in fields(CallbackFigures)
+    for kind in (CallbackFigures, ChainFigures)
+    for field in fields(kind)
 }
 
 
-def to_message(system: str, callbacks: Iterable[CallbackFigures]) -> DiagnosticArray:
-    """Return a message with a status for each callback; one that overran its budget warns."""
-    return DiagnosticArray(status=[_status(system, callback) for callback in callbacks])
+def to_message(system: str, figures: Iterable[Figures]) -> DiagnosticArray:
+    """Return a message with a status for each; what took longer than it may warns."""
+    return DiagnosticArray(status=[_status(system, item) for item in figures])
 
 
-def from_message(message: DiagnosticArray) -> tuple[CallbackFigures, ...]:
-    """Return what :func:`to_message` was given."""
-    return tuple(
-        CallbackFigures(**{item.key: _TYPES[item.key](item.value) for item in status.values})
+def from_message(
+    message: DiagnosticArray,
+) -> tuple[tuple[CallbackFigures, ...], tuple[ChainFigures, ...]]:
+    """Return the callbacks and the chains that :func:`to_message` was given."""
+    values = [
+        {item.key: _TYPES[item.key](item.value) for item in status.values}
         for status in message.status
+    ]
+    return (
+        tuple(CallbackFigures(**item) for item in values if "chain" not in item),
+        tuple(ChainFigures(**item) for item in values if "chain" in item),
     )
 
 
-def _status(system: str, callback: CallbackFigures) -> DiagnosticStatus:
-    late = callback.overruns or callback.dropped
-    values = {field.name: getattr(callback, field.name) for field in fields(callback)}
+def _status(system: str, figures: Figures) -> DiagnosticStatus:
+    if isinstance(figures, ChainFigures):
+        name, is_well, text = f"chain {figures.chain}", not figures.late, figures.text
+    else:
+        name = f"{figures.node} {figures.callback}"
+        is_well = not (figures.overruns or figures.dropped)
+        text = f"{figures.overruns} over budget, {figures.dropped} dropped"
+    values = {field.name: getattr(figures, field.name) for field in fields(figures)}
     return DiagnosticStatus(
-        level=DiagnosticStatus.WARN if late else DiagnosticStatus.OK,
-        name=f"{system}: {callback.node} {callback.callback}",
-        message=f"{callback.overruns} over budget, {callback.dropped} dropped" if late else "",
+        level=DiagnosticStatus.OK if is_well else DiagnosticStatus.WARN,
+        name=f"{system}: {name}",
+        message=text,
         hardware_id=system,
         values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
     )

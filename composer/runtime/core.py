@@ -10,6 +10,7 @@ from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
 from composer.behavior import CallCancelled
+from composer.runtime.chains import NodeChains
 from composer.runtime.delivery.delivery import Delivery
 from composer.runtime.gate import Gate
 from composer.runtime.log import Faults, Log
@@ -28,7 +29,8 @@ _NANOSECONDS = 1e-9
 class Core:
     """One node's ROS handle, loop, gate, log and counters.
 
-    ``delivery`` is where its ports meet those of other nodes of the process. ``mutations`` is there
+    ``delivery`` is where its ports meet those of other nodes of the process, ``chains`` what they
+    have to do with the chains of the system. ``mutations`` is there
     when changes of messages are looked for. ``names`` is what every expression of the node may
     use: ``parameters``, ``state``, ``node``. ``group`` is the callback group of its ports.
     """
@@ -42,6 +44,7 @@ class Core:
     statistics: Statistics
     names: dict[str, Any]
     delivery: Delivery
+    chains: NodeChains
     mutations: MutationCheck | None = None
     tasks: set[Future[Any]] = field(default_factory=set)
     group: CallbackGroup = field(default_factory=MutuallyExclusiveCallbackGroup)

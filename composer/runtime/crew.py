@@ -9,9 +9,11 @@ from functools import partial
 
 from composer.behavior import CallCancelled
 from composer.model import Executor, ExecutorKind, LogLevel, Node, PrimaryState, System
+from composer.runtime.chains import Chains
 from composer.runtime.delivery.choice import shared_channels
 from composer.runtime.delivery.delivery import Delivery
 from composer.runtime.executors import log_exception, make_loop
+from composer.runtime.figures import CallbackFigures, ChainFigures, chain_figures, figures
 from composer.runtime.log import describe
 from composer.runtime.loop import Loop
 from composer.runtime.mutation import SeenMessages
@@ -64,6 +66,7 @@ class Crew:
         self._seen_messages = SeenMessages() if options.check_mutation else None
         self._executors = {executor.name.value: executor for executor in system.executors}
         self._delivery = Delivery({})
+        self._chains = Chains(system, tracing=options.tracing)
         self.nodes: dict[str, RunningNode] = {}
         self.loops: dict[str, Loop] = {}
         #: The loops with a callback that does not return; nothing can be asked of their nodes.
@@ -113,6 +116,18 @@ class Crew:
             for name, state in self.states().items()
             if self.left.get(name, state.value) == state.value
         }
+
+    def callbacks(self) -> tuple[CallbackFigures, ...]:
+        """Return what the callbacks of all nodes took so far."""
+        return tuple(
+            figures(node.full_name, callback)
+            for node in tuple(self.nodes.values())
+            for callback in tuple(node.statistics.callbacks.values())
+        )
+
+    def chains(self) -> tuple[ChainFigures, ...]:
+        """Return how long data was on the chains of the system."""
+        return tuple(map(chain_figures, self._chains.statistics))
 
     def is_lost(self, name: str) -> bool:
         """Say whether nothing can be asked of the node, since its loop hangs."""
@@ -175,6 +190,7 @@ class Crew:
         if name not in self.loops:
             self.loops[name] = make_loop(executor, _take_exception)
         options = NodeOptions(
+            chains=self._chains,
             delivery=self._delivery,
             seen_messages=self._seen_messages,
             parallel=executor.kind is ExecutorKind.MULTI_THREADED,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from composer.model import LogLevel
-from composer.runtime.figures import CallbackFigures
+from composer.runtime.figures import CallbackFigures, ChainFigures
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,3 +203,4 @@ class Outcome:
     nodes: tuple[NodeSummary, ...]
     hung: bool = False
     callbacks: tuple[CallbackFigures, ...] = ()
+    chains: tuple[ChainFigures, ...] = ()

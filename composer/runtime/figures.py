@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from composer.runtime.statistics import CallbackStatistics
+from composer.runtime.statistics import CallbackStatistics, ChainStatistics
 
 _MS = 1e3
 
@@ -54,6 +54,45 @@ def figures(node: str, counted: CallbackStatistics) -> CallbackFigures:
         late_longest_ms=lateness.longest_s * _MS,
         overruns=counted.overruns,
         dropped=counted.dropped,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class ChainFigures:
+    """A chain: how long data took from its first publisher to its last, and how long it may.
+
+    ``late`` counts what took longer than ``latency_ms``.
+    """
+
+    chain: str
+    latency_ms: float
+    count: int = 0
+    mean_ms: float = 0.0
+    p99_ms: float = 0.0
+    longest_ms: float = 0.0
+    late: int = 0
+
+    @property
+    def text(self) -> str:
+        """The figures in one line."""
+        return (
+            f"{self.count} times, mean {self.mean_ms:.3f} ms, "
+            f"p99 {self.p99_ms:.3f} ms, max {self.longest_ms:.3f} ms, "
+            f"{self.late} over {self.latency_ms:g} ms"
+        )
+
+
+def chain_figures(counted: ChainStatistics) -> ChainFigures:
+    """Return what is known of a chain."""
+    times = counted.times
+    return ChainFigures(
+        chain=counted.name,
+        latency_ms=counted.latency_ms,
+        count=times.count,
+        mean_ms=times.mean_s * _MS,
+        p99_ms=times.percentile_s(0.99) * _MS,
+        longest_ms=times.longest_s * _MS,
+        late=counted.late,
     )
 
 

@@ -40,7 +40,6 @@ from composer.runtime.crew import FINALIZED, CreationFailed, Crew, CrewOptions
 from composer.runtime.departure import can_leave_at_once, leave_at_once
 from composer.runtime.environment import prepare_environment
 from composer.runtime.events import NodeSummary, Outcome, Report
-from composer.runtime.figures import CallbackFigures, figures
 from composer.runtime.inbox import Inbox
 from composer.runtime.log import describe
 from composer.runtime.manager import Command, Manager, Office, manager_namespace
@@ -163,7 +162,8 @@ class Host:
         office = Office(
             self._obey,
             self._measure,
-            self._callbacks,
+            self._crew.callbacks,
+            self._crew.chains,
             lambda host, pid: self._yield_to(namespace, host, pid),
             lambda: {node.full_name: node for node in tuple(self._crew.nodes.values())},
         )
@@ -270,13 +270,6 @@ class Host:
         self._board.measure({name: node.statistics for name, node in nodes})
         self._board.see_states({name: node.state for name, node in nodes})
 
-    def _callbacks(self) -> tuple[CallbackFigures, ...]:
-        return tuple(
-            figures(node.full_name, callback)
-            for node in tuple(self._crew.nodes.values())
-            for callback in tuple(node.statistics.callbacks.values())
-        )
-
     def _yield_to(self, namespace: str, host: str, pid: str) -> None:
         if not self._inbox.closing:
             self._fail(str(refusal(namespace, host, pid)))
@@ -334,7 +327,8 @@ class Host:
             elapsed_s=self._reporter.elapsed_s,
             nodes=self._summary,
             hung=self._remains,
-            callbacks=self._callbacks(),
+            callbacks=self._crew.callbacks(),
+            chains=self._crew.chains(),
         )
 
     @property

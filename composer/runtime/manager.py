@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -22,11 +22,11 @@ from std_srvs.srv import Trigger
 
 from composer.names import join
 from composer.runtime.board import Board, NodeStatus, SystemStatus
-from composer.runtime.callback_messages import to_message
+from composer.runtime.callback_messages import Figures, to_message
 from composer.runtime.deputy import Deputy
 from composer.runtime.event_loop import EventLoop
 from composer.runtime.executors import log_exception
-from composer.runtime.figures import CallbackFigures
+from composer.runtime.figures import CallbackFigures, ChainFigures
 from composer.runtime.loop import Reply, never_called
 from composer.runtime.manager_topics import (
     CALLBACKS_QOS,
@@ -68,7 +68,8 @@ def manager_namespace(namespace: str, system: str) -> str:
 class Office:
     """Who is behind a manager; all of it is called on the manager's loop.
 
-    ``obey`` takes commands; ``measure`` works out rates; ``callbacks`` returns what these took;
+    ``obey`` takes commands; ``measure`` works out rates; ``callbacks`` returns what these took,
+    ``chains`` how long data was on its way;
     ``yield_to(host, pid)`` is called when a composer that runs the same system was there first;
     ``members`` returns the nodes, by their full names.
     """
@@ -76,6 +77,7 @@ class Office:
     obey: Callable[[Command], None]
     measure: Callable[[], None]
     callbacks: Callable[[], tuple[CallbackFigures, ...]]
+    chains: Callable[[], tuple[ChainFigures, ...]]
     yield_to: Callable[[str, str], None]
     members: Callable[[], Mapping[str, RunningNode]]
 
@@ -160,7 +162,8 @@ class Manager:
             self._publish_callbacks()
 
     def _publish_callbacks(self) -> None:
-        message = to_message(self._board.snapshot().system, self._office.callbacks())
+        figures: tuple[Figures, ...] = (*self._office.chains(), *self._office.callbacks())
+        message = to_message(self._board.snapshot().system, figures)
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._callbacks.publish(message)
 
@@ -193,19 +196,23 @@ class Manager:
         return time.monotonic() - self._started_s
 
     def _publish(self) -> None:
-        message = diagnostics(self._board.snapshot(), self._uptime_s)
+        message = diagnostics(self._board.snapshot(), self._uptime_s, self._office.chains())
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._diagnostics.publish(message)
         self._state.publish(message)
 
 
-def diagnostics(status: SystemStatus, uptime_s: float) -> DiagnosticArray:
+def diagnostics(
+    status: SystemStatus, uptime_s: float, chains: Iterable[ChainFigures]
+) -> DiagnosticArray:
     """Return the state of a system and of its nodes; the system comes first."""
     nodes = (_of_node(status.system, node) for node in status.nodes)
-    return DiagnosticArray(status=[_of_system(status, uptime_s), *nodes])
+    return DiagnosticArray(status=[_of_system(status, uptime_s, chains), *nodes])
 
 
-def _of_system(status: SystemStatus, uptime_s: float) -> DiagnosticStatus:
+def _of_system(
+    status: SystemStatus, uptime_s: float, chains: Iterable[ChainFigures]
+) -> DiagnosticStatus:
     level = DiagnosticStatus.OK
     if status.failed:
         level = DiagnosticStatus.ERROR
@@ -219,6 +226,7 @@ def _of_system(status: SystemStatus, uptime_s: float) -> DiagnosticStatus:
         "started": f"{status.started_s:.3f}",
         "uptime": f"{uptime_s:.3f}",
     }
+    values |= {f"chain {chain.chain}": chain.text for chain in chains}
     return _status(status.system, status.system, level, status.summary, values)
 
 

@@ -18,6 +18,7 @@ from composer.behavior import TransitionFailed
 from composer.model import Event, LogLevel, Node
 from composer.runtime.assembly import Assembly
 from composer.runtime.behaviors import Named, NamedPorts, NodeClock, behavior_class, method
+from composer.runtime.chains import Chains
 from composer.runtime.core import Core
 from composer.runtime.delivery.delivery import Delivery
 from composer.runtime.gate import Gate
@@ -51,12 +52,13 @@ class WrongReturn(Exception):
 class NodeOptions:
     """How a node is run.
 
-    ``delivery`` is where its ports meet those of the nodes beside it; ``seen_messages`` what all of
-    them remember when changes of messages are looked for; ``parallel`` is true when its loop has
-    several threads.
+    ``delivery`` is where its ports meet those of the nodes beside it, ``chains`` are those of the
+    system; ``seen_messages`` is what all of them remember when changes of messages are looked for;
+    ``parallel`` is true when its loop has several threads.
     """
 
     delivery: Delivery
+    chains: Chains
     seen_messages: SeenMessages | None = None
     parallel: bool = False
     log_level: LogLevel = LogLevel.INFO
@@ -108,6 +110,7 @@ class RunningNode:
             statistics=self.statistics,
             names={"parameters": {}, "state": {}, "node": model.full_name},
             delivery=options.delivery,
+            chains=options.chains.of(model),
             mutations=_mutation_check(options.seen_messages, faults),
         )
         parameters = Parameters(

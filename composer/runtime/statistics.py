@@ -29,6 +29,21 @@ class CallbackStatistics:
 
 
 @dataclass(slots=True)
+class ChainStatistics:
+    """What is counted of a chain: how long data took, and how often longer than it may."""
+
+    name: str
+    latency_ms: float
+    times: Durations = field(default_factory=Durations)
+    late: int = 0
+
+    def take(self, took_s: float) -> None:
+        """Count data that has come to the end."""
+        self.times.take(took_s)
+        self.late += took_s * 1e3 > self.latency_ms
+
+
+@dataclass(slots=True)
 class Statistics:
     """Counters of one node. See :class:`composer.runtime.events.NodeSummary` for their meaning.
 

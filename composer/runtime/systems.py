@@ -12,7 +12,7 @@ from std_srvs.srv import Trigger
 
 from composer.runtime.callback_messages import from_message
 from composer.runtime.claim import claims
-from composer.runtime.figures import CallbackFigures
+from composer.runtime.figures import CallbackFigures, ChainFigures
 from composer.runtime.finding import NotThere, not_there
 from composer.runtime.manager import IS_ACTIVE
 from composer.runtime.manager_topics import (
@@ -54,7 +54,7 @@ class NodeReport:
 class SystemReport:
     """A system as its manager tells of it. ``name`` is the namespace of that.
 
-    ``callbacks`` is there where it was asked for, as it was at ``callbacks_at_s``.
+    ``callbacks`` and ``chains`` are there where asked for, as they were at ``callbacks_at_s``.
     """
 
     name: str
@@ -64,6 +64,7 @@ class SystemReport:
     pid: str
     nodes: tuple[NodeReport, ...]
     callbacks: tuple[CallbackFigures, ...] = ()
+    chains: tuple[ChainFigures, ...] = ()
     callbacks_at_s: float = 0.0
 
 
@@ -191,8 +192,9 @@ class Systems:
         callbacks = self._callbacks.get(name)
         if callbacks is None:
             return report
+        found, chains = from_message(callbacks)
         at_s = _time_s(callbacks)
-        return replace(report, callbacks=from_message(callbacks), callbacks_at_s=at_s)
+        return replace(report, callbacks=found, chains=chains, callbacks_at_s=at_s)
 
     def _listen(self, name: str) -> list[Subscription]:
         subscriptions = [self._heard_of(name, STATE_TOPIC, STATE_QOS, self._heard)]

@@ -86,6 +86,7 @@ def report(at_s: float, *callbacks: CallbackFigures) -> Any:
         host="robot1",
         pid="12",
         callbacks=callbacks,
+        chains=(),
         callbacks_at_s=at_s,
     )
 

@@ -26,7 +26,8 @@ class PublisherPort:
             rclpy_profile(port.qos.profile),
             callback_group=core.group,
         )
-        self._send, self._leave = core.delivery.add_publisher(port, self._publisher)
+        send, self._leave = core.delivery.add_publisher(port, self._publisher)
+        self._send = core.chains.sending(port, send)
         self._warned = False
         self.sent = 0
 

@@ -44,7 +44,7 @@ class SubscriptionPort:
         timer = CallbackTimer(core, self._traced, port.budget_ms)
         self._line = Line(
             core,
-            timer.around(self._work),
+            core.chains.hearing(port, timer.around(self._work)),
             depth=depth,
             reentrant=port.reentrant,
         )
