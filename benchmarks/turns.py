@@ -19,7 +19,8 @@ EVENTS = "EventsExecutor"
 
 Rounds = Mapping[str, Sequence[Mapping[str, Any] | None]]
 Figure = Callable[[Mapping[str, Any]], float | None]
-_PATIENCE_S = 60.0
+#: A program that hangs is given up; large systems take long to start by hand.
+_PATIENCE_S, _PATIENCE_S_PER_NODE = 15.0, 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,8 @@ def _run(way: str, case: Case) -> Mapping[str, Any] | None:
             if case.apart:
                 stack.enter_context(started(*command, "--part", "1", variables=domain))
                 command = (*command, "--part", "0")
-            return run_program(*command, timeout_s=_PATIENCE_S, variables=domain)
+            patience_s = _PATIENCE_S + _PATIENCE_S_PER_NODE * case.nodes
+            return run_program(*command, timeout_s=patience_s, variables=domain)
     except ProgramFailed:
         if program == "composed":
             raise  # ours has to work

@@ -167,7 +167,7 @@ PARTS = {
 
 def spin(executor: Any, task: Task) -> None:
     """Let the executor work. EventsExecutor's ``spin`` does not wake up for timers or outsiders."""
-    wakes_by_itself = task.part is None and not task.is_timed
+    wakes_by_itself = task.shape == "ring" and task.part is None
     if task.executor == "EventsExecutor" and not wakes_by_itself:
         while True:
             executor.spin_once(timeout_sec=1.0)
