@@ -18,20 +18,23 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 
-from composer.runtime.participants import participants_here
+from composer.runtime.participants import make_room_for_announcements, participants_here
 
 T = TypeVar("T")
 H = TypeVar("H", bound=Hashable)
 
 _STEP_S = 0.02
-#: What a participant has is announced 0.1 s after it was met; what is lost, 0.1 s later again.
+#: What a participant has is announced 0.1 s after it was met, and 0.1 s later what was lost of it.
 _QUIET_S = 0.25
+_UNCHANGED_S = 0.15
 #: So long is waited for the first of all others: one in another computer shows nothing before.
 _FIRST_S = 0.5
 #: Who is not met at once is met with its next announcement, with Fast DDS at most 3 s later.
-_ANNOUNCED_WITHIN_S = 3.2
+_MET_WITHIN_S = 3.2
 #: Each participant of ROS 2 has it; its name is as it is on the wire.
 _TOPIC_OF_PARTICIPANTS = "ros_discovery_info"
+#: What rmw calls the node of an endpoint as long as its participant has not told of it.
+_NO_NAME = "_NODE_NAME_UNKNOWN_"
 #: Commands do not count as somebody: they come and go.
 _NAME_PREFIX = "_compose_"
 
@@ -66,6 +69,15 @@ class Deadline:
         return self.left_s <= 0.0
 
 
+class _Member(Node):
+    """A node that has room for the announcements of others before they come."""
+
+    def create_publisher(self, *args: Any, **options: Any) -> Any:
+        """Create a publisher. The first one is a node's own, made right after its participant."""
+        make_room_for_announcements()
+        return super().create_publisher(*args, **options)
+
+
 class Session:
     """The node, hidden from node lists by its leading underscore. Use it in a ``with`` block."""
 
@@ -73,7 +85,7 @@ class Session:
         self._context = Context()
         # No signal handlers come with it: Ctrl-C stays Python's KeyboardInterrupt.
         self._context.init([])
-        self.node = Node(
+        self.node = _Member(
             f"{_NAME_PREFIX}{os.getpid()}",
             context=self._context,
             use_global_arguments=False,
@@ -84,6 +96,8 @@ class Session:
         self._executor.add_node(self.node)
         self._domain_id = self._context.get_domain_id()
         self._joined_s = time.monotonic()
+        self._quiet = _Quiet()
+        self._quiet.since_s(self._met())
 
     def __enter__(self) -> Self:
         return self
@@ -117,11 +131,11 @@ class Session:
 
     def wait_until_still(self, look: Callable[[], H], deadline: Deadline) -> H:
         """Return what ``look`` finds once everything is discovered, or at the deadline."""
-        quiet = _Quiet()
+        found = _Quiet()
         while True:
-            found = look()
-            if self._is_all_discovered(quiet.since_s(found)) or deadline.passed:
-                return found
+            seen = look()
+            if self._is_all_discovered(found.since_s(seen)) or deadline.passed:
+                return seen
             self.spin_once(deadline)
 
     def search(self, look: Callable[[], H | None], deadline: Deadline) -> H | None:
@@ -129,26 +143,44 @@ class Session:
 
         None once everything is discovered, or at the deadline.
         """
-        quiet = _Quiet()
+        began_s = time.monotonic()
         while True:
             found = look()
-            is_over = self._is_all_discovered(quiet.since_s(self.others())) or deadline.passed
-            if found is not None or is_over:
+            if found is not None or self._is_all_discovered(began_s) or deadline.passed:
                 return found
             self.spin_once(deadline)
 
     def _is_all_discovered(self, unchanged_since_s: float) -> bool:
+        """Say whether nobody is left to be met. What is asked for has not changed since then."""
+        met, others = self._met()
+        quiet_since_s = self._quiet.since_s((met, others))
+        ready_s = max(quiet_since_s + _QUIET_S, unchanged_since_s + _UNCHANGED_S)
+        if not others:
+            ready_s = max(ready_s, self._joined_s + _FIRST_S)
         now_s = time.monotonic()
-        earliest_s = unchanged_since_s + _QUIET_S
-        if not self.others():
-            earliest_s = max(earliest_s, self._joined_s + _FIRST_S)
-        if now_s < earliest_s:
+        if now_s < ready_s:
             return False
-        return self._is_everybody_met() or now_s >= self._joined_s + _ANNOUNCED_WITHIN_S
+        if now_s >= self._joined_s + _MET_WITHIN_S:
+            return True
+        return met >= participants_here(self._domain_id) and self._all_named()
 
-    def _is_everybody_met(self) -> bool:
-        met = self.node.get_publishers_info_by_topic(_TOPIC_OF_PARTICIPANTS, no_mangle=True)
-        return len(met) >= participants_here(self._domain_id)
+    def _all_named(self) -> bool:
+        """Say whether each publisher's node is known: participants tell of their nodes last."""
+        return all(
+            end.node_name != _NO_NAME
+            for topic, _ in self.node.get_topic_names_and_types()
+            for end in self.node.get_publishers_info_by_topic(topic)
+        )
+
+    def _met(self) -> tuple[int, tuple[tuple[str, str], ...]]:
+        """Return the number of participants known now, this one included, and the nodes.
+
+        Publishers and subscriptions are announced apart: known is of whom both have come.
+        """
+        node, topic = self.node, _TOPIC_OF_PARTICIPANTS
+        publishers = node.get_publishers_info_by_topic(topic, no_mangle=True)
+        subscriptions = node.get_subscriptions_info_by_topic(topic, no_mangle=True)
+        return min(len(publishers), len(subscriptions)), self.others()
 
     def call(self, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
         """Call a service and return its response. Raises NoAnswer at the deadline."""

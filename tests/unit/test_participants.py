@@ -1,10 +1,11 @@
-"""The ports that Linux says are held, read as participants."""
+"""The ports that Linux says are held, read as participants, and what ours can hold."""
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 
-from composer.runtime.participants import participants_here
+from composer.runtime.participants import make_room_for_announcements, participants_here
 
 HEAD = "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  inode\n"
 
@@ -35,3 +36,18 @@ def test_each_domain_has_its_ports(tmp_path: Path) -> None:
 
 def test_where_nobody_tells_nobody_is_counted(tmp_path: Path) -> None:
     assert participants_here(0, tmp_path / "udp") == 0
+
+
+def test_udp_sockets_get_more_room_and_others_are_left_alone() -> None:
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp,
+        socket.socket(socket.AF_INET, socket.SOCK_STREAM) as tcp,
+    ):
+        before = [room(udp), room(tcp)]
+        make_room_for_announcements()
+        assert room(udp) > before[0]
+        assert room(tcp) == before[1]
+
+
+def room(end: socket.socket) -> int:
+    return end.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
