@@ -5,6 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from action_msgs.msg import GoalStatus
+from composer_interfaces.action import Navigate
+from rclpy.action import ActionClient
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -98,3 +101,78 @@ def test_what_waits_in_a_port_that_is_always_on_ends_with_the_cleanup(
         refusal = finished(answer)
         assert not refusal.success
         assert "CallCancelled" in refusal.message
+
+
+CALLING = """
+system: calling
+nodes:
+  power:
+    lifecycle: {autostart: inactive, depends_on: [other]}
+    behavior: power:Power
+    services: {probe: {type: std_srvs/srv/Trigger, always_on: true, external: true}}
+    clients:
+      ping: {type: std_srvs/srv/Trigger, service: pong, always_on: true}
+      gated: {type: std_srvs/srv/Trigger, service: pong}
+    action_clients:
+      send: {type: composer_interfaces/action/Navigate, action: drive, always_on: true}
+      gated: {type: composer_interfaces/action/Navigate, action: drive}
+    action_servers:
+      charge:
+        type: composer_interfaces/action/Navigate
+        always_on: true
+        external: true
+        result: {success: true}
+      move: {type: composer_interfaces/action/Navigate, external: true, result: {success: true}}
+  other:
+    services: {pong: {type: std_srvs/srv/Trigger, respond: {success: true}}}
+    action_servers: {drive: {type: composer_interfaces/action/Navigate, result: {success: true}}}
+"""
+CALLING_MODULE = """
+from composer.behavior import Behavior, CallCancelled
+
+class Power(Behavior):
+    async def on_probe(self, request, response):
+        found = []
+        for name in ("ping", "gated"):
+            client = self.clients[name]
+            try:
+                await client.call(client.service_type.Request())
+                found.append(f"{name} answered")
+            except CallCancelled:
+                found.append(f"{name} refused")
+        for name in ("send", "gated"):
+            client = self.action_clients[name]
+            try:
+                sent = await client.send_goal(client.action_type.Goal())
+                found.append(f"{name} {(await sent.result()).status}")
+            except CallCancelled:
+                found.append(f"{name} refused")
+        response.message = ", ".join(found)
+        return response
+"""
+
+
+def test_clients_and_actions_that_are_always_on(tmp_path: Path, peer: Peer) -> None:
+    def goal_is_taken(name: str) -> bool:
+        client = ActionClient(peer.node, Navigate, name)
+        wait_until(client.server_is_ready)
+        goal = finished(peer.run(lambda: client.send_goal_async(Navigate.Goal())))
+        if goal.accepted:
+            status = finished(peer.run(goal.get_result_async)).status
+            assert status == GoalStatus.STATUS_SUCCEEDED
+        return bool(goal.accepted)
+
+    with running(CALLING, tmp_path, power=CALLING_MODULE):
+        inactive = "ping answered, gated refused, send succeeded, gated refused"
+        assert peer.call(Trigger, "/probe").message == inactive
+        assert goal_is_taken("/charge")
+        assert not goal_is_taken("/move")
+        assert peer.change("/power", "activate")
+        assert peer.call(Trigger, "/probe").message == inactive.replace(
+            "gated refused, send", "gated answered, send"
+        ).replace("gated refused", "gated succeeded")
+        assert goal_is_taken("/move")
+        assert peer.change("/power", "deactivate")
+        assert peer.call(Trigger, "/probe").message == inactive
+        assert goal_is_taken("/charge")
+        assert not goal_is_taken("/move")
