@@ -187,6 +187,7 @@ def test_a_handler_that_awaits_for_long_is_given_up(tmp_path: Path, hurry: bool)
         system.host.stop("first")
         system.wait_for_log("slow")
         if hurry:
+            wait_until(lambda: time.monotonic() > began_s + 0.15, "as long as a person takes")
             system.host.stop("second")
         outcome = system.end()
         took_s = time.monotonic() - began_s
