@@ -11,10 +11,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.ros.system_bench import RunningSystem, running, wait_until
 
-ROUNDS = 2
-MANY_ROUNDS = 50
 PEER = "tests.ros.delivery_peer"
 WRITERS = ("writer", "second")
 ROOT = Path(__file__).parents[2]
@@ -164,7 +164,10 @@ def verify(system: RunningSystem) -> None:
         assert system.host._crew.nodes[name].statistics.queue_drops == 0
 
 
-def test_a_stress_of_outsiders_changes_nothing_inside(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "rounds", [2, pytest.param(50, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
+)
+def test_a_stress_of_outsiders_changes_nothing_inside(tmp_path: Path, rounds: int) -> None:
     with running(TEXT, tmp_path, stress=MODULE) as system:
-        stress(system, ROUNDS)
+        stress(system, rounds)
         verify(system)
