@@ -51,7 +51,8 @@ class Core:
 
     def now_s(self) -> float:
         """Return the node's time in seconds."""
-        return float(self.node.get_clock().now().nanoseconds) * _NANOSECONDS
+        # Not by way of ``now()``, which makes a Time: many a callback asks for it.
+        return float(self.node.get_clock().handle.get_now().nanoseconds) * _NANOSECONDS
 
     def spawn(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
         """Run ``coroutine`` on the node's loop; it ends at the latest with the node's entities."""
