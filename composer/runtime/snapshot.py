@@ -28,9 +28,6 @@ from composer.tree import Plain
 
 #: Who has not answered by then is busy or gone; what it did not say is said to be unknown.
 _PATIENCE_S = 2.0
-#: Participants of Fast DDS announce themselves every 3 s: who missed the first announcements of a
-#: process learns of it then. Before, nobody can say what is not there.
-_MET_ALL_AFTER_S = 3.5
 _STATE_TYPE = "lifecycle_msgs/srv/GetState"
 _LIST_TYPE = "rcl_interfaces/srv/ListParameters"
 
@@ -45,7 +42,6 @@ class Observer:
         self._session = session
         self._asker = Asker(session)
         self._deputies = Deputies(session)
-        self._met_all = Deadline(_MET_ALL_AFTER_S)
 
     def __enter__(self) -> Self:
         return self
@@ -55,12 +51,8 @@ class Observer:
         self._deputies.close()
 
     def look(self, deadline: Deadline) -> Snapshot:
-        """Return what is there, once discovery stands still or the deadline is there.
-
-        The first time it takes as long as every other process needs to be met.
-        """
+        """Return what is there, once all is discovered or the deadline is there."""
         session = self._session
-        session.wait_for(lambda: self._met_all.passed or None, deadline)
         ends = dict(session.wait_until_still(lambda: _frozen(session.node), deadline))
         counts = Counter(_names(session.node))
         services = {
