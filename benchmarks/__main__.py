@@ -11,7 +11,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from benchmarks import pipeline, start_up, systems, targets, validation
+from benchmarks import pipeline, plot, soak, start_up, systems, targets, validation
 from benchmarks.figures import Row, as_json, table
 
 RESULTS = Path(__file__).parent / "results"
@@ -26,6 +26,7 @@ BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
     "timers": ("jitter of a timer", systems.timers),
     "calls": ("services and actions", systems.calls),
     "outside": ("DDS to another process", systems.outside),
+    "soak": ("a day of work in little: is memory flat?", soak.measure),
     "tracing": ("what the times of callbacks cost", systems.tracing),
 }
 
@@ -62,7 +63,10 @@ def _run(names: list[str], *, long: bool) -> None:
         f"Load of the machine: {load_before:.1f} before, {os.getloadavg()[0]:.1f} after;", end=" "
     )
     print(f"{os.cpu_count()} processors, {time.monotonic() - began_s:.0f} s.")
-    print(f"Every figure: {_write(rows, load_before, long=long)}")
+    path = _write(rows, load_before, long=long)
+    picture = path.with_suffix(".svg")
+    picture.write_text(plot.picture(rows), encoding="utf-8")
+    print(f"Every figure: {path}, a picture of the ratios: {picture}")
 
 
 def _write(rows: list[Row], load_before: float, *, long: bool) -> Path:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from xml.etree import ElementTree
+
 import pytest
 
+from benchmarks import targets
 from benchmarks.figures import Row, Spread, as_json, percentile, ratios, spread, table
+from benchmarks.plot import picture
 
 
 def row(
@@ -77,3 +81,22 @@ def test_json_keeps_every_figure() -> None:
             "ratios": [0.1, 0.5],
         }
     ]
+
+
+def test_the_picture_has_a_bar_for_each_ratio_and_none_for_what_failed() -> None:
+    failed = Row("a <b>", "us", "somebody", (1.0,), (None,))
+    drawn = ElementTree.fromstring(picture([row(), failed, row()]))
+    bars = drawn.findall("{*}rect")[1:]  # the first is the background
+    assert len(bars) == 2
+    assert "chain, N=3, us, against somebody: 0.2" in [item.text for item in drawn.iter()]
+
+
+def test_targets_are_held_against_what_was_measured() -> None:
+    (found,) = [target for target in targets.TARGETS if target.case == "pipeline.yaml"]
+    reached = Row(found.case, found.unit, found.against, (1.0,), (10.0,))
+    missed = Row(found.case, found.unit, found.against, (1.0,), (1.0,))
+    unknown = Row(found.case, found.unit, found.against, (1.0,), (None,))
+    assert targets.table([reached]).endswith("0.25       0.1     0.1 - 0.1  reached")
+    assert targets.table([missed]).endswith("MISSED")
+    assert targets.table([unknown]).endswith("not measured")
+    assert targets.table([row()]) == ""
