@@ -229,6 +229,8 @@ def _definition(part: Part) -> str:
 
 
 def _limits(part: Part) -> str:
+    if "minimum" in part and "maximum" in part:
+        return f", from {_flow(part['minimum'])} to {_flow(part['maximum'])}"
     if "minimum" in part:
         return f", at least {_flow(part['minimum'])}"
     if "exclusiveMinimum" in part:

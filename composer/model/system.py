@@ -199,12 +199,18 @@ class ExecutorKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Executor:
-    """A group of nodes that share a loop. ``threads`` counts for multi_threaded only."""
+    """A group of nodes that share a loop. ``threads`` counts for multi_threaded only.
+
+    ``cpus`` are those that its threads may run on, as Linux counts them from 0; none means all.
+    ``priority`` is that of SCHED_FIFO (man 7 sched), 1 to 99; None is ordinary scheduling.
+    """
 
     name: Located[str]
     kind: ExecutorKind
     span: Span = field(compare=False)
     threads: int = 2
+    cpus: tuple[int, ...] = ()
+    priority: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

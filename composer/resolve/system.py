@@ -38,7 +38,7 @@ from composer.resolve.reading import (
 from composer.resolve.supervision import supervision
 from composer.resolve.types import NodeTypes
 from composer.source import Located, SourceFile, Span
-from composer.tree import Entry, Mapping
+from composer.tree import Entry, Mapping, Sequence
 
 ROOT = "/"
 DEFAULT_THREADS = 2
@@ -165,9 +165,14 @@ def _executor(entry: Entry) -> Executor:
     tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
     threads = integer(tree.get("threads"))
     kind = choice(tree.get("kind"), ExecutorKind)
+    cpus = tree.get("cpus")
+    numbers = map(integer, cpus.items if isinstance(cpus, Sequence) else ())
+    priority = integer(tree.get("priority"))
     return Executor(
         name=key(entry),
         kind=kind.value if kind is not None else ExecutorKind.EVENTS,
         span=entry.key.span,
         threads=threads.value if threads is not None else DEFAULT_THREADS,
+        cpus=tuple(number.value for number in numbers if number is not None),
+        priority=None if priority is None else priority.value,
     )

@@ -19,6 +19,7 @@ from composer.runtime.loop import Loop
 from composer.runtime.mutation import SeenMessages
 from composer.runtime.node import Listener, NodeOptions, RunningNode
 from composer.runtime.parameters import ParameterError
+from composer.runtime.placement import place
 from composer.runtime.statistics import Statistics
 from composer.source import Located
 
@@ -74,6 +75,8 @@ class Crew:
         self._keeps_entities = False
         #: Where nodes are as far as the main thread knows, which moves them; by their keys.
         self.left: dict[str, str] = {}
+        #: What Linux refuses to executors, each with what would help.
+        self.refusals: list[str] = []
 
     def create(self, begin: Callable[[], None] = lambda: None) -> None:
         """Create all nodes and start their loops. Raises CreationFailed; nothing is started then.
@@ -91,8 +94,10 @@ class Crew:
             except Exception as error:
                 reason = f"it cannot be created: {describe(error)}"
                 raise CreationFailed(node.full_name, reason) from error
-        for loop in self.loops.values():
+        for name, loop in self.loops.items():
             loop.start()
+            if name in self._executors:
+                self.refusals += place(self._executors[name], loop.thread_ids())
 
     def timeout_s(self, name: str) -> float:
         """Return how long a transition of a node may take."""

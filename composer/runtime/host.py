@@ -196,6 +196,8 @@ class Host:
             self._reporter.tell(events.RollingBack(at_s, error.node, str(error)))
             self._fail(f"{error.node} failed")
             return False
+        for refused in self._crew.refusals:
+            self._write_log(LogLevel.WARN, "composer", refused)
         self._is_created = True
         return True
 

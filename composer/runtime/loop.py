@@ -115,6 +115,9 @@ class Loop(Protocol):
     def start(self) -> None:
         """Begin to call, on threads of the loop's own."""
 
+    def thread_ids(self) -> tuple[int, ...]:
+        """Return Linux's ids of all threads of the loop, once it was started."""
+
     def stop(self, timeout_s: float) -> bool:
         """End the threads; false when a callback did not return in time.
 

@@ -98,6 +98,10 @@ class Scheduler:
         """Begin to call, on a thread of the loop's own."""
         self._thread.start()
 
+    def thread_ids(self) -> tuple[int, ...]:
+        """Return Linux's ids of all threads of the loop, once it was started."""
+        return (self._thread.native_id or 0,)
+
     def stop(self, timeout_s: float) -> bool:
         """End the thread; false when a callback did not return in time.
 

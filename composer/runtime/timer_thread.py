@@ -30,7 +30,7 @@ class TimerThread:
         self._timers = TimerHeap()
         self._changed = threading.Condition()
         self._stopping = False
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self.thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def add(self, call: ScheduledCall) -> ScheduledCall:
         """Hand ``call`` over when it is due. From any thread."""
@@ -41,7 +41,7 @@ class TimerThread:
 
     def start(self) -> None:
         """Begin."""
-        self._thread.start()
+        self.thread.start()
 
     def stop(self) -> None:
         """Hand nothing over any more."""

@@ -63,6 +63,7 @@ class MendedExecutor(Executor):
         self._sources: dict[object, Source] = {}  # of the entities that were added by themselves
         self._served: WeakSet[Any] = WeakSet()
         self._ending = False
+        self.threads: list[threading.Thread] = []  # those beside the one that calls turn
 
     def serve(self, entity: object, source: Source | None) -> None:
         """Serve an entity by ``source``, or as rclpy does."""
@@ -181,20 +182,20 @@ class MendedMultiThreadedExecutor(MendedExecutor):
     def __init__(self, loop: Calling, threads: int) -> None:
         super().__init__(loop)
         self._handlers: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._threads = [
+        self.threads = [
             threading.Thread(target=self._work, name=f"{loop.name} {number}", daemon=True)
             for number in range(1, threads + 1)
         ]
-        for thread in self._threads:
+        for thread in self.threads:
             thread.start()
 
     def finish(self, until_s: float) -> bool:
         """End the pool."""
-        for _ in self._threads:
+        for _ in self.threads:
             self._handlers.put(_END)
-        for thread in self._threads:
+        for thread in self.threads:
             thread.join(max(0.0, until_s - monotonic()))
-        return not any(thread.is_alive() for thread in self._threads)
+        return not any(thread.is_alive() for thread in self.threads)
 
     def _run(self, handler: Any) -> None:
         with self._tasks_lock:  # or the next turn finds it again

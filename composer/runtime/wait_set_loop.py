@@ -152,6 +152,11 @@ class WaitSetLoop:
         self._timers.start()
         self._thread.start()
 
+    def thread_ids(self) -> tuple[int, ...]:
+        """Return Linux's ids of all threads of the loop, once it was started."""
+        threads = (self._thread, self._timers.thread, *self._executor.threads)
+        return tuple(thread.native_id or 0 for thread in threads)
+
     def stop(self, timeout_s: float) -> bool:
         """End the threads; false when a callback did not return in time.
 

@@ -205,9 +205,12 @@ def _unknown_word(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
     yield Diagnostic(rules.UNKNOWN_WORD, message, error.place.value_span, hint=hint)
 
 
-def _too_small(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
-    limit = "a number above" if error.validator == "exclusiveMinimum" else "at least"
-    message = f"expected {limit} {error.wanted}{error.subject}, found {shown(error.instance)}"
+_LIMITS = {"minimum": "at least", "maximum": "at most", "exclusiveMinimum": "a number above"}
+
+
+def _out_of_range(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
+    limit = f"{_LIMITS[error.validator]} {error.wanted}"
+    message = f"expected {limit}{error.subject}, found {shown(error.instance)}"
     yield Diagnostic(rules.OUT_OF_RANGE, message, error.place.value_span)
 
 
@@ -230,8 +233,7 @@ _FINDINGS: dict[str, Callable[[_Error, _Misspelt], Iterator[Diagnostic]]] = {
     "type": _wrong_type,
     "pattern": _wrong_type,
     "enum": _unknown_word,
-    "minimum": _too_small,
-    "exclusiveMinimum": _too_small,
+    **dict.fromkeys(_LIMITS, _out_of_range),
     "minItems": _nothing_there,
     "minProperties": _nothing_there,
 }

@@ -68,6 +68,9 @@ def _limits(_: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
     if "minimum" in schema:
         least = schema["minimum"]
         yield lambda value: type(value) not in _NUMBERS or value >= least
+    if "maximum" in schema:
+        most = schema["maximum"]
+        yield lambda value: type(value) not in _NUMBERS or value <= most
     if "exclusiveMinimum" in schema:
         below = schema["exclusiveMinimum"]
         yield lambda value: type(value) not in _NUMBERS or value > below
@@ -144,7 +147,7 @@ _PYTHON_TYPES: dict[str, tuple[type, ...]] = {
 _MAKERS: dict[str, Callable[[_Shapes, dict[str, Any]], Iterable[Test]]] = {
     **dict.fromkeys(("$schema", "title", "description", "default", "examples"), _nothing),
     **dict.fromkeys(("definitions", "then", "else"), _nothing),
-    **dict.fromkeys(("minimum", "exclusiveMinimum"), _limits),
+    **dict.fromkeys(("minimum", "maximum", "exclusiveMinimum"), _limits),
     **dict.fromkeys(("minItems", "minProperties"), _sizes),
     **dict.fromkeys(("properties", "additionalProperties"), _keys),
     "type": _type,

@@ -40,7 +40,7 @@ def test_a_system_says_what_is_in_it() -> None:
         executors:
           control: {kind: single_threaded}
           perception: {kind: multi_threaded, threads: 4}
-          rest: {}
+          rest: {cpus: [1, 3], priority: 50}
         lifecycle: {autostart: inactive}
         nodes:
           talker: {executor: control, description: Talks.}
@@ -53,6 +53,11 @@ def test_a_system_says_what_is_in_it() -> None:
         ("control", ExecutorKind.SINGLE_THREADED, 2),
         ("perception", ExecutorKind.MULTI_THREADED, 4),
         ("rest", ExecutorKind.EVENTS, 2),
+    ]
+    assert [(item.cpus, item.priority) for item in system.executors] == [
+        ((), None),
+        ((), None),
+        ((1, 3), 50),
     ]
     assert system.autostart is PrimaryState.INACTIVE
     talker, listener = system.nodes

@@ -126,6 +126,14 @@ def profile(text: str) -> str:
             node("{lifecycle: {depends_on: {planner: activ}}}"),
             "unknown-word", "activ", "expected 'active' or 'inactive' for 'planner'", "'active'?",
         ),
+        (
+            "system: demo\nnodes: {a: {}}\nexecutors: {b: {priority: 100}}",
+            "out-of-range", "100", "expected at most 99 for 'priority', found 100", "",
+        ),
+        (
+            "system: demo\nnodes: {a: {}}\nexecutors: {b: {cpus: [0, -1]}}",
+            "out-of-range", "-1", "expected at least 0", "",
+        ),
         # ports
         (
             node("{publishers: {chatter: {topic: /a}}}"),
