@@ -11,7 +11,16 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from benchmarks import pipeline, plot, soak, start_up, systems, targets, validation
+from benchmarks import (
+    large_systems,
+    pipeline,
+    plot,
+    soak,
+    start_up,
+    systems,
+    targets,
+    validation,
+)
 from benchmarks.figures import Row, as_json, table
 
 RESULTS = Path(__file__).parent / "results"
@@ -23,6 +32,7 @@ BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
     "growth": ("CPU per message of 300 nodes against 10", systems.growth),
     "streams": ("CPU per message at a rate, chains and stars, small and large", systems.streams),
     "hops": ("latency from node to node", systems.hops),
+    "large": ("start, memory and stop of N idle nodes", large_systems.measure),
     "timers": ("jitter of a timer", systems.timers),
     "calls": ("services and actions", systems.calls),
     "outside": ("DDS to another process", systems.outside),

@@ -29,3 +29,13 @@ def complete_discovery(environment: MutableMapping[str, str], folder: Path = Pat
     if any(map(environment.get, variables)) or (folder / _FILE_OF_USER).exists():
         return
     environment[_VARIABLE] = str(_PROFILE)
+
+
+def leave_discovery_alone(environment: MutableMapping[str, str]) -> None:
+    """Take our profile back, for a process that leaves in one go (see ``departure``).
+
+    With the profile a participant also says goodbye in a thread of its own, which then ends before
+    it has; others wait for the participant for 20 s.
+    """
+    if environment.get(_VARIABLE) == str(_PROFILE):
+        del environment[_VARIABLE]

@@ -20,6 +20,7 @@ call at a time; ``str(event)`` is the line to show.
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -38,6 +39,7 @@ from composer.runtime.claim import claimed, refusal
 from composer.runtime.commands import Commands
 from composer.runtime.crew import FINALIZED, CreationFailed, Crew, CrewOptions
 from composer.runtime.departure import can_leave_at_once, leave_at_once
+from composer.runtime.discovery import leave_discovery_alone
 from composer.runtime.environment import prepare_environment
 from composer.runtime.events import NodeSummary, Outcome, Report
 from composer.runtime.inbox import Inbox
@@ -133,6 +135,7 @@ class Host:
         self._farewells: list[Command] = []
         self._end_s = math.inf  # when the tear-down has to be through
         self._remains = False  # something that only the end of the process removes
+        self._leaves_at_once = self._options.ends_process and len(system.nodes) > _FEW_NODES
         self._has_left = False  # all of it is out of the ROS graph
 
     def stop(self, reason: str) -> None:
@@ -146,6 +149,8 @@ class Host:
         Raises StartRefused when the environment does not allow a start, or the system runs already.
         """
         prepare_environment()
+        if self._leaves_at_once:
+            leave_discovery_alone(os.environ)
         namespace = manager_namespace(self._system.namespace, self._system.name.value)
         ends_process = self._options.ends_process
         with claimed(namespace), stop_signals(self.stop, ends_process=ends_process):
@@ -290,11 +295,7 @@ class Host:
         self._failed = self._failed or self._supervisor.has_failed_nodes
         self._board.set_activity("stopping")
         self._reporter.tell(events.Stopping(self._reporter.elapsed_s, self._reason))
-        if (
-            self._options.ends_process
-            and len(self._crew.nodes) > _FEW_NODES
-            and can_leave_at_once()
-        ):
+        if self._leaves_at_once and can_leave_at_once():
             self._crew.keep_entities()
         stop_within_s = self._options.stop_within_s
         self._end_s = time.monotonic() + stop_within_s

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from composer.runtime.discovery import complete_discovery
+from composer.runtime.discovery import complete_discovery, leave_discovery_alone
 
 
 def test_a_profile_is_chosen_that_is_there_and_is_xml(tmp_path: Path) -> None:
@@ -36,3 +36,13 @@ def test_a_file_that_fast_dds_finds_by_itself_is_left_alone(tmp_path: Path) -> N
     environment: dict[str, str] = {}
     complete_discovery(environment, tmp_path)
     assert environment == {}
+
+
+def test_the_profile_is_taken_back_and_no_other(tmp_path: Path) -> None:
+    environment: dict[str, str] = {}
+    complete_discovery(environment, tmp_path)
+    leave_discovery_alone(environment)
+    assert environment == {}
+    chosen = {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
+    leave_discovery_alone(chosen)
+    assert chosen == {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
