@@ -34,7 +34,7 @@ nodes:
   other:
     services: {alive: {type: std_srvs/srv/Trigger, external: true, respond: {success: true}}}
 """
-PORTS = ("input", "output", "trigger", "serve", "send")
+PORTS = ("input", "output", "trigger", "ask", "serve", "send")
 CYCLE = ("configure", "activate", "deactivate", "cleanup")
 #: Of memory that may be held in the end, so that it is 10 MB at the most after a thousand cycles.
 KILOBYTES_AT_ALL, KILOBYTES_PER_CYCLE = 2000, 8
@@ -173,7 +173,7 @@ def test_cycles_leave_nothing_behind(tmp_path: Path, peer: Peer, cycles: int) ->
         print(f"{cycles} cycles: {grown} kB more")
         assert grown < KILOBYTES_AT_ALL + KILOBYTES_PER_CYCLE * cycles
         assert usage.file_descriptors == descriptors
-        wait_until(lambda: usage.graph == baseline, "the graph of before")
+        wait_until(lambda: usage.graph == baseline, f"the graph of before, {baseline}")
         assert subject.change("configure")
         wait_until(lambda: len(usage.ports) > 10, "it has ports again")
         assert system.stop()[0] == 0
