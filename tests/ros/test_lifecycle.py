@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -114,6 +115,10 @@ TRANSITIONS = {
 }
 
 
+def was_told(events: list[TransitionEvent], state: str) -> bool:
+    return bool(events) and events[-1].goal_state.label == state
+
+
 @pytest.mark.parametrize("prefix", ["", "async "])
 @pytest.mark.parametrize("transition", TRANSITIONS)
 def test_whatever_a_handler_does_the_node_ends_in_a_primary_state(
@@ -135,6 +140,7 @@ def test_whatever_a_handler_does_the_node_ends_in_a_primary_state(
         module += f"\n        {prefix}def outcome_{number}(self):\n            {body}\n"
     text = SUBJECT.replace("    behavior: sub", "    parameters: {outcome: -1}\n    behavior: sub")
     with running(text, tmp_path, subject=module) as system:
+        events = peer.listen(TransitionEvent, "/subject/transition_event")
         for number, (body, outcome) in enumerate(OUTCOMES):
             if transition == "shutdown" and outcome != "error":
                 continue  # what ends in finalized cannot be tried again
@@ -145,6 +151,7 @@ def test_whatever_a_handler_does_the_node_ends_in_a_primary_state(
             assert answer is (outcome == "success"), body
             end = ends[("success", "failure", "error").index(outcome)]
             assert peer.state("/subject") == end, body
+            wait_until(partial(was_told, events, end), f"the event of {end}")
             assert peer.set_parameter("/subject", "outcome", -1) == ""
             for step in {"inactive": ["cleanup"], "active": ["deactivate", "cleanup"]}.get(end, []):
                 assert peer.change("/subject", step)
