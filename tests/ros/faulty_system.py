@@ -8,16 +8,17 @@ from textwrap import dedent
 TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown", "error")
 CALLBACKS = ("tick", "input", "ask", "drive", "parameters")
 PLACES = (*TRANSITIONS, *CALLBACKS)
-#: What a callback does; each but ``hang`` has a node of its own, on the executor of the metronome.
+#: What a callback does; each but ``hang`` has a node of its own.
 FAULTS = ("raise", "none", "nonsense", "exit", "once")
 #: Hanging nodes have an executor each: what runs on the same one as they do stands still.
 HANGING = tuple(f"hang_{place}" for place in PLACES)
 SYSTEM = """
 system: faulty
 lifecycle: {on_failure: isolate}
-executors: {EXECUTORS}
+executors: {calm: {kind: events}, EXECUTORS}
 nodes:
   metronome:
+    executor: calm  # making and destroying endpoints takes its time where it is done
     publishers: {beat: {type: std_msgs/msg/Int64, external: true}}
     timers: {beat: {period_ms: 100, publish: {beat: {data: "{count}"}}}}
 """

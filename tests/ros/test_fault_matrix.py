@@ -157,9 +157,10 @@ def answer_of(place: str, begun: Any) -> object:
 
 
 class Metronome:
-    """How often the node beats that must not notice; it shares its executor with those that fail.
+    """How often the node beats that must not notice.
 
-    What makes whole nodes anew is not looked at: Fast DDS needs tens of milliseconds for each.
+    What makes whole nodes anew is not looked at: Fast DDS needs tens of milliseconds for each, and
+    nothing else in Python runs meanwhile.
     """
 
     def __init__(self, peer: Peer) -> None:
