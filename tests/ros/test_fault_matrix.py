@@ -7,6 +7,7 @@ has interrupted it: that is what executors are for.
 
 from __future__ import annotations
 
+import os
 import re
 import time
 from dataclasses import dataclass
@@ -117,7 +118,18 @@ class Subject:
 
     @property
     def state(self) -> str:
-        return str(finished(self._state.call_async(GetState.Request())).current_state.label)
+        # What was sent to a node that was just being made anew is asked for once more.
+        asked: list[Any] = []
+
+        def is_answered() -> bool:
+            if not asked or time.monotonic() > asked_s + len(asked):
+                asked.append(self._state.call_async(GetState.Request()))
+            return any(future.done() for future in asked)
+
+        asked_s = time.monotonic()
+        wait_until(is_answered, f"the state of {self.name}")
+        answer = next(future.result() for future in asked if future.done())
+        return str(answer.current_state.label)
 
     def set_fault(self, fault: str) -> None:
         message = Parameter("fault", value=fault).to_parameter_msg()
@@ -182,6 +194,11 @@ class Metronome:
         self._arrivals_s.append(time.monotonic())
 
 
+def tolerance() -> float:
+    """Return 5 %, and more where more wants to run than there are cores: timers are late then."""
+    return 0.05 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+
+
 def check(system: RunningSystem, subject: Subject, place: str, fault: str, begun: Any) -> None:
     """Hold what came of a fault against the table."""
     row = expected(place, fault)
@@ -230,12 +247,12 @@ def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
         subjects = [Subject(peer, name) for name in FAULTS]
         hanging = {place: Subject(peer, f"hang_{place}") for place in PLACES}
         metronome.forget()
-        undisturbed_hz = pytest.approx(metronome.rate_hz(), rel=0.05)
+        undisturbed_hz = metronome.rate_hz()
 
         for place in (*CALLBACKS, "configure", "activate", "deactivate", "cleanup", "error"):
             for subject in subjects:
                 fail(system, subject, place)
-        assert metronome.rate_hz() == undisturbed_hz
+        assert metronome.rate_hz() == pytest.approx(undisturbed_hz, rel=tolerance())
         start_all(peer)  # those whose on_error failed are made anew
         metronome.forget()
         for subject in subjects:
@@ -249,7 +266,7 @@ def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
         for place, subject in hanging.items():
             check(system, subject, place, "hang", begun[place])
             system.wait_for(rf"/hang_{place} is stuck and did not return from on_{place} within")
-        assert metronome.rate_hz() == undisturbed_hz
+        assert metronome.rate_hz() == pytest.approx(undisturbed_hz, rel=tolerance())
 
         for subject in (*subjects, *hanging.values()):
             if subject.state != "finalized":
