@@ -13,6 +13,7 @@ from pathlib import Path
 
 from benchmarks import (
     large_systems,
+    others,
     pipeline,
     plot,
     soak,
@@ -36,6 +37,7 @@ BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
     "timers": ("jitter of a timer", systems.timers),
     "calls": ("services and actions", systems.calls),
     "outside": ("DDS to another process", systems.outside),
+    "others": ("the ring with Zenoh and ezmsg, installed when first run", others.measure),
     "soak": ("a day of work in little: is memory flat?", soak.measure),
     "tracing": ("what the times of callbacks cost", systems.tracing),
 }
@@ -67,7 +69,8 @@ def _run(names: list[str], *, long: bool) -> None:
         found = measure(long=long)
         print(table(found), end="\n\n", flush=True)  # at once: an interrupted run tells this much
         rows += found
-    print(targets.table(rows), end="\n\n")
+    if judged := targets.table(rows):
+        print(judged, end="\n\n")
     print("Medians of the rounds; a ratio is ours / theirs of one round, below 1 is less for ours.")
     print(
         f"Load of the machine: {load_before:.1f} before, {os.getloadavg()[0]:.1f} after;", end=" "

@@ -67,15 +67,19 @@ def started(name: str, *arguments: str, variables: Mapping[str, str]) -> Iterato
 
 
 def run_program(
-    name: str, *arguments: str, timeout_s: float, variables: Mapping[str, str] | None = None
+    name: str,
+    *arguments: str,
+    timeout_s: float,
+    variables: Mapping[str, str] | None = None,
+    python: str = sys.executable,
 ) -> dict[str, Any]:
     """Run ``benchmarks.programs.<name>`` and return what it measured. Raises ProgramFailed.
 
-    ``variables`` is its environment; a ROS domain of its own unless given.
+    ``variables`` is its environment, a ROS domain of its own unless given; ``python`` runs it.
     """
     try:
         done = subprocess.run(
-            _command(name, *arguments),
+            _command(name, *arguments, python=python),
             cwd=ROOT,
             env=environment() if variables is None else variables,
             capture_output=True,
@@ -93,5 +97,5 @@ def run_program(
     raise ProgramFailed(f"exit code {done.returncode}: {last}")
 
 
-def _command(name: str, *arguments: str) -> list[str]:
-    return [sys.executable, "-m", f"benchmarks.programs.{name}", *arguments]
+def _command(name: str, *arguments: str, python: str = sys.executable) -> list[str]:
+    return [python, "-m", f"benchmarks.programs.{name}", *arguments]
