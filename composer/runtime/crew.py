@@ -26,6 +26,8 @@ from composer.source import Located
 _PRIMARY = {state.value: state for state in PrimaryState}
 FINALIZED = "finalized"
 _LOOP_ENDS_WITHIN_S = 0.2
+#: A loop lets go of everything that its nodes have; on a busy machine that takes up to so long.
+_NODE_IS_LET_GO_WITHIN_S = 0.005
 _MADE_ANEW_WITHIN_S = 5.0
 
 
@@ -165,8 +167,9 @@ class Crew:
 
     def stop_loops(self) -> None:
         """End the threads of the nodes. What cannot be ended is in ``hung`` then."""
+        within_s = _LOOP_ENDS_WITHIN_S + _NODE_IS_LET_GO_WITHIN_S * len(self.nodes)
         for name, loop in self.loops.items():
-            if not loop.stop(_LOOP_ENDS_WITHIN_S):
+            if not loop.stop(within_s):
                 self.hung.add(name)
 
     def destroy(self, end_s: float) -> bool:
