@@ -173,7 +173,8 @@ def test_cycles_leave_nothing_behind(tmp_path: Path, peer: Peer, cycles: int) ->
         print(f"{cycles} cycles: {grown} kB more")
         assert grown < KILOBYTES_AT_ALL + KILOBYTES_PER_CYCLE * cycles
         assert usage.file_descriptors == descriptors
-        wait_until(lambda: usage.graph == baseline, f"the graph of before, {baseline}")
+        # Earlier tests may still be leaving; nothing is to be there that was not.
+        wait_until(lambda: usage.graph <= baseline, f"the graph of before, {baseline}")
         assert subject.change("configure")
         wait_until(lambda: len(usage.ports) > 10, "it has ports again")
         assert system.stop()[0] == 0
