@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from benchmarks import large_systems
 from benchmarks.figures import Row, aligned, ratios, spread
 from benchmarks.turns import EVENTS, SINGLE, UNTRACED
 
@@ -32,6 +33,9 @@ TARGETS = (
     Target("DDS to another process", _CPU, EVENTS, 0.8),
     Target("service, N=10, p50", "round trip us", EVENTS, 1 / 5),
     Target("pipeline.yaml", "CPU ms/s", "rclpy, SingleThreadedExecutor", 1 / 4),
+    Target(f"start, N=300, {large_systems.COMPOSED}", "s", large_systems.BY_HAND, 1.1),
+    Target(f"start, N=300, {large_systems.LEAN}", "s", large_systems.BY_HAND, 1 / 8),
+    Target(f"stop, N=300, {large_systems.COMPOSED}", "s", large_systems.BY_HAND, 1 / 5),
     Target("ring, N=10", _CPU, UNTRACED, 1.1),
 )
 
