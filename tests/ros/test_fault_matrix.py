@@ -54,6 +54,7 @@ STEPS = {
     ("active", "unconfigured"): "deactivate",
     ("inactive", "unconfigured"): "cleanup",
 }
+DECLARED_HZ = 10.0  # of the metronome; what arrives late and then all at once is faster
 RAISED, EXITED = "ValueError: broken", "SystemExit: out"
 NONSENSE = "returned 'nonsense'"
 
@@ -247,12 +248,10 @@ def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
         subjects = [Subject(peer, name) for name in FAULTS]
         hanging = {place: Subject(peer, f"hang_{place}") for place in PLACES}
         metronome.forget()
-        undisturbed_hz = metronome.rate_hz()
-
         for place in (*CALLBACKS, "configure", "activate", "deactivate", "cleanup", "error"):
             for subject in subjects:
                 fail(system, subject, place)
-        assert metronome.rate_hz() == pytest.approx(undisturbed_hz, rel=tolerance())
+        assert metronome.rate_hz() > (1.0 - tolerance()) * DECLARED_HZ
         start_all(peer)  # those whose on_error failed are made anew
         metronome.forget()
         for subject in subjects:
@@ -266,7 +265,7 @@ def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
         for place, subject in hanging.items():
             check(system, subject, place, "hang", begun[place])
             system.wait_for(rf"/hang_{place} is stuck and did not return from on_{place} within")
-        assert metronome.rate_hz() == pytest.approx(undisturbed_hz, rel=tolerance())
+        assert metronome.rate_hz() > (1.0 - tolerance()) * DECLARED_HZ
 
         for subject in (*subjects, *hanging.values()):
             if subject.state != "finalized":
