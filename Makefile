@@ -40,9 +40,10 @@ run: $(STAMPS)/composer $(STAMPS)/interfaces
 	@echo "==> compose run $(SYSTEM)    (Ctrl-C ends it)"
 	@exec $(PYTHON) tools/run_in_foreground.py $(BIN)/compose run $(SYSTEM)
 
+# Two at a time: tests on ROS wait more than they work. A file stays together, with what it shares.
 test: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks
 	@echo "==> pytest"
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 # What shows only after hundreds of starts, ends and transitions.
 soak: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks
