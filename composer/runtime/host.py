@@ -89,7 +89,7 @@ class HostOptions:
     log_level: LogLevel = LogLevel.INFO
     bring_up_within_s: float = math.inf
     transition_timeout_s: float | None = None
-    stop_within_s: float = 2.0
+    stop_within_s: float = 1.7
     grace_s: float = 10.0
     end_within: Callable[[float | None], None] = lambda _: None
     tracing: bool = True

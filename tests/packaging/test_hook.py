@@ -24,6 +24,7 @@ PUBLISHED = (
     "pyproject.toml",
     "schemas",
     "systems",
+    "tools",
 )
 HAS_PRE_COMMIT = importlib.util.find_spec("pre_commit") is not None
 pytestmark = pytest.mark.skipif(
