@@ -55,8 +55,9 @@ class Project:
     def holds(self, path: Path) -> bool:
         """Say whether ``path`` is in the project, whatever links it leads through."""
         try:
-            return path.resolve().is_relative_to(self.root)
-        except (OSError, RuntimeError, ValueError):  # a link to itself, or no path at all
+            # Unlike Path.resolve, it takes a link to itself the same way on every Python.
+            return Path(os.path.realpath(path)).is_relative_to(self.root)
+        except (OSError, ValueError):  # no path at all
             return False
 
     def _folders(self, chosen: tuple[Path, ...] | None, usual: str) -> tuple[Path, ...]:

@@ -291,7 +291,7 @@ def test_no_link_leads_out(tmp_path: Path) -> None:
     loading = included(inside, "linked.yaml\n  - loop.yaml\n  - '\\0'")
     assert [item.message for item in loading.diagnostics] == [
         "'linked.yaml' is outside the project",
-        "'loop.yaml' is outside the project",
+        "'loop.yaml' does not exist",
         "'\\0' does not exist",
     ]
 
