@@ -6,8 +6,9 @@ import unicodedata
 
 TAB = "    "
 
-#: Controls, formats (bidi overrides among them), surrogates, private use, line separators.
-_UNSAFE_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
+#: Controls, formats (bidi overrides among them), surrogates, private use, line separators; and
+#: spaces that look like the one that YAML knows, and are not.
+_UNSAFE_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp", "Zs"})
 _ZERO_WIDTH_CATEGORIES = frozenset({"Mn", "Me"})
 
 
@@ -30,7 +31,7 @@ def width(text: str) -> int:
 def _visible_character(character: str) -> str:
     if character == "\t":
         return TAB
-    if unicodedata.category(character) not in _UNSAFE_CATEGORIES:
+    if character == " " or unicodedata.category(character) not in _UNSAFE_CATEGORIES:
         return character
     code = ord(character)
     if code <= 0xFF:

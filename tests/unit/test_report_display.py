@@ -16,6 +16,7 @@ from composer.report.display import visible, width
         ("\x1b]0;owned\x07", "\\x1b]0;owned\\x07"),
         ("\u202egnp", "\\u202egnp"),
         ("a\u2028b", "a\\u2028b"),
+        ("no\u00a0break, wide\u3000space", "no\\xa0break, wide\\u3000space"),
         ("\x9b31m", "\\x9b31m"),
         ("\U000e0001", "\\U000e0001"),
         ("\ud800", "\\ud800"),
