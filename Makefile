@@ -72,7 +72,7 @@ bench: $(STAMPS)/composer $(STAMPS)/interfaces
 # atheris finds more, where there is a wheel of it for this Python.
 fuzz: $(STAMPS)/composer $(STAMPS)/checks
 	@$(INSTALL) atheris || echo "==> no atheris for this Python: without it"
-	@$(BIN)/python tools/fuzz.py --seconds $(FUZZ_SECONDS)
+	@$(BIN)/python tools/fuzz.py --seconds $(FUZZ_SECONDS) $(addprefix --seed ,$(FUZZ_SEED))
 
 clean:
 	rm -rf $(VENV) build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache

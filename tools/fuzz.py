@@ -3,6 +3,7 @@
 Two ways, in turns: hypothesis with files that have mistakes in them, as the tests have but without
 end; and atheris, where it is installed, with bytes and expressions, guided by what code they reach.
 What breaks a promise ends this with the input in ``build/fuzz``: make it a test, then mend it.
+With ``--seed`` the inputs are the same each time, as CI wants them; what is new is found without.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import importlib.util
+import os
 import re
 import subprocess
 import sys
@@ -27,6 +29,7 @@ def main() -> None:
     """Run what the command line asks for; exit code 1 when something was found."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=600.0, help="for how long (600)")
+    parser.add_argument("--seed", type=int, default=time.time_ns() % 2**31, help="where to begin")
     parser.add_argument("--target", choices=TARGETS, help=argparse.SUPPRESS)
     options, rest = parser.parse_known_args()
     sys.path.insert(0, str(ROOT))
@@ -36,15 +39,15 @@ def main() -> None:
         return
     with_atheris = importlib.util.find_spec("atheris") is not None
     share_s = options.seconds / (1 + len(TARGETS) * with_atheris)
-    _mutations(share_s)
+    _mutations(share_s, options.seed)
     if not with_atheris:
         print("atheris is not installed: nothing is guided by coverage", file=sys.stderr)
         return
     for target in TARGETS:
-        _start_guided(target, share_s)
+        _start_guided(target, share_s, options.seed)
 
 
-def _mutations(seconds: float) -> None:
+def _mutations(seconds: float, first: int) -> None:
     """Validate what the property tests validate, again and again, each time other examples."""
     from hypothesis import given, seed, settings  # noqa: PLC0415
 
@@ -59,21 +62,24 @@ def _mutations(seconds: float) -> None:
     examples = 0
     while time.monotonic() < end_s:
         for inputs in (MISTAKEN, MISWRITTEN):
-            many(seed(time.time_ns())(given(inputs)(hold)))()
+            many(seed(first + examples)(given(inputs)(hold)))()
             examples += EXAMPLES_PER_ROUND
             print(f"{examples} files with mistakes", file=sys.stderr, flush=True)
 
 
-def _start_guided(target: str, seconds: float) -> None:
+def _start_guided(target: str, seconds: float, seed: int) -> None:
     """Run libFuzzer in a process of its own, for it takes over the one it is in."""
     corpus = FOUND / f"corpus_{target}"
     corpus.mkdir(exist_ok=True)
-    for number, seed in enumerate(_seeds(target)):
-        (corpus / f"seed_{number}").write_text(seed, encoding="utf-8")
+    for number, text in enumerate(_seeds(target)):
+        (corpus / f"seed_{number}").write_text(text, encoding="utf-8")
     command = [sys.executable, __file__, "--target", target, str(corpus)]
     limits = ["-rss_limit_mb=1000", "-timeout=10", f"-artifact_prefix={FOUND}/{target}_"]
     ended = subprocess.run(
-        [*command, f"-max_total_time={int(seconds)}", *limits], cwd=ROOT, check=False
+        [*command, f"-max_total_time={int(seconds)}", f"-seed={seed}", *limits],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONHASHSEED": "0"},  # the same branches for the same input
+        check=False,
     )
     if ended.returncode:
         raise SystemExit(1)
