@@ -11,7 +11,7 @@ import typer
 
 from composer.cli.help import examples
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
-from composer.cli.system_name import name_of_system
+from composer.cli.system_name import AnyRunningSystem, name_of_system
 from composer.cli.terminal import columns, write
 
 if TYPE_CHECKING:
@@ -28,20 +28,15 @@ _HEAD = ("node", "state", "since", "restarts", "errors", "out Hz", "in Hz", "las
 
 
 def ps(
-    system: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[SYSTEM]", help="A running system, or its file.", show_default=False
-        ),
-    ] = None,
+    system: AnyRunningSystem = None,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")] = False,
 ) -> None:
     """List running systems: the state of each node, since when, its rates, what went wrong last.
 
     Rates are of topic messages over the last second. With --json what callbacks take is told, too;
-    'compose top' shows it. Lifecycle nodes that no composer runs are
-    listed with their states. Who does not answer is said to be so.
+    'compose top' shows it. Lifecycle nodes that no composer runs are listed with their states. Who
+    does not answer is said to be so.
     """
     name = None if system is None else name_of_system(system)
     with ros_session("compose ps", timeout) as (session, deadline):

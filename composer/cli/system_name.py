@@ -18,6 +18,12 @@ RunningSystem = Annotated[
     ),
 ]
 
+#: One running system, or whichever there are.
+AnyRunningSystem = Annotated[
+    str | None,
+    typer.Argument(metavar="[SYSTEM]", help="A running system, or its file.", show_default=False),
+]
+
 
 def name_of_system(text: str) -> str:
     """Return the name that ``text`` means: of a file, what it calls its system.

@@ -12,7 +12,7 @@ from composer.cli.failure import Failure
 from composer.cli.help import examples
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
 from composer.cli.screen import Screen
-from composer.cli.system_name import name_of_system
+from composer.cli.system_name import AnyRunningSystem, name_of_system
 from composer.cli.terminal import write
 
 if TYPE_CHECKING:
@@ -34,12 +34,7 @@ _SILENT_S = 5.0
 
 
 def top(
-    system: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[SYSTEM]", help="A running system, or its file.", show_default=False
-        ),
-    ] = None,
+    system: AnyRunningSystem = None,
     *,
     sort: Annotated[
         str, typer.Option("--sort", metavar="WHAT", help=f"What comes first: {_SORTINGS}.")

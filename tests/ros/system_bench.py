@@ -34,6 +34,12 @@ from composer.runtime.host import Host, HostOptions
 from composer.runtime.shared_memory import remove_half_made_ports
 
 PATIENCE_S = 20.0
+_GOALS = {
+    "configure": "inactive",
+    "activate": "active",
+    "deactivate": "inactive",
+    "cleanup": "unconfigured",
+}
 E = TypeVar("E", bound=Event)
 
 
@@ -89,6 +95,14 @@ class RunningSystem:
         """Where nodes came to rest, in order: ``/talker active``."""
         changes = [str(event) for event in self.told(StateChanged)]
         return changes if node is None else [text for text in changes if text.startswith(node)]
+
+    def change(self, node: str, *transitions: str) -> None:
+        """Let a node go through transitions, one after the other."""
+        running_node = self.host._crew.nodes[node]
+        for transition in transitions:
+            running_node.loop.run_task(running_node.change(transition))
+            goal = _GOALS[transition]
+            wait_until(lambda goal=goal: running_node.state == goal, f"{node} {goal}")
 
     def log(self) -> list[str]:
         return [event.message for event in self.told(Logged)]

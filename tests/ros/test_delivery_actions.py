@@ -81,12 +81,6 @@ def go(system: RunningSystem, max_velocity: float) -> Any:
     return client._behavior
 
 
-def change(system: RunningSystem, node: str, transition: str, state: str) -> None:
-    running_node = system.host._crew.nodes[node]
-    running_node.loop.run_task(running_node.change(transition))
-    wait_until(lambda: running_node.state == state, f"{node} {state}")
-
-
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 @pytest.mark.parametrize("delivery", ["auto", "dds"])
 def test_every_outcome_of_a_goal_is_the_same_either_way(
@@ -115,17 +109,17 @@ def test_every_outcome_of_a_goal_is_the_same_either_way(
 
         go(system, 0.0)
         wait_until(lambda: client.feedback)
-        change(system, "server", "deactivate", "inactive")
+        system.change("server", "deactivate")
         wait_until(lambda: len(client.outcomes) == 4)
         assert client.outcomes[-1][0] == "canceled"  # whether the sleep ends first or not
         go(system, 1.0)
         wait_until(lambda: len(client.outcomes) == 5)
         assert client.outcomes[-1] == "GoalRejected"
 
-        change(system, "server", "activate", "active")
+        system.change("server", "activate")
         go(system, 0.0)
         wait_until(lambda: client.feedback)
-        change(system, "client", "deactivate", "inactive")
+        system.change("client", "deactivate")
         wait_until(lambda: len(client.outcomes) == 6)
         assert client.outcomes[-1] == "CallCancelled"
         goals = system.host._crew.nodes["server"]._assembly.action_servers["go"]._goals

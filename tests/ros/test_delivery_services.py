@@ -56,12 +56,6 @@ class Client(Behavior):
 REFUSED = (False, "/server is inactive, not active")
 
 
-def change(system: RunningSystem, node: str, transition: str, state: str) -> None:
-    running_node = system.host._crew.nodes[node]
-    running_node.loop.run_task(running_node.change(transition))
-    wait_until(lambda: running_node.state == state, f"{node} {state}")
-
-
 def ask(system: RunningSystem, data: bool = True) -> None:
     client = system.host._crew.nodes["client"]
     client._core.spawn(client._behavior.ask(data))
@@ -89,19 +83,19 @@ def test_every_outcome_of_a_call_is_the_same_either_way(
         ask(system, data=False)
         assert outcomes(system, 2)[-1] == "CallTimeout"
 
-        change(system, "server", "deactivate", "inactive")
+        system.change("server", "deactivate")
         ask(system)
         assert outcomes(system, 3)[-1] == REFUSED
-        change(system, "server", "cleanup", "unconfigured")
+        system.change("server", "cleanup")
         ask(system)
         assert outcomes(system, 4)[-1] == "ServerUnavailable"
 
-        change(system, "server", "configure", "inactive")
-        change(system, "server", "activate", "active")
+        system.change("server", "configure")
+        system.change("server", "activate")
         ask(system, data=False)
         server = system.host._crew.nodes["server"]._behavior
         wait_until(lambda: server.asked)
-        change(system, "client", "deactivate", "inactive")
+        system.change("client", "deactivate")
         assert outcomes(system, 5)[-1] == "CallCancelled"
     counted = {entry.node: entry.calls for entry in system.end().nodes}
     assert counted == {"/client": 4, "/server": 3}
@@ -121,7 +115,7 @@ def test_a_server_that_ends_with_a_request_open_says_so_and_outsiders_are_served
         ask(system, data=False)
         server = system.host._crew.nodes["server"]._behavior
         wait_until(lambda: len(server.asked) == 2)
-        change(system, "server", "deactivate", "inactive")
+        system.change("server", "deactivate")
         (success, message), *_ = outcomes(system, 1)
     assert not success
     assert "not active" in message

@@ -79,14 +79,6 @@ def send(system: RunningSystem, count: int) -> None:
     source.loop.run(lambda: source._behavior.send(count))
 
 
-def change(system: RunningSystem, node: str, *transitions: str) -> None:
-    running_node = system.host._crew.nodes[node]
-    for transition in transitions:
-        running_node.loop.run_task(running_node.change(transition))
-        goal = {"activate": "active", "cleanup": "unconfigured"}.get(transition, "inactive")
-        wait_until(lambda goal=goal: running_node.state == goal, f"{node} {goal}")
-
-
 def numbers(messages: list[Any]) -> list[int]:
     return [message.data for message in messages]
 
@@ -125,19 +117,19 @@ def test_what_is_published_is_what_is_received_and_outsiders_hear_it_too(
 
 def test_what_is_under_way_when_its_reader_leaves_active_is_dropped(tmp_path: Path) -> None:
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
-        change(system, "near", "deactivate")
+        system.change("near", "deactivate")
         send(system, 3)
         near = system.host._crew.nodes["near"]
         wait_until(lambda: near.statistics.dropped == 3)
-        change(system, "near", "activate")
+        system.change("near", "activate")
         send(system, 2)
         wait_until(lambda: len(near._behavior.heard) == 2)
         assert numbers(near._behavior.heard) == [3, 4]
         # A node that is cleaned up has no subscription: nothing is kept for it.
-        change(system, "near", "deactivate", "cleanup")
+        system.change("near", "deactivate", "cleanup")
         send(system, 2)
         wait_until(lambda: len(behavior(system, "far").heard) == 7)
-        change(system, "near", "configure", "activate")
+        system.change("near", "configure", "activate")
         send(system, 1)
         wait_until(lambda: len(near._behavior.heard) == 1)
         assert numbers(near._behavior.heard) == [7]
@@ -187,7 +179,7 @@ def test_who_joins_late_gets_what_is_latched_once_inside_and_outside(
     """
     with running(LATCHED, tmp_path, setter=module) as system:
         for node in ("volatile", "late"):
-            change(system, node, "configure", "activate")
+            system.change(node, "configure", "activate")
         system.wait_for_log("late 3")
         profile = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         outside = outsider().listen(Int64, "/mode", profile)
