@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from benchmarks import (
+    answers,
     large_systems,
     others,
     pipeline,
@@ -27,6 +28,7 @@ from benchmarks.figures import Row, as_json, table
 RESULTS = Path(__file__).parent / "results"
 BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
     "commands": ("wall time of commands that start nothing", start_up.measure),
+    "answers": ("wall time of commands beside a running system", answers.measure),
     "validation": ("growth of compose validate with the size of a system", validation.measure),
     "pipeline": ("CPU of systems/pipeline.yaml", pipeline.measure),
     "ring": ("CPU per message as fast as it goes, start-up and memory of N nodes", systems.ring),
@@ -37,7 +39,7 @@ BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
     "timers": ("jitter of a timer", systems.timers),
     "calls": ("services and actions", systems.calls),
     "outside": ("DDS to another process", systems.outside),
-    "others": ("the ring with Zenoh and ezmsg, installed when first run", others.measure),
+    "others": ("the ring with Zenoh, ezmsg and dora, installed when first run", others.measure),
     "soak": ("a day of work in little: is memory flat?", soak.measure),
     "tracing": ("what the times of callbacks cost", systems.tracing),
 }

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import IO
@@ -69,7 +69,7 @@ def measure(*, long: bool) -> list[Row]:
 
 def cpu_ms_per_s(side: Side, seconds: float) -> float:
     """Run one side and return what CPU it took. Raises ProgramFailed."""
-    with _running(side) as (process, output):
+    with running(side, environment()) as (process, output):
         up_s = time.perf_counter()
         time.sleep(_SETTLE_S)
         cpu_s, began_s = _cpu_s(process.pid), time.perf_counter()
@@ -86,11 +86,17 @@ def cpu_ms_per_s(side: Side, seconds: float) -> float:
 
 
 @contextmanager
-def _running(side: Side) -> Iterator[tuple[subprocess.Popen[bytes], IO[bytes]]]:
+def running(
+    side: Side, variables: Mapping[str, str]
+) -> Iterator[tuple[subprocess.Popen[bytes], IO[bytes]]]:
+    """Let one side run for the length of the block, which begins when it is up.
+
+    ``variables`` is its environment. Raises ProgramFailed when it does not come up.
+    """
     command: Sequence[str] = (sys.executable, *side.command)
     with tempfile.TemporaryFile() as output:
         process = subprocess.Popen(
-            command, cwd=ROOT, env=environment(), stdout=output, stderr=subprocess.STDOUT
+            command, cwd=ROOT, env=variables, stdout=output, stderr=subprocess.STDOUT
         )
         try:
             _wait_until_up(process, output, side.ready)

@@ -5,18 +5,24 @@ from __future__ import annotations
 from benchmarks.figures import Row
 from benchmarks.processes import run_program
 
-_SETTLED = 0.2  # of the work: by then everything has happened often
+FIFTHS = 5  # of the work: after the first of them everything has happened often
 
 
 def measure(*, long: bool) -> list[Row]:
-    """Compare the memory at the end with that after a fifth of the work. Raises ProgramFailed.
+    """Compare the memory after each fifth of the work with that after the first.
 
     Long is 10 million messages, 10 000 changes of timers and 1000 lifecycle cycles; short is a
-    fiftieth of that.
+    fiftieth of that. Raises ProgramFailed.
     """
-    share = 1.0 if long else 0.02
-    figures = run_program("soak", "--share", str(share), timeout_s=3600.0)
-    memory_mb = figures["memory_mb"]
-    settled_mb = memory_mb[int(len(memory_mb) * _SETTLED)]
+    figures = run_program("soak", "--share", str(1.0 if long else 0.02), timeout_s=3600.0)
+    first_mb, *later_mb = after_fifths(figures["memory_mb"])
     case = f"soak, {figures['messages']} messages"
-    return [Row(case, "MB", "after a fifth of it", (memory_mb[-1],), (settled_mb,))]
+    return [
+        Row(f"{case}, after {fifth} fifths", "MB", "after 1 fifth", (memory_mb,), (first_mb,))
+        for fifth, memory_mb in enumerate(later_mb, start=2)
+    ]
+
+
+def after_fifths(memory_mb: list[float]) -> list[float]:
+    """Return what the memory was after each fifth of the looks at it."""
+    return [memory_mb[len(memory_mb) * fifth // FIFTHS - 1] for fifth in range(1, FIFTHS + 1)]

@@ -19,8 +19,8 @@ EVENTS = "EventsExecutor"
 
 Rounds = Mapping[str, Sequence[Mapping[str, Any] | None]]
 Figure = Callable[[Mapping[str, Any]], float | None]
-#: A program that hangs is given up; large systems take long to start by hand.
-_PATIENCE_S, _PATIENCE_S_PER_NODE = 15.0, 0.25
+#: A program that hangs is given up; large systems take long to start by hand, as do many processes.
+_PATIENCE_S, _PATIENCE_S_PER_NODE, _PATIENCE_S_PER_PROCESS = 15.0, 0.25, 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Case:
     rounds: int
     rate_hz: float = 100.0
     message: str = "String"
-    apart: bool = False  # two processes, a node in each
+    apart: bool = False  # a process for each node
 
     @property
     def arguments(self) -> tuple[str, ...]:
@@ -77,9 +77,12 @@ def _run(way: str, case: Case) -> Mapping[str, Any] | None:
         with ExitStack() as stack:
             domain = environment()
             if case.apart:
-                stack.enter_context(started(*command, "--part", "1", variables=domain))
+                for part in range(1, case.nodes):
+                    others = (*command, "--part", str(part))
+                    stack.enter_context(started(*others, variables=domain))
                 command = (*command, "--part", "0")
-            patience_s = _PATIENCE_S + _PATIENCE_S_PER_NODE * case.nodes
+            per_node_s = _PATIENCE_S_PER_PROCESS if case.apart else _PATIENCE_S_PER_NODE
+            patience_s = _PATIENCE_S + per_node_s * case.nodes
             return run_program(*command, timeout_s=patience_s, variables=domain)
     except ProgramFailed:
         if program == "composed":

@@ -25,7 +25,7 @@ from composer.interfaces import Interfaces
 from composer.model import System
 from composer.project import SETTINGS_FILE, Project, Settings
 from composer.project.choices import told, wrong_choices
-from composer.resolve import Overrides, read_overrides, resolve
+from composer.resolve import NOTHING_SAID, CommandLine, Overrides, read_overrides, resolve
 from composer.schema import check_schema, kind_of, kinds
 from composer.schema.kinds import check_kind
 from composer.source import SourceFile, Span
@@ -63,17 +63,16 @@ def load(
     path: Path,
     *,
     shown: str | None = None,
-    parameter_overrides: Iterable[str] = (),
-    namespace: str | None = None,
+    said: CommandLine = NOTHING_SAID,
     interfaces: Interfaces | None = None,
 ) -> Loading:
     """Read, resolve and check the system or node type in the file ``path``.
 
-    ``shown`` is the file's name in findings. ``parameter_overrides`` are texts of the form
-    ``node.parameter=value``; ``namespace`` takes the place of the system's own. ``interfaces`` may
-    be given by who loads many files of one project: reading them is what takes time.
+    ``shown`` is the file's name in findings, ``said`` what a command line says on top of the file.
+    ``interfaces`` may be given by who loads many files of one project: reading them is what takes
+    time.
     """
-    overrides, found = read_overrides(parameter_overrides, namespace)
+    overrides, found = read_overrides(said)
     known = _Known.of(_real_folder(path), interfaces)
     return _load_file(path, shown, known, overrides, found)
 

@@ -1,9 +1,10 @@
-"""What every test process gets: a DDS domain of its own, and honest skips where ROS is absent."""
+"""What every module of tests gets: a DDS domain of its own, and honest skips without ROS."""
 
 from __future__ import annotations
 
 import fcntl
 import importlib.util
+import itertools
 import os
 import signal
 import sys
@@ -74,16 +75,14 @@ def _leave_out(config: pytest.Config, items: list[pytest.Item], marker: str) -> 
         items[:] = [item for item in items if item not in left_out]
 
 
-def _hold_domain_id() -> tuple[int, TextIO]:
-    """Take a domain id that no other test process on this machine has.
+def _hold_domain_id(begin: int) -> tuple[int, TextIO]:
+    """Take a domain id that no other test process on this machine has, from ``begin`` on.
 
     The lock lasts as long as the returned file is open, however the process ends.
     """
     locks = Path(tempfile.gettempdir()) / f"ros2-composer-domain-ids-{os.getuid()}"
     locks.mkdir(exist_ok=True)
-    # Processes started one after another begin in different places: what a killed one left on
-    # the network does not meet the next.
-    start = os.getpid() % len(DOMAIN_IDS)
+    start = begin % len(DOMAIN_IDS)
     for domain_id in (*DOMAIN_IDS[start:], *DOMAIN_IDS[:start]):
         lock = (locks / str(domain_id)).open("w", encoding="ascii")
         try:
@@ -95,10 +94,15 @@ def _hold_domain_id() -> tuple[int, TextIO]:
     pytest.exit(f"all {len(DOMAIN_IDS)} domain ids are taken by other test processes", 3)
 
 
-@pytest.fixture(scope="session", autouse=True)
+#: Where to look for the next domain id. What a killed process left on the network, or nodes that
+#: hang in this one, do not meet the next module, or the next process.
+_next_domain_id = itertools.count(os.getpid())
+
+
+@pytest.fixture(scope="module", autouse=True)
 def ros_domain_id() -> Iterator[int]:
-    """The domain id of this test process, set for it and for every process it starts."""
-    domain_id, lock = _hold_domain_id()
+    """The domain id of this module, set for it and for every process it starts."""
+    domain_id, lock = _hold_domain_id(next(_next_domain_id))
     with pytest.MonkeyPatch.context() as environment, lock:
         environment.setenv("ROS_DOMAIN_ID", str(domain_id))
         environment.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")

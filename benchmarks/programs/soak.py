@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import gc
 import sys
 import tempfile
 import threading
@@ -93,7 +92,6 @@ def _work(nodes: dict[str, RunningNode], share: float) -> Iterator[float]:
             _cycle(nodes["cycling"])
         while COUNTS.delivered < MESSAGES * share * step / _STEPS:
             time.sleep(0.01)
-        gc.collect()
         yield memory_mb()
 
 

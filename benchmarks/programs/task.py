@@ -16,8 +16,8 @@ class Task:
     ``shape``: in a *ring* one message goes round and round; in a *chain* and a *star* the first
     node sends at ``rate_hz``, and the others pass it on or hear it; in a *hop* the second node
     alone hears it; a *timer* ticks in the first node; the first node asks the second by *service*
-    or *action*. What has no part in it is there and idle. ``part`` 0 or 1 is one half of
-    a ring of two, the other half of which is another process.
+    or *action*. What has no part in it is there and idle. ``part`` is the index of
+    the one node of a ring that this process has, when the others are other processes.
     """
 
     executor: str

@@ -16,9 +16,9 @@ from benchmarks.programs.task import Task
 
 KICK_PERIOD_S = 0.2
 _BYTES_PER_MB = 1_000_000
-_PATIENCE_S = 5.0
-_WARM_UP_S = 0.3
-_OTHER_HALF_S = 120.0  # is over long before; nobody may be left to end this half
+_PATIENCE_S, _PATIENCE_S_PER_PART = 5.0, 3.0
+WARM_UP_S = 0.3
+_OTHERS_LAST_S = 120.0  # is over long before; nobody may be left to end the other parts
 
 
 @dataclass(slots=True)
@@ -57,11 +57,12 @@ def measure(
         "start_s": time.perf_counter() - started_s,
         "memory_mb": memory_mb(),
     }
-    if task.part == 1:
-        time.sleep(_OTHER_HALF_S)
+    if task.part:  # the first measures
+        time.sleep(_OTHERS_LAST_S)  # its nodes work on threads of their own
         os._exit(0)
-    _wait_for_work(kick)
-    time.sleep(_WARM_UP_S)
+    parts = 0 if task.part is None else task.nodes
+    _wait_for_work(kick, _PATIENCE_S + _PATIENCE_S_PER_PART * parts)
+    time.sleep(WARM_UP_S)  # caches are cold, and the first messages wait for each other
     delivered, ticks, took = COUNTS.delivered, len(COUNTS.ticks_ns), len(COUNTS.took_ns)
     cpu_s, wall_s = time.process_time(), time.perf_counter()
     time.sleep(task.seconds)
@@ -80,11 +81,11 @@ def hand_over(figures: dict[str, Any]) -> None:
     os._exit(0)
 
 
-def _wait_for_work(kick: Callable[[], None]) -> None:
-    until_s = time.monotonic() + _PATIENCE_S
+def _wait_for_work(kick: Callable[[], None], patience_s: float) -> None:
+    until_s = time.monotonic() + patience_s
     while not (COUNTS.delivered or COUNTS.ticks_ns or COUNTS.took_ns):
         if time.monotonic() > until_s:
-            print(f"nothing moved within {_PATIENCE_S:g} s", file=sys.stderr, flush=True)
+            print(f"nothing moved within {patience_s:g} s", file=sys.stderr, flush=True)
             os._exit(1)
         kick()
         time.sleep(KICK_PERIOD_S)

@@ -1,7 +1,7 @@
 """An included system put in its place: below a namespace, its nodes with a prefix.
 
-What a file says about all of its nodes (namespace, lifecycle, introspection) is said of each of
-them, so that it does not become what the including system says.
+What a file says about all of its nodes (namespace, lifecycle, introspection, use_sim_time) is said
+of each of them, so that it does not become what the including system says.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from composer.assembly.merging import merged
+from composer.model import USE_SIM_TIME
 from composer.source import Located, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
@@ -82,6 +83,9 @@ def _defaults(tree: Mapping) -> dict[str, Mapping]:
         entries = tuple(entry for entry in _entries(said) if entry.name not in _OF_THE_SYSTEM)
         if said is not None and entries:
             found[name] = Mapping(entries, said.span)
+    clock = tree.entry(USE_SIM_TIME)
+    if clock is not None and isinstance(clock.value, Scalar):
+        found["parameters"] = Mapping((clock,), clock.key.span)
     return found
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from composer.checks.context import Context
 from composer.checks.parameter_values import KNOWN_TYPES, describe, type_problem
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
-from composer.model import Parameter, ParameterType
+from composer.model import USE_SIM_TIME, Parameter, ParameterType
 
 RULE = register(
     Rule(
@@ -49,9 +49,17 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the declarations, not at values."""
     for node in context.system.nodes:
         for parameter in node.parameters:
+            yield from _of_every_node(parameter)
             if parameter.type.value in KNOWN_TYPES:
                 yield from _range(parameter)
                 yield from _choices(parameter)
+
+
+def _of_every_node(parameter: Parameter) -> Iterator[Diagnostic]:
+    kind = parameter.type
+    if parameter.name.value == USE_SIM_TIME and kind.value in KNOWN_TYPES - {ParameterType.BOOL}:
+        message = f"parameter '{USE_SIM_TIME}', which every node has, is of type bool, not {kind}"
+        yield Diagnostic(RULE, message, kind.span)
 
 
 def _range(parameter: Parameter) -> Iterator[Diagnostic]:

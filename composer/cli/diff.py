@@ -108,7 +108,7 @@ def diff(
 
 def _load(text: str, settings: list[str], namespace: str | None) -> System:
     path = system_file(text)
-    loading = load_system(path, shown=text, parameter_overrides=settings, namespace=namespace)
+    loading = load_system(path, shown=text, settings=settings, namespace=namespace)
     if loading.system is not None and loading.system.node_type:
         raise Failure(f"'{text}' is a node type, not a system")
     if loading.system is None or not loading.runnable:

@@ -100,14 +100,16 @@ def _live_findings(timeout: float) -> Iterator[Finding]:
     from composer.runtime.doctor.finding import error
 
     try:
-        with ros_session("compose doctor", timeout) as (session, deadline):
+        with ros_session("compose doctor", timeout, carries_messages=True) as (session, deadline):
             from composer.runtime.doctor.graph import (
+                look_at_delivery,
                 look_at_discovery,
                 look_at_graph,
                 look_at_middleware,
             )
 
             yield look_at_middleware()
+            yield look_at_delivery(session)
             yield look_at_discovery(session, deadline)
             yield from look_at_graph(session, deadline)
     except (ImportError, RuntimeError) as problem:  # rclpy's own errors are RuntimeErrors

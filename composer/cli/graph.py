@@ -170,7 +170,10 @@ def _declared(names: list[str]) -> Scene:
 def _live(timeout_s: float, measure_s: float) -> Scene:
     from composer.cli.ros import ros_session
 
-    with ros_session("compose graph --live", timeout_s) as (session, deadline):
+    with ros_session("compose graph --live", timeout_s, carries_messages=True) as (
+        session,
+        deadline,
+    ):
         from composer.graph import live_scene_of
         from composer.runtime.snapshot import Observer
 

@@ -56,13 +56,17 @@ def _control(timeout_s: float) -> Iterator[Control]:
 
 @app.command("nodes", epilog=examples("compose lifecycle nodes", "compose lifecycle nodes --json"))
 def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, as_json: Json = False) -> None:
-    """List the lifecycle nodes and their states."""
+    """List the lifecycle nodes and their states.
+
+    Exit code 1 when a system runs on this computer and does not answer: its nodes are missing.
+    """
     with _control(timeout) as control:
         states = control.states(control.nodes())
-    if as_json:
-        write(json.dumps(states, indent=2))
-    elif states:
-        write(columns([(name, state or "(no answer)") for name, state in states.items()]))
+        if as_json:
+            write(json.dumps(states, indent=2))
+        elif states:
+            write(columns([(name, state or "(no answer)") for name, state in states.items()]))
+        control.check_all_answer()
 
 
 @app.command(

@@ -59,8 +59,9 @@ def load_system(
     path: Path,
     *,
     shown: str | None = None,
-    parameter_overrides: Iterable[str] = (),
+    settings: Iterable[str] = (),
     namespace: str | None = None,
+    use_sim_time: bool = False,
 ) -> Loading:
     """Read and check the system in ``path``; errors and warnings go to stderr, with carets.
 
@@ -69,12 +70,12 @@ def load_system(
     from composer.diagnostics import Severity
     from composer.loading import load
     from composer.report.text import render
+    from composer.resolve import CommandLine
 
     loading = load(
         path,
         shown=str(path) if shown is None or not Path(shown).is_file() else shown,
-        parameter_overrides=parameter_overrides,
-        namespace=namespace,
+        said=CommandLine(tuple(settings), namespace, use_sim_time),
     )
     pressing = [found for found in loading.diagnostics if found.severity is not Severity.INFO]
     if pressing:

@@ -44,11 +44,18 @@ def require_ros(command: str) -> None:
 
 
 @contextmanager
-def ros_session(command: str, timeout_s: float) -> Iterator[tuple[Session, Deadline]]:
-    """Join the ROS graph for the length of a ``with`` block; errors of ROS become Failures."""
-    require_ros(command)
-    from composer.runtime.session import Deadline, RosError, Session
+def ros_session(
+    command: str, timeout_s: float, *, carries_messages: bool = False
+) -> Iterator[tuple[Session, Deadline]]:
+    """Join the ROS graph for the length of a ``with`` block; errors of ROS become Failures.
 
+    ``carries_messages`` says that messages of topics come or go, which may be large.
+    """
+    require_ros(command)
+    from composer.runtime.session import Deadline, RosError, Session, suit_commands
+
+    if not carries_messages:
+        suit_commands()
     deadline = Deadline(timeout_s)
     try:
         with Session() as session:

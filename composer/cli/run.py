@@ -30,6 +30,7 @@ EPILOG = examples(
     "compose run pipeline --dry-run                        the plan only, needs no ROS",
     "compose run pipeline --set planner.max_velocity=0.5   another parameter value",
     "compose run pipeline --namespace /robot1",
+    "compose run pipeline --use-sim-time                   with a simulator that publishes /clock",
     "compose run pipeline --autostart inactive             then: compose lifecycle set ...",
     "compose run pipeline --wait --timeout 10              in the background, once it is up",
 )
@@ -84,6 +85,13 @@ def run(
         ),
     ] = None,
     namespace: Namespace = None,
+    use_sim_time: Annotated[
+        bool,
+        typer.Option(
+            "--use-sim-time",
+            help="Let the time of all nodes that say nothing else be that of /clock.",
+        ),
+    ] = False,
     autostart: Annotated[
         Autostart | None,
         typer.Option(help="How far to bring the nodes up.", show_default="as the file says"),
@@ -129,7 +137,7 @@ def run(
     Ctrl-C stops it. Exit code 1 when the system has errors (nothing is started then), when it does
     not come up (what was started is taken back then), or a node failed for good.
     """
-    declared = _load(system, settings or [], namespace)
+    declared = _load(system, settings or [], namespace, use_sim_time=use_sim_time)
     from composer.model import PrimaryState
     from composer.plan import bring_up
 
@@ -144,6 +152,7 @@ def run(
 
         up_s = _WAIT_S if timeout is None else timeout
         given = _arguments(system, settings or [], namespace, autostart, log_level)
+        given += ["--use-sim-time"] if use_sim_time else []
         given += [] if tracing else ["--no-tracing"]
         given += ["--check-mutation"] if check_mutation else []
         limits = _numbers({"--for": run_for, "--timeout": up_s, "--grace": grace})
@@ -157,9 +166,15 @@ def run(
         raise typer.Exit(outcome.exit_code)
 
 
-def _load(text: str, settings: list[str], namespace: str | None) -> System:
+def _load(text: str, settings: list[str], namespace: str | None, *, use_sim_time: bool) -> System:
     path = system_file(text)
-    loading = load_system(path, shown=text, parameter_overrides=settings, namespace=namespace)
+    loading = load_system(
+        path,
+        shown=text,
+        settings=settings,
+        namespace=namespace,
+        use_sim_time=use_sim_time,
+    )
     if loading.system is not None and loading.system.node_type:
         raise Failure(
             f"'{text}' is a node type, not a system",

@@ -17,7 +17,7 @@ from composer.cli.values import as_json
 
 if TYPE_CHECKING:
     from composer.qos import QosProfile
-    from composer.runtime.inspect_topics import End, TopicInfo
+    from composer.runtime.topic_ends import End, TopicInfo
 
 app = typer.Typer(
     help="See what goes over topics, measure it, and publish.",

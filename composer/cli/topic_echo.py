@@ -55,7 +55,10 @@ def echo(
     from all of them; --qos-... asks for more.
     """
     wanted = compiled_filter(condition)
-    with ros_session("compose topic", topic_timeout_s(timeout)) as (session, deadline):
+    with ros_session("compose topic", topic_timeout_s(timeout), carries_messages=True) as (
+        session,
+        deadline,
+    ):
         from composer.runtime.inspect_topics import Listener, Topics
         from composer.runtime.inspect_values import part, to_plain
 

@@ -54,7 +54,10 @@ class Limits:
 
 def measure(topic: str, measuring: Measuring, qos: QosWish, limits: Limits) -> None:
     """Take what comes up to the limits; print reports every second and at the end."""
-    with ros_session("compose topic", limits.topic_timeout_s) as (session, deadline):
+    with ros_session("compose topic", limits.topic_timeout_s, carries_messages=True) as (
+        session,
+        deadline,
+    ):
         from composer.runtime.inspect_topics import Listener, Topics
         from composer.runtime.session import Deadline, NoAnswer
 

@@ -67,7 +67,7 @@ def pub(
     from composer.qos import PRESETS
 
     limit = 1 if once else times
-    with ros_session("compose topic", timeout) as (session, deadline):
+    with ros_session("compose topic", timeout, carries_messages=True) as (session, deadline):
         from composer.runtime.inspect_publish import Publishing, publish
         from composer.runtime.inspect_values import class_of, compile_content, to_plain
 

@@ -1,7 +1,7 @@
 """How large a file may be.
 
 Every limit is beyond what a person writes, and beyond a generated system of 2000 nodes and 6000
-connections. What exceeds one is refused within a second and 200 MB.
+connections. What exceeds one is refused within about a second and 200 MB.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ MAX_COPIES = 2_000
 MAX_INCLUDES = 500
 
 #: Keys, values, maps and lists in all files that a system includes, and in what patterns stand for.
-MAX_INCLUDED_VALUES = 100_000
+MAX_INCLUDED_VALUES = 50_000
 
 #: Files that include each other, one in another.
 MAX_INCLUDE_DEPTH = 16

@@ -6,6 +6,7 @@ written; the checks say what is wrong with it.
 
 from composer.model.introspection import DEFAULT_INTROSPECTION, Introspection
 from composer.model.ports import (
+    USE_SIM_TIME,
     ChannelKind,
     Delivery,
     Event,
@@ -22,6 +23,7 @@ from composer.model.ports import (
     Reaction,
     Send,
     Timer,
+    TimerClock,
 )
 from composer.model.supervision import (
     DEFAULT_SUPERVISION,
@@ -53,6 +55,7 @@ from composer.model.system import (
 __all__ = [
     "DEFAULT_INTROSPECTION",
     "DEFAULT_SUPERVISION",
+    "USE_SIM_TIME",
     "BehaviorReference",
     "Chain",
     "Channel",
@@ -88,6 +91,7 @@ __all__ = [
     "Supervision",
     "System",
     "Timer",
+    "TimerClock",
     "UnknownKey",
     "Watch",
     "channels",

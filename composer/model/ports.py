@@ -199,6 +199,13 @@ class Period:
         return value / 1000.0 if self.unit is PeriodUnit.MILLISECONDS else 1.0 / value
 
 
+class TimerClock(StrEnum):
+    """What a timer goes by."""
+
+    ROS = "ros"  # the node's time: that of /clock with `use_sim_time`, else as STEADY
+    STEADY = "steady"  # real time, which nobody sets
+
+
 @dataclass(frozen=True, slots=True)
 class Timer:
     """Something a node does again and again while it is active."""
@@ -207,10 +214,15 @@ class Timer:
     period: Period
     span: Span = field(compare=False)
     reaction: Reaction | None = None
+    clock: TimerClock = TimerClock.ROS
     budget_ms: Located[float] | None = None  # how long its callback may take
     reentrant: bool = False
     always_on: bool = False  # it runs while its node is inactive, too
     description: str = ""
+
+
+#: The parameter that every ROS node has: whether its time is that of /clock.
+USE_SIM_TIME = "use_sim_time"
 
 
 class ParameterType(StrEnum):

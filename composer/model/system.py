@@ -253,6 +253,7 @@ class System:
     supervision: Supervision = DEFAULT_SUPERVISION
     implied_dependencies: bool = True
     delivery: Delivery = Delivery.AUTO
+    use_sim_time: bool = False  # what is the system's own, and nodes that say nothing else
     node_type: bool = False
     unmatched_parameters: tuple[Located[str], ...] = ()  # nodes that only parameter files name
     unknown: tuple[UnknownKey, ...] = ()  # what the command line names and the system lacks

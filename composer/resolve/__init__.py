@@ -16,14 +16,14 @@ from composer.catalog import Catalog
 from composer.diagnostics import Diagnostic, in_order
 from composer.model import System
 from composer.resolve.files import Places
-from composer.resolve.overrides import Overrides, read_overrides
+from composer.resolve.overrides import NOTHING_SAID, CommandLine, Overrides, read_overrides
 from composer.resolve.system import resolve_node_type, resolve_system
 from composer.schema import kind_of, kinds
 from composer.schema.kinds import check_kind
 from composer.source import SourceFile
 from composer.tree import Mapping
 
-__all__ = ["Overrides", "read_overrides", "resolve"]
+__all__ = ["NOTHING_SAID", "CommandLine", "Overrides", "read_overrides", "resolve"]
 
 
 def resolve(

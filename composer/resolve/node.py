@@ -8,6 +8,7 @@ from pathlib import Path
 
 from composer.diagnostics import Diagnostic
 from composer.model import (
+    USE_SIM_TIME,
     Dependency,
     Node,
     Port,
@@ -23,7 +24,7 @@ from composer.resolve.files import Places
 from composer.resolve.introspection import introspection
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import ParameterFiles
-from composer.resolve.parameters import with_values
+from composer.resolve.parameters import with_own_clock, with_values
 from composer.resolve.qos import QosTable
 from composer.resolve.reading import entries, is_opaque, key, plain_text, text, text_or_opaque
 from composer.resolve.supervision import supervision
@@ -45,6 +46,7 @@ class Surroundings:
     supervision: Supervision
     introspection: Tree | None
     parameter_files: ParameterFiles
+    use_sim_time: tuple[Entry, ...]  # what is said of all nodes, if anything is
     findings: list[Diagnostic]
 
 
@@ -70,11 +72,14 @@ def node(entry: Entry, around: Surroundings) -> Node:
     declared = made.declaration
     namespace = node_namespace(tree.get("namespace"), around.namespace)
     known = frozenset(parameter.name.value for parameter in declared.parameters)
-    given = around.parameter_files.given(join(namespace.value, entry.name), known)
+    own_clock = type_entry is None and USE_SIM_TIME in known
+    given = {} if own_clock else {item.name: item for item in around.use_sim_time}
+    given |= around.parameter_files.given(join(namespace.value, entry.name), known)
     if type_entry is not None:
         given |= {item.name: item for item in entries(tree.get("parameters"))}
     given |= around.overrides.by_node.get(entry.name, {})
-    parameters, unknown = with_values(declared.parameters, given, complete=made.complete)
+    own = with_own_clock(declared.parameters, given)
+    parameters, unknown = with_values(own, given, complete=made.complete)
     remappings = _remappings(tree.get("remappings"))
     lifecycle = tree.get("lifecycle")
     lifecycle = lifecycle if isinstance(lifecycle, Mapping) else Mapping((), tree.span)

@@ -1,17 +1,18 @@
-"""What the command line says on top of a file: ``--set node.parameter=value``, ``--namespace``."""
+"""What the command line says on top of a file: ``--set``, ``--namespace``, ``--use-sim-time``."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, shown
 from composer.document import parse_document
+from composer.model import USE_SIM_TIME
 from composer.source import Located, SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 SET = "--set"
 NAMESPACE = "--namespace"
+USE_SIM_TIME_OPTION = "--use-sim-time"
 
 RULE = register(
     Rule(
@@ -40,6 +41,7 @@ class Overrides:
 
     parameters: tuple[Override, ...] = ()
     namespace: Located[str] | None = None
+    use_sim_time: Entry | None = None
     by_node: dict[str, dict[str, Entry]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -49,19 +51,31 @@ class Overrides:
         object.__setattr__(self, "by_node", by_node)
 
 
-def read_overrides(
-    settings: Iterable[str] = (), namespace: str | None = None
-) -> tuple[Overrides, list[Diagnostic]]:
-    """Read command-line settings, each ``node.parameter=value``.
+@dataclass(frozen=True, slots=True)
+class CommandLine:
+    """What is said on a command line: ``--set`` texts, each ``node.parameter=value``, and so on."""
 
-    The value is YAML, as it would stand in a file; of two for one parameter the last counts.
+    settings: tuple[str, ...] = ()
+    namespace: str | None = None
+    use_sim_time: bool = False
+
+
+NOTHING_SAID = CommandLine()
+
+
+def read_overrides(said: CommandLine) -> tuple[Overrides, list[Diagnostic]]:
+    """Read what a command line says.
+
+    Values of settings are YAML, as they would stand in a file; of two for one parameter the last
+    counts.
     """
-    texts = [setting.replace("\r", " ").replace("\n", " ") for setting in settings]
+    texts = [setting.replace("\r", " ").replace("\n", " ") for setting in said.settings]
     source = SourceFile(SET, "\n".join(texts))
     findings: list[Diagnostic] = []
     found = (_override(text, source, line, findings) for line, text in enumerate(texts, start=1))
     parameters = tuple(item for item in found if item is not None)
-    return Overrides(parameters, _namespace(namespace)), findings
+    clock = _use_sim_time() if said.use_sim_time else None
+    return Overrides(parameters, _namespace(said.namespace), clock), findings
 
 
 def _namespace(namespace: str | None) -> Located[str] | None:
@@ -69,6 +83,12 @@ def _namespace(namespace: str | None) -> Located[str] | None:
         return None
     source = SourceFile(NAMESPACE, namespace)
     return Located(namespace, Span(source, 1, 1, max(len(namespace), 1)))
+
+
+def _use_sim_time() -> Entry:
+    source = SourceFile(USE_SIM_TIME_OPTION, USE_SIM_TIME_OPTION)
+    span = Span(source, 1, 1, len(USE_SIM_TIME_OPTION))
+    return Entry(Scalar(USE_SIM_TIME, span, verbatim=False), Scalar(True, span, verbatim=False))
 
 
 def _override(

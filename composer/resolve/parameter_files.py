@@ -15,6 +15,7 @@ from pathlib import Path
 
 from composer.diagnostics import Diagnostic, Rule, Severity, register, shown
 from composer.document import read_document
+from composer.model import USE_SIM_TIME
 from composer.names import fits, join
 from composer.project import Project
 from composer.resolve.reading import is_opaque, texts
@@ -53,8 +54,8 @@ nodes:
 )
 
 PARAMETERS = "ros__parameters"
-#: What every ROS node declares without being asked to.
-_EVERY_NODE = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..*")
+#: What every ROS node declares without being asked to, and nobody here follows.
+_EVERY_NODE = re.compile(r"start_type_description_service|qos_overrides\..*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +92,8 @@ class ParameterFiles:
     def given(self, full_name: str, declared: frozenset[str]) -> dict[str, Entry]:
         """Return the values for the node that ROS calls ``full_name``, by parameter.
 
-        Under a name with wildcards it finds what it declares; the rest is for other nodes. So is
-        what every ROS node has, unless this one tells of it.
+        Under a name with wildcards it finds what it declares, and ``use_sim_time``; the rest is for
+        other nodes. So is what else every ROS node has, unless this one tells of it.
         """
         found = [*self._named.get(full_name, ()), *self._matching(full_name)]
         given: dict[str, Entry] = {}
@@ -100,7 +101,9 @@ class ParameterFiles:
             given.update(
                 (name, entry)
                 for name, entry in section.values.items()
-                if name in declared or not (section.is_pattern or _EVERY_NODE.fullmatch(name))
+                if name in declared
+                or name == USE_SIM_TIME
+                or not (section.is_pattern or _EVERY_NODE.fullmatch(name))
             )
         return given
 

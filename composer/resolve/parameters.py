@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from collections.abc import Mapping as Map
 from dataclasses import replace
 
-from composer.model import Parameter, ParameterType, UnknownKey
+from composer.model import USE_SIM_TIME, Parameter, ParameterType, UnknownKey
 from composer.resolve.reading import (
     OPAQUE,
     entries,
@@ -22,6 +22,7 @@ from composer.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree, plain
 
 #: The type of a parameter whose bare value tells none, such as an empty list.
 UNTOLD = ""
+_OF_USE_SIM_TIME = "Whether the time of the node is that of /clock."
 
 
 def declarations(tree: Tree | None) -> tuple[Parameter, ...]:
@@ -30,6 +31,18 @@ def declarations(tree: Tree | None) -> tuple[Parameter, ...]:
     A bare value declares a parameter of its own type with that default.
     """
     return tuple(_declaration(entry) for entry in entries(tree))
+
+
+def with_own_clock(
+    parameters: tuple[Parameter, ...], given: Map[str, Entry]
+) -> tuple[Parameter, ...]:
+    """Return the parameters with ``use_sim_time``, which every node has, where a value is given."""
+    entry = given.get(USE_SIM_TIME)
+    if entry is None or any(item.name.value == USE_SIM_TIME for item in parameters):
+        return parameters
+    kind = Located(str(ParameterType.BOOL), entry.key.span)
+    own = Parameter(key(entry), kind, None, None, entry.key.span, description=_OF_USE_SIM_TIME)
+    return (*parameters, own)
 
 
 def with_values(
@@ -115,10 +128,12 @@ def _declaration(entry: Entry) -> Parameter:
 
 def _bare(entry: Entry) -> Parameter:
     kind = _bare_type(plain(entry.value))
+    if entry.name == USE_SIM_TIME and kind != OPAQUE:
+        kind = ParameterType.BOOL
     value = _value(entry.value, kind)
     return Parameter(
         name=key(entry),
-        type=Located(kind, entry.value.span),
+        type=Located(str(kind), entry.value.span),
         value=value,
         default=value,
         span=entry.key.span,

@@ -11,10 +11,12 @@ from composer.model import (
     Port,
     PortKind,
     Timer,
+    TimerClock,
 )
 from composer.resolve.qos import QosTable, implicit_qos
 from composer.resolve.reactions import RULE, Events, expression, nested, reaction, template
 from composer.resolve.reading import (
+    choice,
     entries,
     flag,
     integer,
@@ -129,11 +131,13 @@ def _feedback(entry: Entry | None, findings: list[Diagnostic]) -> FeedbackSteps 
 def _timer(entry: Entry, findings: list[Diagnostic]) -> Timer:
     span = entry.key.span
     tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), span)
+    clock = choice(tree.get("clock"), TimerClock)
     return Timer(
         name=key(entry),
         period=_period(tree, span, findings),
         span=span,
         reaction=reaction(tree, span, findings),
+        clock=TimerClock.ROS if clock is None else clock.value,
         budget_ms=number(tree.get("budget_ms")),
         reentrant=flag(tree.get("reentrant"), default=False),
         always_on=flag(tree.get("always_on"), default=False),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from composer.diagnostics import Diagnostic
 from composer.model import (
     DEFAULT_SUPERVISION,
+    USE_SIM_TIME,
     Delivery,
     Executor,
     ExecutorKind,
@@ -22,7 +23,7 @@ from composer.resolve.introspection import introspection
 from composer.resolve.node import Surroundings, node, placed, state
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import read_parameter_files
-from composer.resolve.parameters import with_values
+from composer.resolve.parameters import with_own_clock, with_values
 from composer.resolve.qos import qos_table
 from composer.resolve.reading import (
     choice,
@@ -38,7 +39,7 @@ from composer.resolve.reading import (
 from composer.resolve.supervision import supervision
 from composer.resolve.types import NodeTypes
 from composer.source import Located, SourceFile, Span
-from composer.tree import Entry, Mapping, Sequence
+from composer.tree import Entry, Mapping, Scalar, Sequence
 
 ROOT = "/"
 DEFAULT_THREADS = 2
@@ -58,6 +59,7 @@ def resolve_system(
     upkeep = supervision(lifecycle, DEFAULT_SUPERVISION)
     written = tree.get("parameter_files")
     files = read_parameter_files(written, places.home, places.catalog.project, findings)
+    clock = _use_sim_time(tree, overrides)
     around = Surroundings(
         places,
         namespace,
@@ -68,6 +70,7 @@ def resolve_system(
         upkeep,
         tree.get("introspection"),
         files,
+        clock,
         findings,
     )
     nodes = tuple(node(entry, around) for entry in entries(tree.get("nodes")))
@@ -88,6 +91,7 @@ def resolve_system(
         autostart=autostart.value if autostart is not None else PrimaryState.ACTIVE,
         supervision=upkeep,
         delivery=delivery.value if delivery is not None else Delivery.AUTO,
+        use_sim_time=any(flag(entry.value, default=False) for entry in clock),
         implied_dependencies=flag(lifecycle.get("implied_dependencies"), default=True),
         unknown=_unknown_nodes(nodes, overrides),
         unmatched_parameters=files.unmatched(frozenset(node.full_name for node in nodes)),
@@ -106,7 +110,8 @@ def resolve_node_type(
     span = _name_span(tree, "node")
     namespace = _system_namespace(Mapping((), span), overrides)
     given = overrides.by_node.get(name.value, {})
-    parameters, unknown = with_values(declared.parameters, given, complete=True)
+    own = with_own_clock(declared.parameters, given)
+    parameters, unknown = with_values(own, given, complete=True)
     alone = Node(
         name=name,
         namespace=namespace,
@@ -149,6 +154,14 @@ def _system_namespace(tree: Mapping, overrides: Overrides) -> Located[str]:
     if written is None:
         return Located(ROOT, tree.span)
     return written if is_opaque(written.value) else written.map(lambda name: join(ROOT, name))
+
+
+def _use_sim_time(tree: Mapping, overrides: Overrides) -> tuple[Entry, ...]:
+    """Return what is said of the time of all nodes. The command line's wins."""
+    written = overrides.use_sim_time or tree.entry(USE_SIM_TIME)
+    if written is None or not isinstance(written.value, Scalar):
+        return ()
+    return (written,) if isinstance(written.value.value, bool) else ()
 
 
 def _unknown_nodes(nodes: tuple[Node, ...], overrides: Overrides) -> tuple[UnknownKey, ...]:

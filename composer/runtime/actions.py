@@ -27,13 +27,16 @@ from unique_identifier_msgs.msg import UUID
 
 from composer.runtime import readiness
 from composer.runtime.readiness import Announcement, Handle, Signal
-from composer.runtime.tasks import Calls, Cancelled, Future, Report, name_of
+from composer.runtime.tasks import Cancelled, Clock, Future, Report, name_of
 
 T = TypeVar("T")
 
 
-class TaskLoop(Calls, Protocol):
+class TaskLoop(Clock, Protocol):
     """The part of a loop that actions need."""
+
+    def call_soon(self, callback: Callable[[], object]) -> None:
+        """Call ``callback`` on the loop as soon as it is free."""
 
     def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
         """Run a coroutine; the future is its outcome."""
@@ -86,6 +89,7 @@ class ActionSource:
     ) -> None:
         self._waitable: Any = waitable
         self._side = _SERVER if isinstance(waitable, ActionServer) else _CLIENT
+        self.passes_over = self._side is _CLIENT
         self._handle: Handle = getattr(waitable, self._side.handle)
         self._executor = executor
         self._loop = loop

@@ -16,6 +16,7 @@ from composer.behavior import CallCancelled
 from composer.model import BehaviorReference
 from composer.runtime.core import Core
 from composer.runtime.tasks import Future, sleep
+from composer.runtime.user_code import calls_user_code, may_be_interrupted
 
 #: A behaviour's method, or None where it has none of that name.
 Method = Callable[..., Any]
@@ -73,6 +74,7 @@ def _module_of_file(path: Path) -> ModuleType:
         return sys.modules.get(name) or _imported(name, path)
 
 
+@calls_user_code
 def _imported(name: str, path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
@@ -94,6 +96,7 @@ class Named:
         self._kind = kind
         self._entries = entries
 
+    @may_be_interrupted
     def __getattr__(self, name: str) -> Any:
         try:
             return self._entries[name]
@@ -138,7 +141,7 @@ class NodeClock:
         """
         for gate in (self._core.gate, self._standby.gate):
             if gate.waiting:
-                return gate.hold(sleep(self._core.loop, max(0.0, seconds)))
+                return gate.pending.hold(sleep(self._core.clock, max(0.0, seconds)))
         ended: Future[None] = Future()
         ended.set_exception(CallCancelled(self._core.gate.refusal))
         return ended

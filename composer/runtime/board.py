@@ -7,7 +7,8 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from composer.model import PrimaryState, System
 from composer.plan import start_goals
@@ -24,7 +25,7 @@ class NodeStatus:
     makes it active. Rates are in hertz, over the last second, as is ``busy``: the share of a thread
     that its callbacks took. ``slowest`` is the callback that took longest at once so far, and how
     long; ``overruns`` are calls over their ``budget_ms``, ``queue_drops`` what full queues pushed
-    out.
+    out; ``qos_events`` counts what :mod:`composer.runtime.ports.qos_events` tells of.
     """
 
     node: str
@@ -43,6 +44,7 @@ class NodeStatus:
     slowest: str = ""
     overruns: int = 0
     queue_drops: int = 0
+    qos_events: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +65,13 @@ class SystemStatus:
 
     @property
     def is_active(self) -> bool:
-        """Whether every node that a start makes active is active."""
-        return all(node.state == "active" for node in self.nodes if node.starts_active)
+        """Whether every node that a start makes active is active, and no node has failed.
+
+        A node that failed counts also where a start only makes it inactive. A system without any
+        node that is to be active is not.
+        """
+        wanted = [node for node in self.nodes if node.starts_active]
+        return bool(wanted) and not self.failed and all(node.state == "active" for node in wanted)
 
     @property
     def summary(self) -> str:
@@ -75,6 +82,28 @@ class SystemStatus:
         return ", ".join(parts)
 
 
+class _Counters(NamedTuple):
+    """What a node had done at a moment of ``time.monotonic()``."""
+
+    at_s: float
+    sent: int
+    received: int
+    busy_s: float
+
+    def put_into(self, node: NodeStatus, before: _Counters | None) -> NodeStatus:
+        """Return ``node`` with the rates since ``before``."""
+        if before is None or self.at_s <= before.at_s:
+            return node
+        passed_s = self.at_s - before.at_s
+        # A node that was made anew counts from zero again.
+        return replace(
+            node,
+            sent_hz=max(0, self.sent - before.sent) / passed_s,
+            received_hz=max(0, self.received - before.received) / passed_s,
+            busy=max(0.0, self.busy_s - before.busy_s) / passed_s,
+        )
+
+
 class Board:
     """Where everything that happens to nodes is written down, from any thread."""
 
@@ -82,7 +111,9 @@ class Board:
         """``order`` has the keys of all nodes, in the order of the bring-up."""
         self._lock = threading.Lock()
         self._changed: Callable[[], None] = lambda: None
-        self._counters: dict[str, tuple[float, int, int, float]] = {}
+        self._statistics: Mapping[str, Statistics] = {}
+        self._counters: dict[str, _Counters] = {}
+        self._counters_before: dict[str, _Counters] = {}
         now_s = time.time()
         models = {node.name.value: node for node in system.nodes}
         goals = start_goals(system, PrimaryState.ACTIVE)
@@ -109,10 +140,16 @@ class Board:
         """Call ``changed`` after each change, on the thread that made it."""
         self._changed = changed
 
+    @property
+    def without_nodes(self) -> SystemStatus:
+        """The system and its process: a snapshot for who asks nothing about nodes."""
+        return self._status
+
     def snapshot(self) -> SystemStatus:
         """Return everything as it is now."""
         with self._lock:
-            return replace(self._status, nodes=tuple(self._nodes.values()))
+            nodes = tuple(self._measured(name, node) for name, node in self._nodes.items())
+            return replace(self._status, nodes=nodes)
 
     def set_activity(self, activity: str) -> None:
         """Say what is being done with the system."""
@@ -153,30 +190,32 @@ class Board:
         self._changed()
 
     def measure(self, statistics: Mapping[str, Statistics]) -> None:
-        """Work out the rates since the last time from the counters of the nodes."""
+        """Take down the counters of the nodes: rates are those since the last time.
+
+        What is made of them is worked out for who asks.
+        """
         now_s = time.monotonic()
         with self._lock:
-            for name, counted in statistics.items():
-                before = self._counters.get(name)
-                busy_s = counted.busy_s
-                self._counters[name] = (now_s, counted.sent, counted.received, busy_s)
-                node = replace(
-                    self._nodes[name],
-                    errors=counted.errors,
-                    slowest=counted.slowest,
-                    overruns=counted.overruns,
-                    queue_drops=counted.queue_drops,
-                )
-                if before is not None and now_s > before[0]:
-                    passed_s = now_s - before[0]
-                    # A node that was made anew counts from zero again.
-                    node = replace(
-                        node,
-                        sent_hz=max(0, counted.sent - before[1]) / passed_s,
-                        received_hz=max(0, counted.received - before[2]) / passed_s,
-                        busy=max(0.0, busy_s - before[3]) / passed_s,
-                    )
-                self._nodes[name] = node
+            self._statistics = statistics
+            self._counters_before = self._counters
+            self._counters = {
+                name: _Counters(now_s, counted.sent, counted.received, counted.busy_s)
+                for name, counted in statistics.items()
+            }
+
+    def _measured(self, name: str, node: NodeStatus) -> NodeStatus:
+        counted = self._statistics.get(name)
+        if counted is None:
+            return node
+        node = replace(
+            node,
+            errors=counted.errors,
+            slowest=counted.slowest,
+            overruns=counted.overruns,
+            queue_drops=counted.queue_drops,
+            qos_events=dict(counted.qos_events),
+        )
+        return self._counters[name].put_into(node, self._counters_before.get(name))
 
     def _change(self, name: str, **changes: object) -> None:
         with self._lock:

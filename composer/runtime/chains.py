@@ -18,9 +18,9 @@ from typing import Any
 
 from composer.model import Node, Port, System
 from composer.runtime.statistics import ChainStatistics
+from composer.runtime.strand import Work
 
 Send = Callable[[Any], None]
-Work = Callable[[Any], "Coroutine[Any, Any, None] | None"]
 _ON_THE_WAY = 256  # messages from one node to the next; of more, the oldest are forgotten
 
 
@@ -79,7 +79,7 @@ class NodeChains:
                 send = hop.around(send)
         return send
 
-    def hearing(self, port: Port, work: Work) -> Work:
+    def hearing(self, port: Port, work: Work[Any]) -> Work[Any]:
         """Return the work of a subscription; where chains lead through its topic, watched."""
         hops = tuple(hop for _, topic, hop in self.hops if topic == port.full_name)
         if not hops:

@@ -37,7 +37,7 @@ class Commands:
     def carry_out(self, what: str) -> tuple[bool, str]:
         """Do it; return whether it went well, and how the system is now, or what went wrong."""
         doing, done = _ACTIVITIES[what]
-        before = self.board.snapshot().activity
+        before = self.board.without_nodes.activity
         self.board.set_activity(doing)
         actions: dict[str, Callable[[], str | None]] = {
             "startup": self._start_up,

@@ -53,12 +53,23 @@ class Manner:
 
 @dataclass(slots=True)
 class _Running:
-    """A step under way: until when it may take, and until when anything may."""
+    """A step under way, how long its loop may not go on, and until when it may take at most.
+
+    A loop makes the transitions of its nodes one after the other: ``since_s`` is when it last began
+    the work of one.
+    """
 
     step: Step
+    loop: str
     future: Future[Result]
-    limit_s: float
+    since_s: float
+    may_take_s: float
     end_s: float
+
+    @property
+    def limit_s(self) -> float:
+        """Until when it may take."""
+        return self.since_s + self.may_take_s
 
     @property
     def until_s(self) -> float:
@@ -138,10 +149,20 @@ class Conductor:
             )
             if self._is_called_off(phase.manner):
                 break
+            self._note_turns(phase.running)
             for item in tuple(phase.running):
                 if self._has_had_its_time(item):
                     self._end(item, phase)
         self.moving.clear()
+
+    def _note_turns(self, running: list[_Running]) -> None:
+        """Let the time of each begin anew with the last turn on its loop."""
+        turns_s: dict[str, float] = {}
+        for node in self._crew.nodes.values():
+            loop = node.loop.name
+            turns_s[loop] = max(node.turn_s, turns_s.get(loop, 0.0))
+        for item in running:
+            item.since_s = max(item.since_s, turns_s.get(item.loop, 0.0))
 
     def _is_called_off(self, manner: Manner) -> bool:
         return self._inbox.closing and manner.stoppable
@@ -159,11 +180,12 @@ class Conductor:
         ):  # fmt: skip
             phase.done.add(step.number)
             return
-        limit_s = min(self._crew.timeout_s(step.node) + _STUCK_AFTER_S, manner.share_s)
+        may_take_s = min(self._crew.timeout_s(step.node) + _STUCK_AFTER_S, manner.share_s)
         self.moving.add(step.node)
         future = node.loop.run_task(node.change(step.transition))
         future.add_done_callback(lambda _: self._inbox.wake())
-        phase.running.append(_Running(step, future, now_s + limit_s, manner.end_s))
+        name = node.loop.name
+        phase.running.append(_Running(step, name, future, now_s, may_take_s, manner.end_s))
 
     def _end(self, item: _Running, phase: _Phase) -> None:
         phase.running.remove(item)
@@ -210,8 +232,8 @@ class Conductor:
         node = self._crew.nodes[item.step.node]
         if self._crew.is_lost(item.step.node):
             return node.loop.where()
-        found = list(running_callbacks(node.loop, self._crew.nodes.values()))
-        own = [callback for callback in found if callback.node is node]
+        found = [innermost for innermost, *_ in running_callbacks(node.loop)]
+        own = [callback for callback in found if callback.node((node,)) is node]
         if not own and time.monotonic() < item.limit_s:
             return ""
         stack = node.loop.where()

@@ -15,9 +15,10 @@ from typing import Any
 
 from lifecycle_msgs.msg import Transition as TransitionMessage
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
+from rclpy.type_support import check_is_valid_srv_type
 
 from composer.runtime.deputies import LIFECYCLE, Deputies
-from composer.runtime.finding import find_node, not_there
+from composer.runtime.finding import check_all_answer, find_node, not_there
 from composer.runtime.session import Deadline, NoAnswer, RosError, Session
 
 PRIMARY_STATES = ("unconfigured", "inactive", "active", "finalized")
@@ -83,20 +84,26 @@ class Control:
         self._session = session
         self._deadline = deadline
         self._deputies = Deputies(session)
+        for service in (GetState, GetAvailableTransitions, ChangeState):
+            check_is_valid_srv_type(service)  # it takes a tenth of a second, and nobody is met yet
 
     def nodes(self) -> tuple[str, ...]:
         """Return the full names of all lifecycle nodes, once discovery stands still."""
         return self._session.wait_until_still(self.known, self._deadline)
 
+    def check_all_answer(self) -> None:
+        """Raise NoAnswer when there is a system here whose nodes are not known."""
+        check_all_answer(self._session)
+
     def find(self, name: str) -> str:
-        """Return the full name of the node that ``name`` means. Raises NotThere."""
+        """Return the full name of the node that ``name`` means. Raises NotThere and NoAnswer."""
         return find_node(self._session, self._deadline, name, self.known, "lifecycle node")
 
     def select(self, targets: Iterable[str]) -> tuple[str, ...]:
         """Return the full names of all nodes that are meant, each once, in the targets' order.
 
         A target is what :meth:`find` takes, or a pattern: ``/planning/*``, ``*_driver``; without a
-        slash it is held against the last parts of the names. Raises NotThere.
+        slash it is held against the last parts of the names. Raises NotThere and NoAnswer.
         """
         found: dict[str, None] = {}
         for target in targets:
@@ -104,6 +111,7 @@ class Control:
                 found[self.find(target)] = None
                 continue
             known = self.nodes()
+            check_all_answer(self._session)
             matches = [name for name in known if _matches(name, target)]
             if not matches:
                 raise not_there("lifecycle node like", target, known)

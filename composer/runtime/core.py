@@ -10,33 +10,37 @@ from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
 from composer.behavior import CallCancelled
+from composer.runtime.announced_events import AnnouncedEvents
 from composer.runtime.chains import NodeChains
+from composer.runtime.clock import Clock
 from composer.runtime.delivery.delivery import Delivery
 from composer.runtime.gate import Gate
 from composer.runtime.log import Faults, Log
 from composer.runtime.loop import Loop
 from composer.runtime.mutation import MutationCheck
 from composer.runtime.statistics import Statistics
-from composer.runtime.strand import Strand
+from composer.runtime.strand import Strand, Work
 from composer.runtime.tasks import Cancelled, Future
+from composer.runtime.user_code import calls_user_code
 
 T = TypeVar("T")
 
-_NANOSECONDS = 1e-9
+_NANOSECONDS = 1e9
 
 
 @dataclass(slots=True)
 class Core:
-    """One node's ROS handle, loop, gate, log and counters.
+    """One node's ROS handle, loop, clock, gate, log and counters.
 
     ``delivery`` is where its ports meet those of other nodes of the process, ``chains`` what they
-    have to do with the chains of the system. ``mutations`` is there
+    have to do with the chains of the system, ``events`` tells of QoS events. ``mutations`` is there
     when changes of messages are looked for. ``names`` is what every expression of the node may
     use: ``parameters``, ``state``, ``node``. ``group`` is the callback group of its ports.
     """
 
     node: Node
     loop: Loop
+    clock: Clock
     gate: Gate
     strand: Strand
     log: Log
@@ -45,6 +49,7 @@ class Core:
     names: dict[str, Any]
     delivery: Delivery
     chains: NodeChains
+    events: AnnouncedEvents
     mutations: MutationCheck | None = None
     tasks: set[Future[Any]] = field(default_factory=set)
     group: CallbackGroup = field(default_factory=MutuallyExclusiveCallbackGroup)
@@ -52,7 +57,7 @@ class Core:
     def now_s(self) -> float:
         """Return the node's time in seconds."""
         # Not by way of ``now()``, which makes a Time: many a callback asks for it.
-        return float(self.node.get_clock().handle.get_now().nanoseconds) * _NANOSECONDS
+        return float(self.node.get_clock().handle.get_now().nanoseconds / _NANOSECONDS)
 
     def spawn(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
         """Run ``coroutine`` on the node's loop; it ends at the latest with the node's entities."""
@@ -66,6 +71,28 @@ class Core:
         for task in tuple(self.tasks):
             task.cancel()
 
+    def caller(self, name: str, function: Callable[[T], Any]) -> Work[T]:
+        """Return what calls ``function`` as :meth:`call` does."""
+
+        # Defaults are one object, found at once; what a closure knows is two objects a name, and
+        # in a large system what a message costs is to fetch objects from far away in memory.
+        @calls_user_code
+        def work(
+            item: T,
+            self: Core = self,  # by this name the watch finds whose callback hangs
+            name: str = name,
+            function: Callable[[T], Any] = function,
+        ) -> Coroutine[Any, Any, None] | None:
+            try:
+                result = function(item)
+            except BaseException as error:
+                self.faults.take(name, error)
+                return None
+            return None if result is None else self._rest_of(name, result)
+
+        return work
+
+    @calls_user_code
     def call(
         self, name: str, function: Callable[..., Any], *arguments: Any
     ) -> Coroutine[Any, Any, None] | None:
@@ -78,10 +105,12 @@ class Core:
         except BaseException as error:
             self.faults.take(name, error)
             return None
-        if result is None or not isinstance(result, Awaitable):
-            return None
-        return self._rest(name, result)
+        return None if result is None else self._rest_of(name, result)
 
+    def _rest_of(self, name: str, result: object) -> Coroutine[Any, Any, None] | None:
+        return self._rest(name, result) if isinstance(result, Awaitable) else None
+
+    @calls_user_code
     async def _rest(self, name: str, result: Awaitable[Any]) -> None:
         try:
             await result

@@ -17,7 +17,7 @@ from composer.runtime.figures import CallbackFigures, ChainFigures, chain_figure
 from composer.runtime.log import describe
 from composer.runtime.loop import Loop
 from composer.runtime.mutation import SeenMessages
-from composer.runtime.node import Listener, NodeOptions, RunningNode
+from composer.runtime.node import Listener, NodeOptions, RunningNode, Shared
 from composer.runtime.parameters import ParameterError
 from composer.runtime.placement import place
 from composer.runtime.statistics import Statistics
@@ -70,6 +70,7 @@ class Crew:
         self._executors = {executor.name.value: executor for executor in system.executors}
         self._delivery = Delivery({})
         self._chains = Chains(system, tracing=options.tracing)
+        self._shared: Shared  # which is known once nodes are created
         self.nodes: dict[str, RunningNode] = {}
         self.loops: dict[str, Loop] = {}
         #: The loops with a callback that does not return; nothing can be asked of their nodes.
@@ -77,16 +78,22 @@ class Crew:
         self._keeps_entities = False
         #: Where nodes are as far as the main thread knows, which moves them; by their keys.
         self.left: dict[str, str] = {}
-        #: What Linux refuses to executors, each with what would help.
+        #: What Linux refuses to executors and the middleware to topics, each with what would help.
         self.refusals: list[str] = []
 
-    def create(self, begin: Callable[[], None] = lambda: None) -> None:
+    def create(self, shared: Shared, begin: Callable[[], None] = lambda: None) -> None:
         """Create all nodes and start their loops. Raises CreationFailed; nothing is started then.
 
         A node that cannot be created leaves those before it to be closed. ``begin`` is called
         before each of them.
         """
+        self._shared = shared
         self._delivery = Delivery(shared_channels(self._system))
+        if self._delivery.refusal is not None:
+            self.refusals.append(
+                f"topics within the process go by DDS, which costs more: {self._delivery.refusal};"
+                " 'compose doctor' says what helps, 'delivery: dds' that it is meant"
+            )
         for node in self._system.nodes:
             begin()
             try:
@@ -200,6 +207,7 @@ class Crew:
         options = NodeOptions(
             chains=self._chains,
             delivery=self._delivery,
+            shared=self._shared,
             seen_messages=self._seen_messages,
             parallel=executor.kind is ExecutorKind.MULTI_THREADED,
             log_level=self._options.log_level,

@@ -12,8 +12,7 @@ from typing import TypeAlias
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.subscription import Subscription
 
-from composer.runtime.deputy import CHANGE_STATE
-from composer.runtime.manager_topics import NAME, STATE_QOS, STATE_TOPIC
+from composer.runtime.manager_interface import CHANGE_STATE, NAME, STATE_QOS, STATE_TOPIC
 from composer.runtime.session import Deadline, Session
 
 LIFECYCLE, PARAMETERS = "lifecycle", "parameters"

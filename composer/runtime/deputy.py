@@ -36,14 +36,8 @@ from rclpy.node import Node
 from composer.runtime import parameter_answers
 from composer.runtime.event_loop import EventLoop
 from composer.runtime.loop import Reply, never_called
+from composer.runtime.manager_interface import CHANGE_STATE, full_parameter_name
 from composer.runtime.node import RunningNode
-
-CHANGE_STATE = "change_state"
-
-
-def full_parameter_name(node: str, parameter: str) -> str:
-    """Return what a node's parameter is called at the manager: node names have no dots."""
-    return f"{node}.{parameter}"
 
 
 class Deputy:

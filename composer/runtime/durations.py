@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from bisect import bisect
 from collections.abc import Iterable
 from itertools import accumulate, pairwise
@@ -23,30 +24,67 @@ def _bounds() -> Iterable[float]:
 BOUNDS_S = tuple(_bounds())
 
 
-class Durations:
-    """A histogram of times in seconds. One that counts allocates nothing.
+#: So many times are put into the histogram together.
+TOGETHER = 64
 
-    Its fields are public for who counts a million a second: see :meth:`take`. Two threads that
-    count at the same time may lose one of the two.
+
+class Durations:
+    """A histogram of times in seconds.
+
+    Who counts a million a second appends to ``waiting`` by itself, and calls :meth:`settle` at
+    every :data:`TOGETHER`: a list is a place in memory that is near, buckets are not. Any thread
+    may count and ask.
     """
 
-    __slots__ = ("buckets", "longest_s", "total_s")
+    __slots__ = ("_buckets", "_lock", "_longest_s", "_total_s", "_weight", "waiting")
 
     def __init__(self) -> None:
-        self.buckets = [0] * (len(BOUNDS_S) + 1)
-        self.total_s = 0.0
-        self.longest_s = 0.0
+        self.waiting: list[float] = []
+        self._weight = 1
+        self._buckets = [0] * (len(BOUNDS_S) + 1)
+        self._total_s = 0.0
+        self._longest_s = 0.0
+        self._lock = threading.Lock()
 
     def take(self, took_s: float) -> None:
         """Count one."""
-        self.buckets[bisect(BOUNDS_S, took_s)] += 1
-        self.total_s += took_s
-        self.longest_s = max(self.longest_s, took_s)
+        self.waiting.append(took_s)
+        if len(self.waiting) >= TOGETHER:
+            self.settle()
+
+    def settle(self) -> None:
+        """Put what waits into the histogram."""
+        with self._lock:
+            settled = len(self.waiting)  # by now: others may go on appending
+            for took_s in self.waiting[:settled]:
+                self._buckets[bisect(BOUNDS_S, took_s)] += self._weight
+                self._total_s += took_s * self._weight
+                self._longest_s = max(self._longest_s, took_s)
+            del self.waiting[:settled]
+
+    def stand_for(self, weight: int) -> None:
+        """Let each time that comes from now on count as ``weight`` of them."""
+        if weight != self._weight:
+            self.settle()
+            self._weight = weight
+
+    @property
+    def total_s(self) -> float:
+        """All of them together."""
+        self.settle()
+        return self._total_s
+
+    @property
+    def longest_s(self) -> float:
+        """The longest; 0 when there were none."""
+        self.settle()
+        return self._longest_s
 
     @property
     def count(self) -> int:
         """How many there were."""
-        return sum(self.buckets)
+        self.settle()
+        return sum(self._buckets)
 
     @property
     def mean_s(self) -> float:
@@ -55,12 +93,13 @@ class Durations:
 
     def percentile_s(self, share: float) -> float:
         """Return what ``share`` (0 to 1) of them do not exceed, within 10 %; 0 without any."""
-        counted = list(accumulate(self.buckets))
+        self.settle()
+        counted = list(accumulate(self._buckets))
         if not counted[-1]:
             return 0.0
         rank = share * counted[-1]
         index = next(index for index, below in enumerate(counted) if below >= rank and below)
-        return min(self.longest_s, _MIDDLES_S[index])
+        return min(self._longest_s, _MIDDLES_S[index])
 
 
 _MIDDLES_S = (

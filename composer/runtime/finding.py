@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from composer.diagnostics import nearest
-from composer.runtime.session import Deadline, RosError, Session
+from composer.runtime.session import Deadline, NoAnswer, RosError, Session
 
 _MOST_LISTED = 8
 
@@ -23,16 +23,27 @@ def find_node(
 ) -> str:
     """Return the full name that ``name`` means among what ``look`` finds, once it is there.
 
-    That is a full name, or the last part (or parts) of just one. Raises NotThere.
+    That is a full name, or the last part (or parts) of just one. Raises NotThere; NoAnswer when it
+    may be in a system that does not answer.
     """
     found = session.search(lambda: _matches(name, look()) or None, deadline)
     if found is None:
+        check_all_answer(session)
         raise not_there(kind, name, look())
     if name not in found:  # a part of a name: are there others with the same part?
         found = _matches(name, session.wait_until_still(look, deadline))
     if len(found) > 1:
         raise NotThere(f"'{name}' is more than one {kind}", "say which: " + ", ".join(found))
     return found[0]
+
+
+def check_all_answer(session: Session) -> None:
+    """Raise NoAnswer when a system of this computer is not met: not all nodes are known then."""
+    for name, pid in session.silent_systems().items():
+        raise NoAnswer(
+            f"system '{name}' does not answer, so its nodes are not known",
+            f"its process {pid} may be busy or stopped",
+        )
 
 
 def not_there(kind: str, name: str, known: Iterable[str]) -> NotThere:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from composer.behavior import CallCancelled
-from composer.runtime.tasks import Future
+from composer.runtime.pending import Pending
 
 
 class Gate:
@@ -17,11 +15,22 @@ class Gate:
     while any other transition is on its way: a lifecycle handler may sleep.
     """
 
-    __slots__ = ("_node", "_pending", "incoming", "outgoing", "period", "state", "waiting")
+    __slots__ = (
+        "_had_outgoing",
+        "_node",
+        "incoming",
+        "outgoing",
+        "pending",
+        "period",
+        "state",
+        "waiting",
+    )
 
-    def __init__(self, node: str) -> None:
+    def __init__(self, node: str, pending: Pending) -> None:
+        """``pending`` is what somebody waits for: it ends when the node leaves *active*."""
         self._node = node
-        self._pending: set[Future[Any]] = set()
+        self._had_outgoing: bool | None = None  # before it was hushed
+        self.pending = pending
         self.incoming = False
         self.outgoing = False
         self.waiting = False
@@ -31,25 +40,33 @@ class Gate:
     @property
     def refusal(self) -> str:
         """Why nothing gets through now."""
+        if self._had_outgoing is not None:
+            return f"{self._node} has failed"
         return f"{self._node} is {self.state}, not active"
+
+    def hush(self) -> None:
+        """Let nothing through until the next transition, from any thread: the node hangs."""
+        self._had_outgoing = self.outgoing
+        self.incoming = self.outgoing = False
+
+    def end_hush(self) -> None:
+        """Let out again what was let out before, for a last word; nothing comes in."""
+        if self._had_outgoing is not None:
+            self.outgoing = self._had_outgoing
+            self._had_outgoing = None
 
     def open(self) -> None:
         """Open every door."""
+        self._had_outgoing = None
         self.incoming = self.outgoing = self.waiting = True
 
     def close(self) -> None:
         """Shut every door and end what waits."""
+        self._had_outgoing = None
         self.incoming = self.outgoing = self.waiting = False
         self.end_pending()
-
-    def hold(self, future: Future[Any]) -> Future[Any]:
-        """Let ``future`` end with CallCancelled if the node leaves *active* first; return it."""
-        self._pending.add(future)
-        future.add_done_callback(self._pending.discard)
-        return future
 
     def end_pending(self) -> None:
         """End all calls, goals and sleeps that somebody in the node waits for."""
         self.period += 1
-        for future in tuple(self._pending):
-            future.set_exception(CallCancelled(self.refusal))
+        self.pending.end(lambda: CallCancelled(self.refusal))

@@ -45,7 +45,7 @@ from composer.runtime.events import NodeSummary, Outcome, Report
 from composer.runtime.inbox import Inbox
 from composer.runtime.log import describe
 from composer.runtime.manager import Command, Manager, Office, manager_namespace
-from composer.runtime.node import Listener, RunningNode
+from composer.runtime.node import Listener, RunningNode, Shared
 from composer.runtime.reporter import Reporter
 from composer.runtime.signals import stop_signals
 from composer.runtime.start_refused import StartRefused
@@ -172,9 +172,9 @@ class Host:
             lambda host, pid: self._yield_to(namespace, host, pid),
             lambda: {node.full_name: node for node in tuple(self._crew.nodes.values())},
         )
-        manager = Manager(namespace, self._board, office)
+        manager = Manager(namespace, self._board, office, use_sim_time=self._system.use_sim_time)
         try:
-            if self._create():
+            if self._create(manager.shared):
                 self._live()
         finally:
             self._limit_end()
@@ -192,9 +192,9 @@ class Host:
         if not self._ends:
             self._options.end_within(None)
 
-    def _create(self) -> bool:
+    def _create(self, shared: Shared) -> bool:
         try:
-            self._crew.create(self._limit_start)
+            self._crew.create(shared, self._limit_start)
             self._lift_limit()
         except CreationFailed as error:
             at_s = self._reporter.elapsed_s

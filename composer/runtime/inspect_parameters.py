@@ -18,8 +18,8 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 
 from composer.diagnostics import suggestion
 from composer.runtime.deputies import PARAMETERS, Deputies
-from composer.runtime.deputy import full_parameter_name
 from composer.runtime.inspect_names import Names
+from composer.runtime.manager_interface import full_parameter_name
 from composer.runtime.session import Deadline, NoAnswer, RosError, Session
 
 _NOT_SET = "not set"

@@ -4,47 +4,17 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
-from rclpy.node import Node
-from rclpy.qos import (
-    DurabilityPolicy,
-    HistoryPolicy,
-    LivelinessPolicy,
-    QoSProfile,
-    ReliabilityPolicy,
-)
-from rclpy.topic_endpoint_info import TopicEndpointInfo
-
-from composer.qos import Durability, History, Liveliness, QosProfile, Reliability
+from composer.qos import Durability, QosProfile, Reliability
 from composer.runtime.inspect_names import Names
 from composer.runtime.inspect_values import class_of
 from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.session import Deadline, RosError, Session
+from composer.runtime.topic_ends import TopicInfo, topic_info
 
 _LISTEN_DEPTH = 1000
-#: rmw's infinite duration; what is longer than any process lives means "no limit".
-_NO_LIMIT_MS = 1e12
-
-
-@dataclass(frozen=True, slots=True)
-class End:
-    """A publisher or a subscription of some node."""
-
-    node: str
-    type: str
-    qos: QosProfile
-
-
-@dataclass(frozen=True, slots=True)
-class TopicInfo:
-    """A topic and who is at its ends."""
-
-    name: str
-    types: tuple[str, ...]
-    publishers: tuple[End, ...]
-    subscriptions: tuple[End, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +52,8 @@ class Topics:
 
     def matching(self, name: str) -> QosProfile:
         """Return the strongest profile that all publishers of a topic satisfy."""
-        found = self._session.node.get_publishers_info_by_topic(name)
-        return strongest_for_all([_end(endpoint).qos for endpoint in found], depth=_LISTEN_DEPTH)
+        found = topic_info(self._session.node, name, ()).publishers
+        return strongest_for_all([publisher.qos for publisher in found], depth=_LISTEN_DEPTH)
 
 
 class Listener:
@@ -131,54 +101,3 @@ def strongest_for_all(offers: list[QosProfile], depth: int) -> QosProfile:
         reliability=Reliability.RELIABLE if offers and reliable else Reliability.BEST_EFFORT,
         durability=Durability.TRANSIENT_LOCAL if offers and kept else Durability.VOLATILE,
     )
-
-
-def topic_info(node: Node, name: str, types: tuple[str, ...]) -> TopicInfo:
-    """Return who is known now to publish and subscribe to a topic, by its full name."""
-    return TopicInfo(
-        name,
-        types,
-        _ends(node.get_publishers_info_by_topic(name)),
-        _ends(node.get_subscriptions_info_by_topic(name)),
-    )
-
-
-def _ends(endpoints: list[TopicEndpointInfo]) -> tuple[End, ...]:
-    return tuple(sorted(map(_end, endpoints), key=lambda end: (end.node, end.type)))
-
-
-def _end(endpoint: TopicEndpointInfo) -> End:
-    node = f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
-    return End(node, endpoint.topic_type, _profile(endpoint.qos_profile))
-
-
-def _profile(found: QoSProfile) -> QosProfile:
-    """Return a profile as we say it. History and depth are not discovered: they say nothing."""
-    profile = QosProfile(
-        reliability=(
-            Reliability.BEST_EFFORT
-            if found.reliability is ReliabilityPolicy.BEST_EFFORT
-            else Reliability.RELIABLE
-        ),
-        durability=(
-            Durability.TRANSIENT_LOCAL
-            if found.durability is DurabilityPolicy.TRANSIENT_LOCAL
-            else Durability.VOLATILE
-        ),
-        deadline_ms=_milliseconds(found.deadline),
-        lifespan_ms=_milliseconds(found.lifespan),
-        liveliness=(
-            Liveliness.MANUAL_BY_TOPIC
-            if found.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
-            else Liveliness.AUTOMATIC
-        ),
-        liveliness_lease_duration_ms=_milliseconds(found.liveliness_lease_duration),
-    )
-    if found.history is HistoryPolicy.KEEP_ALL:
-        return replace(profile, history=History.KEEP_ALL)
-    return profile
-
-
-def _milliseconds(duration: Any) -> float | None:
-    milliseconds = duration.nanoseconds / 1e6
-    return None if milliseconds >= _NO_LIMIT_MS else milliseconds

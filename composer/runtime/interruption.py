@@ -8,19 +8,24 @@ from __future__ import annotations
 
 import ctypes
 import inspect
-import sys
-import traceback
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from time import sleep
 from types import FrameType
 
 from composer.runtime.line import Line
 from composer.runtime.loop import Loop
 from composer.runtime.node import RunningNode
+from composer.runtime.reactions import RunningReaction
+from composer.runtime.stacks import shown, stacks_of, undisturbed
+from composer.runtime.user_code import CALLERS, HARMLESS
 
 _OURS = str(Path(__file__).parent)
-_TRANSITIONS = (RunningNode.on_transition.__code__, RunningNode.on_error.__code__)
+_TRANSITIONS = {id(RunningNode._tell.__code__), id(RunningNode._make_behavior.__code__)}
+_REACTION = RunningReaction.run.__code__
+_TRIES = 50
+_MOMENT_S = 0.001
 
 
 class CallbackInterrupted(BaseException):
@@ -33,99 +38,95 @@ class CallbackInterrupted(BaseException):
         return "the callback took too long"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RunningCallback:
-    """A callback of a node that runs now. Two of them are equal when it is the same call.
+    """What a user has written, in Python or as a reaction, that runs now.
 
-    ``name`` is its function; ``in_transition`` is true for the handlers of transitions.
+    ``call`` is the same as long as it is the same call. ``name`` is the function that was called;
+    ``in_transition`` is true for what belongs to a transition.
     """
 
-    node: RunningNode = field(compare=False)
     thread: int
-    frame: FrameType = field(repr=False)
-    name: str = field(compare=False)
-    in_transition: bool = field(compare=False)
+    call: FrameType
+    name: str
+    in_transition: bool
+    _callers: Sequence[FrameType]  # from the frame that calls it outward
+
+    def node(self, nodes: Iterable[RunningNode]) -> RunningNode | None:
+        """Return which of ``nodes`` it belongs to. To be asked once, of what does not return.
+
+        Reading the variables of a frame a second time drops what they were before, which may run
+        Python while the frame is looked at.
+        """
+        owners = {id(part): node for node in nodes for part in (node, *node.cores)}
+        with undisturbed():
+            for frame in self._callers:
+                subject = frame.f_locals.get("self")
+                owner = owners.get(id(subject)) or owners.get(id(getattr(subject, "_core", None)))
+                if owner is not None or isinstance(subject, Line):
+                    return owner
+        return None
 
     def stack(self) -> str:
         """Return the Python stack as far as it belongs to the callback; empty when it has ended."""
-        innermost = sys._current_frames().get(self.thread)
-        frames = list(_outward(innermost))
-        if self.frame not in frames:
-            return ""
-        inner = frames[: frames.index(self.frame)]
-        lines = traceback.StackSummary.extract((frame, frame.f_lineno) for frame in inner[::-1])
-        return "".join(lines.format())
-
-    def runs(self) -> bool:
-        """Say whether it still has not returned."""
-        return self.frame in _outward(sys._current_frames().get(self.thread))
+        stack = stacks_of((self.thread,)).get(self.thread, [])
+        return shown(stack[: stack.index(self.call)]) if self.call in stack else ""
 
     def interrupt(self) -> None:
-        """Raise CallbackInterrupted in it, as soon as it is back from whatever is not Python."""
-        if self.runs():
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(
-                ctypes.c_ulong(self.thread), ctypes.py_object(CallbackInterrupted)
-            )
+        """Raise CallbackInterrupted in it, as soon as it is back from whatever is not Python.
+
+        It strikes in a user's Python alone. What never is there when somebody looks, but always in
+        something of ours, is let be.
+        """
+        exception = ctypes.py_object(CallbackInterrupted)
+        thread = ctypes.c_ulong(self.thread)
+        for _ in range(_TRIES):
+            # Who slept and is given the interpreter's lock has it for 5 ms: what is seen holds.
+            sleep(_MOMENT_S)
+            stack = stacks_of((self.thread,)).get(self.thread, [])
+            if self.call not in stack:
+                return
+            at = next(_callers(stack), None)
+            if at is None or _plain(stack[at:]) is not self.call:
+                continue
+            if not any(map(_is_ours, stack[:at])):
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, exception)
+                return
 
 
-def running_callbacks(loop: Loop, nodes: Iterable[RunningNode]) -> Iterator[RunningCallback]:
-    """Yield the callbacks of ``nodes`` that ``loop`` is in now."""
-    idents = loop.threads()
-    if not idents:
-        return
-    owners = {id(part): node for node in nodes for part in (node, *node.cores)}
-    frames = sys._current_frames()
-    for ident in idents:
-        found = _callback(ident, frames.get(ident), owners)
-        if found is not None:
+def running_callbacks(loop: Loop) -> Iterator[list[RunningCallback]]:
+    """Yield the callbacks that each thread of ``loop`` is in now, the innermost first.
+
+    Delivering a message calls the callback of another node within that of its sender.
+    """
+    for ident, stack in stacks_of(loop.threads()).items():
+        if found := [_callback(ident, stack, at) for at in _callers(stack)]:
             yield found
 
 
-def _callback(
-    ident: int, innermost: FrameType | None, owners: dict[int, RunningNode]
-) -> RunningCallback | None:
-    """Return the callback on a thread's stack.
-
-    It is called by something that belongs to a node: its core, a port, the node itself. A line
-    calls one callback after the other, so what is outside of it is no mark of one call.
-    """
-    node: RunningNode | None = None
-    outermost: FrameType | None = None
-    in_transition = False
-    for frame in _outward(innermost):
-        subject = frame.f_locals.get("self")
-        if isinstance(subject, Line):
-            break
-        owner = owners.get(id(subject)) or owners.get(id(getattr(subject, "_core", None)))
-        if owner is not None:
-            node, outermost = owner, frame
-            in_transition = frame.f_code in _TRANSITIONS
-    if node is None or outermost is None:
-        return None
-    call = _plain(outermost)
-    return RunningCallback(node, ident, call, _name(innermost, call), in_transition)
+def _callers(stack: Sequence[FrameType]) -> Iterator[int]:
+    """Yield, for each callback on a stack, where the frame is that calls it."""
+    inner: FrameType | None = None
+    for at, frame in enumerate(stack):
+        calls_user = id(frame.f_code) in CALLERS and (inner is None or not _is_ours(inner))
+        if calls_user or frame.f_code is _REACTION:
+            yield at
+        inner = frame
 
 
-def _plain(frame: FrameType) -> FrameType:
-    """Return the nearest frame outward that is one call: coroutines outlive the calls of theirs."""
+def _callback(ident: int, stack: Sequence[FrameType], at: int) -> RunningCallback:
+    callers = stack[at:]
+    is_reaction = callers[0].f_code is _REACTION
+    name = "a reaction" if is_reaction else stack[max(at - 1, 0)].f_code.co_name
+    in_transition = any(id(frame.f_code) in _TRANSITIONS for frame in callers[:2])
+    return RunningCallback(ident, _plain(callers), name, in_transition, callers)
+
+
+def _plain(callers: Sequence[FrameType]) -> FrameType:
+    """Return the first frame that is one call: coroutines outlive the calls of theirs."""
     lasting = inspect.CO_COROUTINE | inspect.CO_GENERATOR | inspect.CO_ITERABLE_COROUTINE
-    while frame.f_code.co_flags & lasting and frame.f_back is not None:
-        frame = frame.f_back
-    return frame
+    return next((frame for frame in callers if not frame.f_code.co_flags & lasting), callers[0])
 
 
-def _name(innermost: FrameType | None, call: FrameType) -> str:
-    """Return the name of the first function that is not ours within ``call``, else of ``call``."""
-    name = call.f_code.co_name
-    for frame in _outward(innermost):
-        if frame is call:
-            break
-        if not frame.f_code.co_filename.startswith(_OURS):
-            name = frame.f_code.co_name
-    return name
-
-
-def _outward(frame: FrameType | None) -> Iterator[FrameType]:
-    while frame is not None:
-        yield frame
-        frame = frame.f_back
+def _is_ours(frame: FrameType) -> bool:
+    return frame.f_code.co_filename.startswith(_OURS) and id(frame.f_code) not in HARMLESS

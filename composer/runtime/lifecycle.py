@@ -12,7 +12,7 @@ from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 from lifecycle_msgs.msg import State, Transition, TransitionDescription
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
@@ -38,6 +38,7 @@ _NAMES = {
     Transition.TRANSITION_INACTIVE_SHUTDOWN: "shutdown",
     Transition.TRANSITION_ACTIVE_SHUTDOWN: "shutdown",
 }
+_Work: TypeAlias = Callable[[], Coroutine[Any, Any, None]]
 _SUCCESS, _FAILURE, _ERROR = "transition_success", "transition_failure", "transition_error"
 
 
@@ -176,7 +177,9 @@ class Lifecycle:
         """Make a transition; the right to has been taken and is given back."""
         try:
             return await self._transition(transition)
-        except Exception as error:
+        except (Cancelled, GeneratorExit):
+            raise
+        except BaseException as error:
             # What user code raises is dealt with: this is rcl, whose context may have gone, or us.
             self._log.error(f"'{transition}' came to nothing: {traceback_of(error)}")
             return Result(success=False, state=self.state, reason=describe(error))
@@ -189,7 +192,9 @@ class Lifecycle:
         if transition_id is None:
             return self._refused(transition, f"the node is {start}")
         self._machine.trigger_transition_by_id(transition_id, True)
-        cause = await self._attempt(transition, self._hooks.on_transition(transition, start))
+        cause = await self._attempt(
+            transition, partial(self._hooks.on_transition, transition, start)
+        )
         if isinstance(cause, TransitionFailed):
             self._machine.trigger_transition_by_label(_FAILURE, True)
         elif cause is not None:
@@ -203,9 +208,7 @@ class Lifecycle:
             return Result(success=True, state=state)
         return Result(success=False, state=state, reason=describe(cause))
 
-    async def _attempt(
-        self, transition: str, work: Coroutine[Any, Any, None]
-    ) -> BaseException | None:
+    async def _attempt(self, transition: str, work: _Work) -> BaseException | None:
         """Do the work of a transition; return what went wrong."""
         try:
             await self._in_time(work)
@@ -221,7 +224,7 @@ class Lifecycle:
 
     async def _process_error(self, cause: BaseException) -> None:
         try:
-            await self._in_time(self._hooks.on_error(cause))
+            await self._in_time(partial(self._hooks.on_error, cause))
         except GeneratorExit:
             raise
         except BaseException as error:
@@ -230,14 +233,30 @@ class Lifecycle:
         else:
             self._machine.trigger_transition_by_label(_SUCCESS, True)
 
-    async def _in_time(self, work: Coroutine[Any, Any, None]) -> None:
+    async def _in_time(self, work: _Work) -> None:
+        """Do the work. Its time begins with its turn on the loop, which others may keep it from."""
+        turn: Future[None] = Future()
+
+        async def in_turn() -> None:
+            turn.set_result(None)
+            await self._strand.wrap(work())
+
         try:
-            task = self._loop.run_task(self._strand.wrap(work))
-            await within(self._loop, task, self._timeout_s)
+            await within(self._loop, self._begun(in_turn()), self._timeout_s, after=turn)
         except TimeoutError as error:
             raise TransitionTimeout(f"not through after {self._timeout_s:g} s") from error
         except Cancelled as error:
             raise TransitionTimeout("the executor is stopping") from error
+
+    def _begun(self, work: Coroutine[Any, Any, None]) -> Future[None]:
+        """Have the loop do it. What interrupts a callback may come late, and strike here."""
+        task: Future[None] | None = None
+        try:
+            task = self._loop.run_task(work)
+            return task
+        finally:
+            if task is None:
+                work.close()
 
     def _refused(self, transition: str, why: str) -> Result:
         legal = ", ".join(self.legal) or "none"

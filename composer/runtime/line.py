@@ -4,56 +4,55 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from typing import Any, Generic, TypeVar
 
 from composer.runtime.core import Core
-from composer.runtime.strand import Direct
+from composer.runtime.strand import Direct, Work
+from composer.runtime.tracing import CallbackTimer, Untimed
 
 T = TypeVar("T")
 
-#: Does the work for one item; what it returns, if anything, is awaited. Must not raise.
-Work = Callable[[T], "Coroutine[Any, Any, None] | None"]
+
+def line_for(
+    core: Core,
+    work: Work[T],
+    timer: CallbackTimer | None,
+    *,
+    depth: int | None,
+    reentrant: bool,
+) -> Line[T]:
+    """Return the line of a port of ``core``, for ``work`` that ``timer`` takes the times of.
+
+    ``depth`` is how many may wait; None means any number. With ``reentrant`` nothing waits: every
+    item is worked on at once.
+    """
+    if reentrant:
+        return OverlappingLine(core, work, timer, depth)
+    if isinstance(core.strand, Direct):
+        return OneThreadLine(core, work, timer, depth)
+    return Line(core, work, timer, depth)
 
 
 class Line(Generic[T]):
-    """Items that wait for ``work``. ``depth`` is how many may wait; None means any number.
+    """Items that wait for ``work``, on several threads."""
 
-    With ``reentrant`` nothing waits: every item is worked on at once.
-    """
+    __slots__ = ("_busy", "_core", "_depth", "_lock", "_timed", "_timer", "_waiting", "_work")
 
-    __slots__ = ("_busy", "_core", "_depth", "_lock", "_put", "_waiting", "_work")
-
-    def __init__(self, core: Core, work: Work[T], *, depth: int | None, reentrant: bool) -> None:
+    def __init__(
+        self, core: Core, work: Work[T], timer: CallbackTimer | None, depth: int | None
+    ) -> None:
         self._core = core
-        self._work = work
+        self._timer = timer or Untimed()
+        self._timed = work if timer is None else timer.around(work)
+        self._work = work if timer is None else timer.watched(work)
         self._depth = depth
         self._waiting: deque[T] = deque()
         self._busy = False
         self._lock = threading.Lock()
-        self._put = self._wait_or_run
-        if reentrant:
-            self._put = self._overlap
-        elif isinstance(core.strand, Direct):
-            self._put = self._wait_or_run_now
 
     def put(self, item: T) -> T | None:
         """Take ``item`` in; return the one that had to make room for it, if any."""
-        return self._put(item)
-
-    def clear(self) -> list[T]:
-        """Take out everything that waits and return it."""
-        with self._lock:
-            left = list(self._waiting)
-            self._waiting.clear()
-        return left
-
-    def _overlap(self, item: T) -> None:
-        coroutine = self._work(item)
-        if coroutine is not None:
-            self._core.spawn(coroutine)
-
-    def _wait_or_run(self, item: T) -> T | None:
         pushed_out = None
         with self._lock:
             if self._busy and self._depth is not None and len(self._waiting) >= self._depth:
@@ -67,19 +66,12 @@ class Line(Generic[T]):
         self._core.strand.post(self._run)
         return None
 
-    def _wait_or_run_now(self, item: T) -> T | None:
-        """Do the same on the one thread there is: nothing has to be locked."""
-        if self._busy:
-            return self._wait_or_run(item)
-        self._busy = True
-        coroutine = self._work(item)
-        if coroutine is not None:
-            self._spawn(coroutine)
-        elif self._waiting:
-            self._run()
-        else:
-            self._busy = False
-        return None
+    def clear(self) -> list[T]:
+        """Take out everything that waits and return it."""
+        with self._lock:
+            left = list(self._waiting)
+            self._waiting.clear()
+        return left
 
     def _run(self) -> None:
         """Work on what waits until something has to be awaited or nothing is left."""
@@ -89,7 +81,7 @@ class Line(Generic[T]):
                     self._busy = False
                     return
                 item = self._waiting.popleft()
-            coroutine = self._work(item)
+            coroutine = self._timed(item)
             if coroutine is not None:
                 self._spawn(coroutine)
                 return
@@ -100,3 +92,40 @@ class Line(Generic[T]):
 
     def _next(self, _: object) -> None:
         self._core.strand.post(self._run)
+
+
+class OneThreadLine(Line[T]):
+    """The line of a port whose loop has one thread: nothing has to be locked."""
+
+    __slots__ = ()
+
+    def put(self, item: T) -> T | None:
+        """Take ``item`` in; return the one that had to make room for it, if any."""
+        if self._busy:
+            return super().put(item)
+        self._busy = True
+        timer = self._timer
+        if timer.pause:
+            timer.pause -= 1
+            coroutine = self._work(item)
+        else:
+            coroutine = self._timed(item)
+        if coroutine is not None:
+            self._spawn(coroutine)
+        elif self._waiting:
+            self._run()
+        else:
+            self._busy = False
+        return None
+
+
+class OverlappingLine(Line[T]):
+    """The line of a reentrant port: nobody waits in it."""
+
+    __slots__ = ()
+
+    def put(self, item: T) -> None:
+        """Work on ``item`` at once."""
+        coroutine = self._timed(item)
+        if coroutine is not None:
+            self._core.spawn(coroutine)

@@ -2,8 +2,9 @@
 
 Its services are those of nav2's lifecycle manager as far as both have them (std_srvs/srv/Trigger):
 ``startup``, ``pause``, ``resume``, ``reset``, ``shutdown`` and ``is_active``. It tells the state of
-every node on ``/diagnostics`` (REP 107) and, latched, on ``state``: each second and on change. What
-the callbacks of the nodes take it tells on ``callbacks``, each second while somebody listens.
+every node on ``/diagnostics`` (REP 107) and, latched, on ``state``: on change, and while somebody
+listens each second and as soon as somebody does. What the callbacks of the nodes take it tells on
+``callbacks`` and ``/diagnostics``, while somebody listens.
 """
 
 from __future__ import annotations
@@ -11,38 +12,45 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.time_source import USE_SIM_TIME_NAME
 from std_srvs.srv import Trigger
 
 from composer.names import join
+from composer.runtime.announced_events import AnnouncedEvents
 from composer.runtime.board import Board, NodeStatus, SystemStatus
 from composer.runtime.callback_messages import Figures, to_message
+from composer.runtime.clock import Clock
 from composer.runtime.deputy import Deputy
 from composer.runtime.event_loop import EventLoop
 from composer.runtime.executors import log_exception
 from composer.runtime.figures import CallbackFigures, ChainFigures
 from composer.runtime.loop import Reply, never_called
-from composer.runtime.manager_topics import (
+from composer.runtime.manager_interface import (
     CALLBACKS_QOS,
     CALLBACKS_TOPIC,
+    IS_ACTIVE,
     NAME,
     STATE_QOS,
     STATE_TOPIC,
 )
-from composer.runtime.node import RunningNode
+from composer.runtime.node import RunningNode, Shared
+from composer.runtime.simulated_time import SimulatedTime
 
 COMMANDS = ("startup", "pause", "resume", "reset", "shutdown")
-IS_ACTIVE = "is_active"
 _DIAGNOSTICS = "/diagnostics"
 _PERIOD_S = 1.0
-#: How often it is seen whether somebody listens, who is then told at once.
-_LOOK_S = 0.25
+_OWN = 1  # the subscription that looks for rivals
 #: Many changes at once, as in a bring-up, become one message.
 _TOGETHER_S = 0.05
 _ENDS_WITHIN_S = 0.2
@@ -83,9 +91,15 @@ class Office:
 
 
 class Manager:
-    """The node, and the loop of its own that serves it whatever the others do."""
+    """The node, and the loop of its own that serves it whatever the others do.
 
-    def __init__(self, namespace: str, board: Board, office: Office) -> None:
+    Its subscription of /clock serves all nodes, so that none of them can hold up time.
+    """
+
+    def __init__(
+        self, namespace: str, board: Board, office: Office, *, use_sim_time: bool = False
+    ) -> None:
+        """Join the ROS graph. With ``use_sim_time`` its stamps are the time of /clock."""
         self._board = board
         self._office = office
         self._started_s = time.monotonic()
@@ -100,12 +114,15 @@ class Manager:
             start_parameter_services=False,
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
-        self._diagnostics = self._node.create_publisher(DiagnosticArray, _DIAGNOSTICS, 10)
-        self._state = self._node.create_publisher(DiagnosticArray, f"~/{STATE_TOPIC}", STATE_QOS)
-        self._callbacks = self._node.create_publisher(
-            DiagnosticArray, f"~/{CALLBACKS_TOPIC}", CALLBACKS_QOS
+        simulated_time = SimulatedTime(self._node, self._loop)
+        self.shared = Shared(simulated_time, AnnouncedEvents(self._loop))
+        self._clock = Clock(self._node, self._loop, simulated_time)
+        self._node.set_parameters([Parameter(USE_SIM_TIME_NAME, value=use_sim_time)])
+        self._diagnostics = self._publisher(_DIAGNOSTICS, 10, self._publish)
+        self._state = self._publisher(f"~/{STATE_TOPIC}", STATE_QOS, self._publish)
+        self._callbacks = self._publisher(
+            f"~/{CALLBACKS_TOPIC}", CALLBACKS_QOS, self._publish_callbacks
         )
-        self._listeners = 0
         for what in COMMANDS:
             self._serve(what, partial(self._take, what))
         self._serve(IS_ACTIVE, self._tell_whether_active)
@@ -117,7 +134,6 @@ class Manager:
             Deputy(self._node, self._loop, office.members, self._publish)
         self._loop.start()
         self._loop.call_every(_PERIOD_S, self._tick)
-        self._loop.call_every(_LOOK_S, self._look_for_listeners)
         self._loop.call_soon(self._publish)
         board.on_change(self._publish_soon)
 
@@ -136,6 +152,24 @@ class Manager:
         """Leave the ROS graph."""
         self._node.destroy_node()
 
+    def _publisher(
+        self, name: str, profile: QoSProfile | int, tell: Callable[[], None]
+    ) -> Publisher:
+        """Make a publisher; whoever begins to listen to it is told at once."""
+        publisher = self._node.create_publisher(DiagnosticArray, name, profile)
+        listeners = 0
+
+        def matched() -> None:
+            nonlocal listeners
+            before, listeners = listeners, publisher.get_subscription_count()
+            if listeners > before:
+                tell()
+
+        with suppress(UnsupportedEventTypeError):  # then who listens is told within a second
+            kind = QoSPublisherEventType.RCL_PUBLISHER_MATCHED
+            self.shared.events.watch(publisher.handle, kind, matched)
+        return publisher
+
     def _serve(self, name: str, callback: Callable[[Any, Reply], None]) -> None:
         service = self._node.create_service(Trigger, f"~/{name}", never_called)
         self._loop.add_service(service, callback)
@@ -152,18 +186,15 @@ class Manager:
 
     def _tick(self) -> None:
         self._office.measure()
-        self._publish()
-        if self._listeners:
-            self._publish_callbacks()
-
-    def _look_for_listeners(self) -> None:
-        before, self._listeners = self._listeners, self._callbacks.get_subscription_count()
-        if self._listeners > before:
+        heard = self._diagnostics.get_subscription_count()
+        if heard or self._state.get_subscription_count() > _OWN:
+            self._publish()
+        if self._callbacks.get_subscription_count():
             self._publish_callbacks()
 
     def _publish_callbacks(self) -> None:
         figures: tuple[Figures, ...] = (*self._office.chains(), *self._office.callbacks())
-        message = to_message(self._board.snapshot().system, figures)
+        message = to_message(self._board.without_nodes.system, figures)
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._callbacks.publish(message)
 
@@ -179,7 +210,7 @@ class Manager:
         """See whether another composer runs the same system, and for how long."""
         values = {item.key: item.value for item in message.status[0].values}
         rival = (values["host"], values["pid"])
-        status = self._board.snapshot()
+        status = self._board.without_nodes
         own = (status.host, str(status.pid))
         if rival == own:
             return
@@ -198,8 +229,11 @@ class Manager:
     def _publish(self) -> None:
         message = diagnostics(self._board.snapshot(), self._uptime_s, self._office.chains())
         message.header.stamp = self._node.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
         self._state.publish(message)
+        if self._diagnostics.get_subscription_count():
+            callbacks = to_message(self._board.without_nodes.system, self._office.callbacks())
+            message.status = [*message.status, *callbacks.status]
+            self._diagnostics.publish(message)
 
 
 def diagnostics(
@@ -253,6 +287,7 @@ def _of_node(system: str, node: NodeStatus) -> DiagnosticStatus:
         "slowest": node.slowest,
         "overruns": str(node.overruns),
         "queue_drops": str(node.queue_drops),
+        "qos_events": " ".join(f"{name}={count}" for name, count in node.qos_events.items()),
     }
     return _status(f"{system}: {node.node}", system, level, message, values)
 

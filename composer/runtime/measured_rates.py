@@ -14,9 +14,10 @@ from typing import Any, Self
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from composer.runtime.inspect_topics import strongest_for_all, topic_info
+from composer.runtime.inspect_topics import strongest_for_all
 from composer.runtime.inspect_values import BadValue, class_of
 from composer.runtime.ports.profiles import rclpy_profile
+from composer.runtime.topic_ends import topic_info
 
 _DEPTH = 1000
 _PAUSE_S = 0.002

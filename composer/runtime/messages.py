@@ -7,12 +7,17 @@ else is converted, except that a number put into a Time or a Duration means seco
 
 from __future__ import annotations
 
+import threading
 from array import array
 from collections.abc import Callable, Mapping
+from functools import cache
 from importlib import import_module
 from typing import Any, TypeAlias
 
-from rosidl_parser.definition import (  # type: ignore[import-untyped]
+from rclpy.exceptions import NoTypeSupportImportedException
+from rclpy.type_support import check_for_type_support
+from rosidl_generator_py.import_type_support_impl import UnsupportedTypeSupport
+from rosidl_parser.definition import (
     AbstractNestedType,
     AbstractString,
     AbstractWString,
@@ -51,20 +56,36 @@ _TYPECODES = {
 }
 
 
+_NOT_INSTALLED = (
+    ImportError,
+    AttributeError,
+    ValueError,
+    NoTypeSupportImportedException,
+    UnsupportedTypeSupport,
+)
+#: A class notes down its own type support first and that of its parts after it. Who uses it on
+#: another thread in between meets parts without any, and rclpy can neither take nor send.
+_LOADING = threading.Lock()
+
+
 class MessageError(Exception):
     """A value does not fit the field it is put into; the text names both."""
 
 
+@cache
 def interface_class(name: str) -> Any:
-    """Return the class of ``package/folder/Name``.
+    """Return the class of ``package/folder/Name``, ready to be used on any thread.
 
     Raises MessageError when it is not installed.
     """
     module, _, class_name = name.rpartition("/")
     try:
-        return getattr(import_module(module.replace("/", ".")), class_name)
-    except (ImportError, AttributeError, ValueError) as error:
+        found = getattr(import_module(module.replace("/", ".")), class_name)
+        with _LOADING:
+            check_for_type_support(found)
+    except _NOT_INSTALLED as error:
         raise MessageError(f"interface '{name}' is not installed for Python: {error}") from error
+    return found
 
 
 def compile_message(template: Template, message_type: Any, what: str) -> Build:

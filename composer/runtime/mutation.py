@@ -14,12 +14,11 @@ from weakref import WeakValueDictionary
 
 from rclpy.serialization import serialize_message
 
-from composer.runtime.strand import in_steps
+from composer.runtime.strand import Work, in_steps
 from composer.runtime.tasks import Future
 
 T = TypeVar("T")
 
-Work = Callable[[T], "Coroutine[Any, Any, None] | None"]
 #: Told (the callback, what it has done).
 Tell = Callable[[str, str], None]
 

@@ -9,16 +9,19 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from time import monotonic
 from typing import Any, TypeVar
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node as RosNode
 
 from composer.behavior import TransitionFailed
-from composer.model import Event, LogLevel, Node
+from composer.model import BehaviorReference, Event, LogLevel, Node
+from composer.runtime.announced_events import AnnouncedEvents
 from composer.runtime.assembly import Assembly
 from composer.runtime.behaviors import Named, NamedPorts, NodeClock, behavior_class, method
 from composer.runtime.chains import Chains
+from composer.runtime.clock import Clock
 from composer.runtime.core import Core
 from composer.runtime.delivery.delivery import Delivery
 from composer.runtime.gate import Gate
@@ -27,12 +30,15 @@ from composer.runtime.log import Faults, Log, Write, describe
 from composer.runtime.loop import Loop
 from composer.runtime.mutation import MutationCheck, SeenMessages
 from composer.runtime.parameters import Parameters
+from composer.runtime.pending import Pending
 from composer.runtime.ports.port import RunningPort
 from composer.runtime.ports.timer import PeriodError, period_s
 from composer.runtime.ros_node import make_ros_node
+from composer.runtime.simulated_time import SimulatedTime
 from composer.runtime.statistics import Statistics
 from composer.runtime.strand import Direct, Turns
 from composer.runtime.tasks import Future
+from composer.runtime.user_code import calls_user_code
 
 T = TypeVar("T")
 
@@ -49,16 +55,26 @@ class WrongReturn(Exception):
 
 
 @dataclass(frozen=True, slots=True)
+class Shared:
+    """What serves all nodes of the process, on the loop of the manager."""
+
+    simulated_time: SimulatedTime
+    events: AnnouncedEvents
+
+
+@dataclass(frozen=True, slots=True)
 class NodeOptions:
     """How a node is run.
 
     ``delivery`` is where its ports meet those of the nodes beside it, ``chains`` are those of the
-    system; ``seen_messages`` is what all of them remember when changes of messages are looked for;
+    system, ``shared`` is what there is once in the process;
+    ``seen_messages`` is what all of them remember when changes of messages are looked for;
     ``parallel`` is true when its loop has several threads.
     """
 
     delivery: Delivery
     chains: Chains
+    shared: Shared
     seen_messages: SeenMessages | None = None
     parallel: bool = False
     log_level: LogLevel = LogLevel.INFO
@@ -94,6 +110,8 @@ class RunningNode:
         self.model = model
         self.loop = loop
         self.activations = 0  # how often it became active
+        #: When, by ``time.monotonic()``, the work of its last transition began.
+        self.turn_s = 0.0
         self.statistics = Statistics() if statistics is None else statistics
         self._listener = listener
         self._ros = make_ros_node(model)
@@ -103,7 +121,8 @@ class RunningNode:
         self._core = Core(
             node=self._ros,
             loop=loop,
-            gate=Gate(model.full_name),
+            clock=Clock(self._ros, loop, options.shared.simulated_time, self._time_switched),
+            gate=Gate(model.full_name, Pending(loop.call_later)),
             strand=Turns(loop.call_soon) if options.parallel else Direct(),
             log=log,
             faults=faults,
@@ -111,16 +130,18 @@ class RunningNode:
             names={"parameters": {}, "state": {}, "node": model.full_name},
             delivery=options.delivery,
             chains=options.chains.of(model),
+            events=options.shared.events,
             mutations=_mutation_check(options.seen_messages, faults),
         )
+        # What is always on has a gate of its own and shares the rest.
+        standby_gate = Gate(model.full_name, Pending(loop.call_later))
+        self._standby = replace(self._core, gate=standby_gate)
+        self._behavior: Any = None
+        self._assembly = Assembly(self._core, self._standby)
         parameters = Parameters(
             self._ros, model.parameters, objection=self._objection, changed=self._changed
         )
         self._core.names["parameters"] = parameters.values
-        # What is always on has a gate of its own and shares the rest.
-        self._standby = replace(self._core, gate=Gate(model.full_name))
-        self._behavior: Any = None
-        self._assembly = Assembly(self._core, self._standby)
         self._keeps_entities = False
         loop.add_node(self._ros)
         self._lifecycle = Lifecycle(
@@ -140,10 +161,17 @@ class RunningNode:
         """The label of the lifecycle state, as ROS tools see it."""
         return self._lifecycle.state
 
+    def now_s(self) -> float:
+        """Return the node's time in seconds."""
+        return self._core.now_s()
+
     def stand_still(self) -> None:
-        """Take nothing more in until it comes to rest anew, from any thread: it has failed."""
+        """Let nothing through, from any thread: it has failed.
+
+        It may say a last word in the next transition, and takes in what comes once that is over.
+        """
         for core in self.cores:
-            core.gate.incoming = False
+            core.gate.hush()
 
     def give_up(self) -> None:
         """Tell who waits for a transition that it hangs, from any thread."""
@@ -184,6 +212,7 @@ class RunningNode:
         """Give back everything, whatever the state. No transition can be made afterwards."""
         self._release()
         self._lifecycle.destroy()
+        self._core.clock.close()
         self.loop.remove_node(self._ros)
         self._ros.destroy_node()
 
@@ -191,6 +220,7 @@ class RunningNode:
 
     async def on_transition(self, transition: str, start: str) -> None:
         """Do the work of ``transition``; raise what goes wrong."""
+        self._take_turn()
         gate = self._core.gate
         gate.state = self._standby.gate.state = self.state
         gate.waiting = True
@@ -207,6 +237,7 @@ class RunningNode:
 
     async def on_error(self, cause: BaseException) -> None:
         """Let the behaviour know why the node failed."""
+        self._take_turn()
         await self._leave(self._core, self._assembly.gated)
         await self._leave(self._standby, self._assembly.always_on)
         self._core.gate.waiting = True
@@ -225,22 +256,33 @@ class RunningNode:
 
     # --- transitions
 
+    def _take_turn(self) -> None:
+        self.turn_s = monotonic()
+        for core in self.cores:
+            core.gate.end_hush()
+
     def _configure(self) -> None:
         """Make the behaviour and the entities anew, so that nothing of an earlier life is left."""
         state = self._core.names["state"]
         state.clear()
         state.update({name.value: deepcopy(value) for name, value in self.model.state})
-        if self.model.behavior is not None:
-            self._behavior = behavior_class(self.model.behavior)()
         # A callback group never forgets what was in it, so an old one is not used again.
         self._core.group = self._standby.group = MutuallyExclusiveCallbackGroup()
         self._assembly = Assembly(self._core, self._standby)
-        self._assembly.build(self.model, self._behavior)
-        if self._behavior is not None:
-            self._equip(self._behavior)
+        reference = self.model.behavior
+        behavior = None if reference is None else self._make_behavior(reference)
+        try:
+            self._assembly.build(self.model, behavior)
+        finally:
+            if behavior is not None:
+                self._equip(behavior, self._assembly)
+                self._behavior = behavior  # whole: nobody meets it without what was promised
 
-    def _equip(self, behavior: Any) -> None:
-        assembly = self._assembly
+    @calls_user_code
+    def _make_behavior(self, reference: BehaviorReference) -> Any:
+        return behavior_class(reference)()
+
+    def _equip(self, behavior: Any, assembly: Assembly) -> None:
         behavior.name = self.full_name
         behavior.log = self._core.log
         behavior.clock = NodeClock(self._core, self._standby)
@@ -260,6 +302,7 @@ class RunningNode:
             if server in left:
                 await server.drain()
 
+    @calls_user_code
     async def _tell(self, transition: str, *arguments: Any) -> None:
         event = _EVENTS.get(transition)
         reaction = self._assembly.transitions.get(event) if event is not None else None
@@ -293,6 +336,13 @@ class RunningNode:
         self._behavior = None
 
     # --- parameters
+
+    def _time_switched(self) -> None:
+        self._core.strand.post(self._follow_clock)
+
+    def _follow_clock(self) -> None:
+        for timer in self._assembly.timers.values():
+            timer.follow_clock()
 
     def _objection(self, values: Mapping[str, Any]) -> str | None:
         """Return why a timer could not go on with the new parameter values, or None."""

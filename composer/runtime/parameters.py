@@ -112,6 +112,8 @@ def _declare(node: Node, parameter: Parameter) -> Any:
     reason = _out_of_bounds(parameter, value)
     if reason is not None:
         raise ParameterError(reason)
+    if node.has_parameter(name):  # use_sim_time, which every node has
+        node.undeclare_parameter(name)
     try:
         node.declare_parameter(name, value, _descriptor(parameter))
     except (InvalidParameterException, InvalidParameterValueException, TypeError) as error:

@@ -50,13 +50,13 @@ class Poller:
             raise OSError(ctypes.get_errno(), "timerfd_create failed")
         self._armed_for_s: float | None = None
         self._time = _TimeSpecification()
-        self.watch(self._wake_fd)
-        self.watch(self._timer_fd)
+        for fd in (self._wake_fd, self._timer_fd):
+            # Edge-triggered: each write is a new edge, so nobody needs to read the counter back.
+            self._epoll.register(fd, select.EPOLLIN | select.EPOLLET)
 
     def watch(self, fd: int) -> None:
-        """Report ``fd`` from now on, once for each time that it is written."""
-        # Edge-triggered: each write is a new edge, so nobody needs to read the counter back.
-        self._epoll.register(fd, select.EPOLLIN | select.EPOLLET)
+        """Report ``fd`` from now on, as long as its counter is not read back."""
+        self._epoll.register(fd, select.EPOLLIN)
 
     def forget(self, fd: int) -> None:
         """Do not report ``fd`` any more. To be called before it is closed."""
@@ -72,7 +72,8 @@ class Poller:
             return self._epoll.poll(None, _AT_ONCE)
         if until_s <= time.monotonic():
             return self.ready()
-        self._arm(until_s)
+        if until_s != self._armed_for_s:
+            self._arm(until_s)
         return self._epoll.poll(None, _AT_ONCE)
 
     def __del__(self) -> None:
@@ -81,8 +82,6 @@ class Poller:
         os.close(self._timer_fd)
 
     def _arm(self, until_s: float) -> None:
-        if until_s == self._armed_for_s:
-            return
         self._armed_for_s = until_s
         nanoseconds = int(until_s * _NANOSECONDS) + 1
         self._time.value_s, self._time.value_ns = divmod(nanoseconds, _NANOSECONDS)

@@ -83,7 +83,7 @@ class Signal:
         self._attached: list[tuple[Handle, tuple[Announcement, ...]]] = []
 
     def attach(self, handle: Handle, *announcements: Announcement) -> None:
-        """Have rcl announce the entity. Data that waits already is announced at once.
+        """Have rcl announce the entity.
 
         Raises rclpy's InvalidHandle when the entity is destroyed, RuntimeError when rcl refuses.
         """
@@ -93,7 +93,6 @@ class Signal:
             if announce(handle.pointer, _WRITE, self.fd) != 0:
                 self.detach(handle)
                 raise RuntimeError(f"rcl does not announce {handle!r}")
-        self.raise_()  # a middleware may not count what came before
 
     def detach(self, handle: Handle) -> None:
         """Have rcl announce the entity no more, and let it be destroyed."""
@@ -103,14 +102,24 @@ class Signal:
                 announce(handle.pointer, None, 0)
             handle.__exit__(None, None, None)
 
-    def raise_(self) -> None:
-        """Announce as rcl does."""
-        os.eventfd_write(self.fd, 1)
+    def announce(self, number: int) -> None:
+        """Announce so many things, as rcl does."""
+        os.eventfd_write(self.fd, number)
+
+    def count(self) -> int:
+        """Return how many things were announced since the last time."""
+        try:
+            return os.eventfd_read(self.fd)
+        except BlockingIOError:
+            return 0
 
     def close(self) -> None:
-        """Detach everything and give the file descriptor back."""
+        """Detach everything."""
         for handle, _ in list(self._attached):
             self.detach(handle)
+
+    def __del__(self) -> None:
+        # Not sooner: who is about to read must not read what is somebody else's by now.
         os.close(self.fd)
 
 

@@ -6,7 +6,6 @@ announced, one item each, and never keeps a due timer waiting for more than one 
 
 from __future__ import annotations
 
-import sys
 import threading
 import traceback
 from collections import deque
@@ -20,14 +19,19 @@ from composer.runtime.loop import ExceptionHandler
 from composer.runtime.poller import Poller
 from composer.runtime.slots import Slot
 from composer.runtime.sources import Source
+from composer.runtime.stacks import where
 from composer.runtime.tasks import Future, Task, name_of
 from composer.runtime.timers import ScheduledCall, TimerHeap
 
 T = TypeVar("T")
 
 _ROUND = 64  # calls, then items of entities, before readiness is looked at again
-_PATIENCE = 256  # turns that go by before what may have more is served among what was announced
 _PAUSE_AFTER_FAULT_S = 0.01
+#: So long the loop may be busy before it sleeps for a moment, which Linux makes 50 us. Each look at
+#: what is ready lets go of the interpreter's lock and has it back before a thread that waits for it
+#: is awake, who takes that for a change of hands and asks for none: for seconds he gets no turn.
+BUSY_S = 0.005
+MOMENT_S = 1e-6
 
 
 class Scheduler:
@@ -39,8 +43,7 @@ class Scheduler:
         self._poller = Poller()
         self._timers = TimerHeap()
         self._calls: deque[Callable[[], object]] = deque()
-        self._ready: deque[Slot] = deque()  # announced
-        self._again: deque[Slot] = deque()  # something was taken, there may be more
+        self._ready: deque[Slot] = deque()  # with something to take
         self._slots: dict[int, Slot] = {}  # by the file descriptor of their signal
         self._tasks: set[Task[Any]] = set()
         self._running: object = None  # a source or a callback, while it is called
@@ -124,10 +127,7 @@ class Scheduler:
 
     def where(self) -> str:
         """Return the Python stack of the callback that runs now; empty when none does."""
-        frame = sys._current_frames().get(self._thread.ident or 0)
-        if frame is None or self._running is None:
-            return ""
-        return "".join(traceback.format_stack(frame))
+        return where(self.threads())
 
     def threads(self) -> tuple[int, ...]:
         """Return the identifiers of the threads that are in a callback now."""
@@ -164,22 +164,27 @@ class Scheduler:
             except BaseException as error:  # between two callbacks: an asynchronous one, or ours
                 self._report(f"executor '{self._name}'", error)
                 sleep(_PAUSE_AFTER_FAULT_S)  # a lasting fault must not fill the log in a second
+                self._ready.clear()  # one may have been on its way
+                self._ready.extend(slot for slot in list(self._slots.values()) if slot.due)
         self._wind_up()
 
     def _take_turns(self) -> None:
-        timers, calls, ready, again = self._timers, self._calls, self._ready, self._again
-        turns_since = 0
+        timers, calls, ready = self._timers, self._calls, self._ready
+        busy_until_s = 0.0
         while not self._stopping:
-            if monotonic() >= timers.next_s:
+            now_s = monotonic()
+            if now_s >= timers.next_s:
                 self._run_timers()
             if calls:
                 self._run_calls()
-            waiting = not (calls or ready or again)
-            self._gather(self._wait() if waiting else self._poller.ready())
-            turns_since += 1
-            if again and (not ready or turns_since > _PATIENCE):
-                turns_since = 0
-                self._look_again()
+            if not (calls or ready):
+                self._gather(self._wait())
+                busy_until_s = monotonic() + BUSY_S
+            else:
+                if now_s > busy_until_s:
+                    sleep(MOMENT_S)
+                    busy_until_s = now_s + BUSY_S
+                self._gather(self._poller.ready())
             for _ in range(_ROUND):
                 if not ready:
                     break
@@ -217,23 +222,13 @@ class Scheduler:
     def _gather(self, announced: list[tuple[int, int]]) -> None:
         for fd, _ in announced:
             slot = self._slots.get(fd)
-            if slot is not None and not slot.ready:
-                slot.ready = True
-                self._ready.append(slot)
-
-    def _look_again(self) -> None:
-        # An announcement may stand for several items, so each take that brought one is followed
-        # by one that brings none. While much is announced that second take can wait: mostly the
-        # next announcement of the entity makes it needless.
-        while self._again:
-            slot = self._again.popleft()
-            slot.again = False
-            if not slot.ready:
-                slot.ready = True
-                self._ready.append(slot)
+            if slot is not None:
+                if not slot.due:
+                    self._ready.append(slot)
+                slot.due += slot.signal.count()
 
     def _serve(self, slot: Slot) -> None:
-        slot.ready = False
+        brought = 0
         for source in slot.sources:
             self._running = source
             try:
@@ -241,17 +236,19 @@ class Scheduler:
             except BaseException as error:
                 if source in slot.sources:  # not removed meanwhile
                     self._report(source.name, error)
+                    brought += 1
                 continue
             if taken is None:
                 continue
-            if not slot.again:
-                slot.again = True
-                self._again.append(slot)
+            brought += 1
             try:
                 source.call(taken)
             except BaseException as error:
                 self._report(source.name, error)
         self._running = None
+        slot.note_round(brought)
+        if slot.due:
+            self._ready.append(slot)
 
     def _call(self, callback: Callable[[], object]) -> None:
         self._running = callback
@@ -286,4 +283,3 @@ class Scheduler:
         for slot in list(self._slots.values()):
             self.close_slot(slot)
         self._ready.clear()
-        self._again.clear()

@@ -16,25 +16,32 @@ from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.task import Future
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rclpy.utilities import get_rmw_implementation_identifier
 
+from composer.runtime import discovery
+from composer.runtime.claim import claims
+from composer.runtime.manager_interface import NAME
 from composer.runtime.participants import make_room_for_announcements, participants_here
+from composer.runtime.topic_ends import NO_NAME
 
 T = TypeVar("T")
 H = TypeVar("H", bound=Hashable)
 
-_STEP_S = 0.02
-#: What a participant has is announced 0.1 s after it was met, and 0.1 s later what was lost of it.
-_QUIET_S = 0.25
-_UNCHANGED_S = 0.15
+_STEP_S = 0.01
+#: What a participant has comes at once, 0.1 to 0.2 s after it was met; what was lost of it, 0.11 s
+#: later. Fast DDS 2 has these times in EDPUtils.hpp and no setting for them.
+_QUIET_S = 0.15
 #: So long is waited for the first of all others: one in another computer shows nothing before.
 _FIRST_S = 0.5
 #: Who is not met at once is met with its next announcement, with Fast DDS at most 3 s later.
-_MET_WITHIN_S = 3.2
+_MET_WITHIN_S = 3.5
 #: Each participant of ROS 2 has it; its name is as it is on the wire.
 _TOPIC_OF_PARTICIPANTS = "ros_discovery_info"
-#: What rmw calls the node of an endpoint as long as its participant has not told of it.
-_NO_NAME = "_NODE_NAME_UNKNOWN_"
+#: The part of an endpoint's id that is its participant's (DDSI-RTPS, 9.3.1).
+_PARTICIPANT_BYTES = 12
 #: Commands do not count as somebody: they come and go.
 _NAME_PREFIX = "_compose_"
 
@@ -69,12 +76,28 @@ class Deadline:
         return self.left_s <= 0.0
 
 
+def suit_commands() -> None:
+    """Have this process do without shared memory: see :mod:`composer.runtime.discovery`.
+
+    For commands that do not carry large messages, before they join the ROS graph.
+    """
+    if get_rmw_implementation_identifier().startswith("rmw_fastrtps"):
+        discovery.suit_commands(os.environ)
+
+
 class _Member(Node):
-    """A node that has room for the announcements of others before they come."""
+    """A node that has room for the announcements of others before they come.
+
+    ``joined_s`` is when it joined the graph, on the clock of time.monotonic.
+    """
+
+    joined_s = 0.0
 
     def create_publisher(self, *args: Any, **options: Any) -> Any:
         """Create a publisher. The first one is a node's own, made right after its participant."""
-        make_room_for_announcements()
+        if not self.joined_s:
+            self.joined_s = time.monotonic()
+            make_room_for_announcements()
         return super().create_publisher(*args, **options)
 
 
@@ -91,11 +114,11 @@ class Session:
             use_global_arguments=False,
             enable_rosout=False,
             start_parameter_services=False,
+            parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._domain_id = self._context.get_domain_id()
-        self._joined_s = time.monotonic()
         self._quiet = _Quiet()
         self._quiet.since_s(self._met())
 
@@ -116,6 +139,14 @@ class Session:
                 if not name.startswith(_NAME_PREFIX)
             )
         )
+
+    def silent_systems(self) -> dict[str, str]:
+        """Return the systems that composers run on this computer and that are not met, by name.
+
+        With their processes, which are stopped or busy. What is met lacks their nodes.
+        """
+        met = set(self.others())
+        return {name: pid for name, pid in claims().items() if (NAME, name) not in met}
 
     def spin_once(self, deadline: Deadline) -> None:
         """Wait for something to come in, for a moment and not beyond the deadline."""
@@ -154,23 +185,28 @@ class Session:
         """Say whether nobody is left to be met. What is asked for has not changed since then."""
         met, others = self._met()
         quiet_since_s = self._quiet.since_s((met, others))
-        ready_s = max(quiet_since_s + _QUIET_S, unchanged_since_s + _UNCHANGED_S)
+        ready_s = max(quiet_since_s, unchanged_since_s) + _QUIET_S
         if not others:
-            ready_s = max(ready_s, self._joined_s + _FIRST_S)
+            ready_s = max(ready_s, self.node.joined_s + _FIRST_S)
         now_s = time.monotonic()
         if now_s < ready_s:
             return False
-        if now_s >= self._joined_s + _MET_WITHIN_S:
+        if now_s >= self.node.joined_s + _MET_WITHIN_S:
             return True
-        return met >= participants_here(self._domain_id) and self._all_named()
+        return met >= participants_here(self._domain_id) and self._have_all_told()
 
-    def _all_named(self) -> bool:
-        """Say whether each publisher's node is known: participants tell of their nodes last."""
-        return all(
-            end.node_name != _NO_NAME
-            for topic, _ in self.node.get_topic_names_and_types()
-            for end in self.node.get_publishers_info_by_topic(topic)
-        )
+    def _have_all_told(self) -> bool:
+        """Say whether each participant's nodes are known: it tells of them last."""
+        node = self.node
+        met = node.get_publishers_info_by_topic(_TOPIC_OF_PARTICIPANTS, no_mangle=True)
+        publishers = [
+            end
+            for topic, _ in node.get_topic_names_and_types()
+            for end in node.get_publishers_info_by_topic(topic)
+        ]
+        named = [end for end in publishers if end.node_name != NO_NAME]
+        told = {_participant(end) for end in named}
+        return len(named) == len(publishers) and told.issuperset(map(_participant, met))
 
     def _met(self) -> tuple[int, tuple[tuple[str, str], ...]]:
         """Return the number of participants known now, this one included, and the nodes.
@@ -203,6 +239,10 @@ class Session:
         finally:
             for call in calls.values():
                 self.node.destroy_client(call.client)
+
+
+def _participant(end: TopicEndpointInfo) -> bytes:
+    return bytes(end.endpoint_gid[:_PARTICIPANT_BYTES])
 
 
 class _Quiet:

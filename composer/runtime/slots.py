@@ -5,27 +5,38 @@ from __future__ import annotations
 from composer.runtime.readiness import Signal
 from composer.runtime.sources import Source
 
+_ALL = 1 << 32  # more than can wait: to be taken until there is nothing
+
 
 class Slot:
     """Sources that share one signal. The loop serves them together, one item each."""
 
-    __slots__ = ("again", "ready", "signal", "sources")
+    __slots__ = ("_passes_over", "due", "signal", "sources")
 
     def __init__(self) -> None:
         self.signal = Signal()
         self.sources: tuple[Source, ...] = ()
-        # True while in the loop's deque of that name, so that it is in there once.
-        self.ready = False
-        self.again = False
+        self.due = 0  # so many things were announced and are not taken yet
+        self._passes_over = True
 
     def add(self, source: Source) -> None:
         """Serve ``source`` from now on. Raises InvalidHandle when its entity is destroyed."""
         self.sources = (*self.sources, source)
+        self._passes_over = self._passes_over and source.passes_over
         try:
             source.attach(self.signal)
         except BaseException:
             self.discard(source)
             raise
+        # What came before may have been counted for somebody else.
+        self.signal.announce(1 if self._passes_over else _ALL)
+
+    def note_round(self, brought: int) -> None:
+        """Note how many things a take from each source has brought."""
+        if brought < self.due and (brought or self._passes_over):
+            self.due -= brought or 1
+        else:
+            self.due = 0  # where nothing came, a full queue has pushed out what was announced
 
     def discard(self, source: Source) -> None:
         """Serve ``source`` no more."""

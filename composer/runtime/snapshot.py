@@ -18,12 +18,12 @@ from composer.drift import EndSeen, NodeSeen, Snapshot
 from composer.model import PortKind
 from composer.runtime.asking import Asker
 from composer.runtime.deputies import LIFECYCLE, PARAMETERS, Deputies
-from composer.runtime.deputy import full_parameter_name
 from composer.runtime.inspect_names import is_hidden
 from composer.runtime.inspect_parameters import plain_value
-from composer.runtime.inspect_topics import topic_info
+from composer.runtime.manager_interface import full_parameter_name
 from composer.runtime.measured_rates import RateMeter
 from composer.runtime.session import Deadline, Session
+from composer.runtime.topic_ends import topic_info
 from composer.tree import Plain
 
 #: Who has not answered by then is busy or gone; what it did not say is said to be unknown.

@@ -29,7 +29,15 @@ RunTask = Callable[[Coroutine[Any, Any, Any]], object]
 
 
 class Source(Protocol):
-    """One entity that is served."""
+    """One entity that is served.
+
+    ``passes_over``: a take that brings nothing may be followed by one that does. A client is sent
+    all answers of its service, and passes over those for others.
+    """
+
+    @property
+    def passes_over(self) -> bool:
+        """See above."""
 
     @property
     def name(self) -> str:
@@ -52,6 +60,7 @@ class SubscriptionSource:
     """Calls ``callback(message)`` for each message."""
 
     __slots__ = ("_callback", "_subscription", "take")
+    passes_over = False
 
     def __init__(self, subscription: Subscription, callback: Callable[[Any], object]) -> None:
         self._subscription = subscription
@@ -81,6 +90,8 @@ class SubscriptionSource:
 
 class ServiceSource:
     """Calls ``callback(request, reply)`` for each request."""
+
+    passes_over = False
 
     def __init__(self, service: Any, callback: Callable[[Any, Reply], object]) -> None:
         self._service = service
@@ -164,6 +175,8 @@ def answer_with_own_callback(service: Any, run_task: RunTask) -> Callable[[Any, 
 class ClientSource:
     """Completes the futures of ``client.call_async``."""
 
+    passes_over = True
+
     def __init__(self, client: Any, executor: object) -> None:
         self._client = client
         self._executor = executor
@@ -199,6 +212,8 @@ class ClientSource:
 
 class EventSource:
     """Calls what was registered for a QoS event of a publisher or a subscription."""
+
+    passes_over = False
 
     def __init__(self, handler: Any) -> None:
         self._handler = handler

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 
 from composer.runtime.durations import Durations
@@ -47,7 +48,8 @@ class ChainStatistics:
 class Statistics:
     """Counters of one node. See :class:`composer.runtime.events.NodeSummary` for their meaning.
 
-    With ``tracing`` false, the times of callbacks are not taken.
+    ``qos_events`` counts what :mod:`composer.runtime.ports.qos_events` tells of, by the name of the
+    event. With ``tracing`` false, the times of callbacks are not taken.
     """
 
     tracing: bool = True
@@ -57,6 +59,7 @@ class Statistics:
     dropped: int = 0
     skipped: int = 0
     errors: int = 0
+    qos_events: Counter[str] = field(default_factory=Counter)
     callbacks: dict[tuple[str, str], CallbackStatistics] = field(default_factory=dict)
 
     def callback(self, kind: str, name: str) -> CallbackStatistics:

@@ -12,9 +12,12 @@ from collections.abc import Callable, Coroutine, Generator
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
-from composer.runtime.tasks import Future, awaited_rclpy_future, wrap_rclpy_future
+from composer.runtime.tasks import Future, awaited_rclpy_future, wrap_future
 
 T = TypeVar("T")
+
+#: Does the work for one item; what it returns, if anything, is awaited. Must not raise.
+Work = Callable[[T], "Coroutine[Any, Any, None] | None"]
 
 
 class Strand(Protocol):
@@ -154,7 +157,7 @@ def _steps(around: Around, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, 
             # rclpy's futures yield nothing and want to be polled: wait for them instead.
             foreign = awaited_rclpy_future(coroutine) if yielded is None else None
             try:
-                yield yielded if foreign is None else wrap_rclpy_future(foreign)
+                yield yielded if foreign is None else wrap_future(foreign)
             except GeneratorExit:
                 raise
             except BaseException as error:

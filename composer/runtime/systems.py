@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -14,10 +14,10 @@ from composer.runtime.callback_messages import from_message
 from composer.runtime.claim import claims
 from composer.runtime.figures import CallbackFigures, ChainFigures
 from composer.runtime.finding import NotThere, not_there
-from composer.runtime.manager import IS_ACTIVE
-from composer.runtime.manager_topics import (
+from composer.runtime.manager_interface import (
     CALLBACKS_QOS,
     CALLBACKS_TOPIC,
+    IS_ACTIVE,
     NAME,
     STATE_QOS,
     STATE_TOPIC,
@@ -28,6 +28,8 @@ _TRIGGER_TYPE = "std_srvs/srv/Trigger"
 _SERVICE = f"/{NAME}/{IS_ACTIVE}"
 #: Managers tell at once and again each second; who is not met at once is met within 3 s.
 MEETING_S = 3.5
+
+_LAST_WORDS_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +50,7 @@ class NodeReport:
     slowest: str
     overruns: int
     queue_drops: int
+    qos_events: Mapping[str, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,14 +150,16 @@ class Systems:
 
         ``what`` is one of the services of :class:`composer.runtime.manager.Manager`.
         """
-        meeting = Deadline(min(MEETING_S, self._deadline.left_s))
+        life = _Life(name, self._deadline)
         # Who tells its state is alive: of a killed process, services are in the graph for a while.
-        if not self._hear((name,), meeting):
+        if not self._hear((name,), _Life(name, Deadline(min(MEETING_S, life.left_s)))):
             raise self._silent(name)
         service = f"{name}/{NAME}/{what}"
         try:
-            answer = self._session.call(Trigger, service, Trigger.Request(), self._deadline)
+            answer = self._session.call(Trigger, service, Trigger.Request(), life)
         except NoAnswer as error:
+            if life.is_over:
+                raise NoAnswer(f"{name} did not {what}: its process has ended") from error
             raise NoAnswer(
                 f"{name} did not {what} within {self._deadline.timeout_s:g} s",
                 "it may still be at it: 'compose ps' tells. --timeout waits longer",
@@ -215,6 +220,28 @@ class Systems:
         )
 
 
+class _Life(Deadline):
+    """A time limit that ends with the process of a system, where that runs on this computer."""
+
+    def __init__(self, system: str, limit: Deadline) -> None:
+        super().__init__(limit.left_s)
+        self._system = system
+        self._is_here = system in claims()
+        self._last_words: Deadline | None = None
+
+    @property
+    def left_s(self) -> float:
+        """The seconds that are left. What it said last still arrives."""
+        if self._last_words is None and self.is_over:
+            self._last_words = Deadline(min(_LAST_WORDS_S, super().left_s))
+        return super().left_s if self._last_words is None else self._last_words.left_s
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the process has ended."""
+        return self._is_here and self._system not in claims()
+
+
 def _time_s(message: DiagnosticArray) -> float:
     stamp = message.header.stamp
     return float(stamp.sec + stamp.nanosec * 1e-9)
@@ -255,7 +282,14 @@ def _node_report(status: DiagnosticStatus) -> NodeReport:
         slowest=values["slowest"],
         overruns=int(values["overruns"]),
         queue_drops=int(values["queue_drops"]),
+        qos_events=_counts(values["qos_events"]),
     )
+
+
+def _counts(text: str) -> dict[str, int]:
+    """Read counts by name: ``incompatible=1``."""
+    pairs = (item.partition("=") for item in text.split())
+    return {name: int(count) for name, _, count in pairs}
 
 
 def _values(status: DiagnosticStatus) -> dict[str, str]:

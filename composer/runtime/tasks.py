@@ -7,7 +7,6 @@ Not asyncio: its event loop knows nothing of DDS. A coroutine that runs here awa
 from __future__ import annotations
 
 import threading
-from collections import deque
 from collections.abc import Callable, Coroutine, Generator
 from functools import partial
 from typing import Any, Generic, Protocol, TypeVar, cast
@@ -32,102 +31,88 @@ class Future(Generic[T]):
     and ``cancel`` wins, and answers true.
     """
 
-    __slots__ = (
-        "__weakref__",
-        "_callbacks",
-        "_cancelled",
-        "_done",
-        "_error",
-        "_noticed",
-        "_report",
-        "_right_to_finish",
-        "_value",
-    )
+    __slots__ = ("__weakref__", "_callbacks", "_outcomes", "_report")
 
     def __init__(self, report: Callable[[BaseException], None] | None = None) -> None:
         """``report`` is told of an exception that nobody asked for, when the future is dropped."""
-        # Popping from a list and from a deque is atomic, so a future needs no lock.
-        self._right_to_finish = [True]
-        self._callbacks: deque[Callable[[Future[T]], object]] = deque()
+        # Appending to a list and popping from it are atomic, so a future needs no lock: of the
+        # outcomes the first one counts.
+        self._outcomes: list[tuple[T | None, _Failure | None, bool]] = []
+        self._callbacks: list[Callable[[Future[T]], object]] = []
         self._report = report
-        self._value: T | None = None
-        self._error: BaseException | None = None
-        self._cancelled = False
-        self._noticed = False
-        self._done = False
 
     def done(self) -> bool:
         """Tell whether there is an outcome: a result, an exception or a cancellation."""
-        return self._done
+        return bool(self._outcomes)
 
     def cancelled(self) -> bool:
         """Tell whether the outcome is a cancellation."""
-        return self._cancelled
+        return bool(self._outcomes) and self._outcomes[0][2]
 
     def set_result(self, value: T) -> bool:
         """Finish with a result; false when there is an outcome already."""
-        return self._finish(value, None, cancelled=False)
+        return self._finish((value, None, False))
 
     def set_exception(self, error: BaseException) -> bool:
         """Finish with an exception; false when there is an outcome already."""
-        return self._finish(None, error, cancelled=False)
+        failure = _Failure(error, self._report)
+        if self._finish((None, failure, False)):
+            return True
+        failure.report = None
+        return False
 
     def cancel(self) -> bool:
         """Finish as cancelled; false when there is an outcome already."""
-        return self._finish(None, None, cancelled=True)
+        return self._finish((None, None, True))
 
     def exception(self) -> BaseException | None:
         """Return the exception, or None. An exception asked for is not reported any more."""
-        self._noticed = True
-        return self._error
+        failure = self._outcomes[0][1] if self._outcomes else None
+        return None if failure is None else failure.ask()
 
     def result(self) -> T:
         """Return the result.
 
         Raises the exception that was set, Cancelled, or RuntimeError while there is no outcome.
         """
-        if not self._done:
+        if not self._outcomes:
             raise RuntimeError("the future has no result yet")
-        self._noticed = True
-        if self._error is not None:
-            raise self._error
-        if self._cancelled:
+        value, failure, is_cancelled = self._outcomes[0]
+        if failure is not None:
+            raise failure.ask()
+        if is_cancelled:
             raise Cancelled
-        return cast(T, self._value)
+        return cast(T, value)
 
     def add_done_callback(self, callback: Callable[[Future[T]], object]) -> None:
         """Call ``callback(self)`` on whichever thread finishes this; at once when it is done."""
         self._callbacks.append(callback)
-        if self._done:
+        if self._outcomes:
             self._call_back()
 
     def __await__(self) -> Generator[Future[T], None, T]:
-        if not self._done:
+        if not self._outcomes:
             yield self
         return self.result()
 
-    def __del__(self) -> None:
-        if self._error is not None and not self._noticed and self._report is not None:
-            self._report(self._error)
-
-    def _finish(self, value: T | None, error: BaseException | None, *, cancelled: bool) -> bool:
-        try:
-            self._right_to_finish.pop()
-        except IndexError:
+    def _finish(self, outcome: tuple[T | None, _Failure | None, bool]) -> bool:
+        outcomes = self._outcomes
+        if outcomes:
             return False
-        self._value = value
-        self._error = error
-        self._cancelled = cancelled
-        self._done = True
-        self._call_back()
+        outcomes.append(outcome)
+        if outcomes[0] is not outcome:  # another thread was faster
+            return False
+        if self._callbacks:
+            self._call_back()
         return True
 
     def _call_back(self) -> None:
-        while True:
+        callbacks = self._callbacks
+        while callbacks:
             try:
-                callback = self._callbacks.popleft()
+                callback = callbacks.pop(0)
             except IndexError:
-                return
+                return  # another thread calls it
             try:
                 callback(self)
             except BaseException:
@@ -135,11 +120,28 @@ class Future(Generic[T]):
                 raise
 
 
-class Calls(Protocol):
-    """The part of a loop that tasks need."""
+class _Failure:
+    """The exception of a future, reported when it goes and nobody has asked for it."""
 
-    def call_soon(self, callback: Callable[[], object]) -> None:
-        """Call ``callback`` on the loop as soon as it is free."""
+    __slots__ = ("error", "report")
+
+    def __init__(
+        self, error: BaseException, report: Callable[[BaseException], None] | None
+    ) -> None:
+        self.error = error
+        self.report = report
+
+    def ask(self) -> BaseException:
+        self.report = None
+        return self.error
+
+    def __del__(self) -> None:
+        if self.report is not None:
+            self.report(self.error)
+
+
+class Clock(Protocol):
+    """Who waits: a loop by the steady clock, or a node's clock."""
 
     def call_later(self, delay_s: float, callback: Callable[[], object]) -> Cancellable:
         """Call ``callback`` once, ``delay_s`` seconds from now."""
@@ -239,7 +241,7 @@ class Task(Generic[T]):
         try:
             self._cancelling = False
             if not self._finished:
-                self._advance(partial(self._coroutine.throw, Cancelled()))
+                self._advance(self._coroutine.throw, Cancelled())
         finally:
             self._lock.release()
 
@@ -247,15 +249,15 @@ class Task(Generic[T]):
         with self._lock:
             # A cancelled task may be woken by what it no longer waits for.
             if not self._finished and self._awaited is awaited:
-                self._advance(partial(self._coroutine.send, None))
+                self._advance(self._coroutine.send, None)
         if self._cancelling:
             self._throw()
 
-    def _advance(self, resume: Callable[[], object]) -> None:
+    def _advance(self, resume: Callable[[Any], object], argument: BaseException | None) -> None:
         while True:
             self._awaited = None
             try:
-                yielded = resume()
+                yielded = resume(argument)
             except StopIteration as stop:
                 self._end()
                 self.future.set_result(stop.value)
@@ -270,7 +272,7 @@ class Task(Generic[T]):
                 return
             if self._wait_for(yielded):
                 return
-            resume = partial(self._coroutine.throw, _not_awaitable(yielded))
+            resume, argument = self._coroutine.throw, _not_awaitable(yielded)
 
     def _end(self) -> None:
         self._finished = True
@@ -305,39 +307,50 @@ class Task(Generic[T]):
         self._call_soon(partial(self._step, awaited))
 
 
-def sleep(loop: Calls, delay_s: float) -> Future[None]:
+def sleep(clock: Clock, delay_s: float) -> Future[None]:
     """Return a future that is done ``delay_s`` seconds from now."""
     future: Future[None] = Future()
-    timer = loop.call_later(delay_s, lambda: future.set_result(None))
+    timer = clock.call_later(delay_s, lambda: future.set_result(None))
     future.add_done_callback(lambda _: timer.cancel())
     return future
 
 
-async def within(loop: Calls, future: Future[T], timeout_s: float) -> T:
-    """Wait for ``future`` for at most ``timeout_s`` seconds.
+async def within(
+    clock: Clock, future: Future[T], timeout_s: float, after: Future[None] | None = None
+) -> T:
+    """Wait for ``future`` for at most ``timeout_s`` seconds, which begin once ``after`` is done.
 
     Raises TimeoutError when it takes longer. A future not waited for any more, because of that
     or because the caller was cancelled, is cancelled.
     """
     woken: Future[None] = Future()
-    timer = loop.call_later(timeout_s, lambda: woken.set_result(None))
+    timers: list[Cancellable] = []
+
+    def begin(_: object) -> None:
+        timers.append(clock.call_later(timeout_s, lambda: woken.set_result(None)))
+
     future.add_done_callback(lambda _: woken.set_result(None))
+    if after is None:
+        begin(None)
+    else:
+        after.add_done_callback(begin)
     try:
         await woken
         if not future.done():
             raise TimeoutError(f"no answer within {timeout_s:g} s")
         return future.result()
     finally:
-        timer.cancel()
+        for timer in timers:
+            timer.cancel()
         future.cancel()
 
 
-def wrap_rclpy_future(foreign: Any) -> Future[Any]:
-    """Return a future with the outcome of an ``rclpy.task.Future``.
+def wrap_future(foreign: Any, report: Callable[[BaseException], None] | None = None) -> Future[Any]:
+    """Return a future with the outcome of another, which may be an ``rclpy.task.Future``.
 
-    Cancelling one cancels the other, so that a client forgets a request nobody waits for.
+    Cancelling one cancels the other. ``report`` is as for :class:`Future`.
     """
-    future: Future[Any] = Future()
+    future: Future[Any] = Future(report)
 
     def take_over(_: object) -> None:
         if foreign.cancelled():

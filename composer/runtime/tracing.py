@@ -3,15 +3,14 @@
 What is counted is the time for which a callback keeps its thread; while an ``async`` one waits it
 does not.
 
-This is always on and so has to cost little, which two looks at the clock and one bucket of a
-histogram, a quarter of a microsecond, are not for who is called a hundred thousand times a second:
-of callbacks that come more often than :data:`HOT_HZ` each sixteenth call stands for sixteen. One
-with a ``budget_ms`` is timed at every call.
+This is always on and so has to cost little, which two looks at the clock, a tenth of a microsecond,
+are not for who is called a hundred thousand times a second: of callbacks that come more often than
+:data:`HOT_HZ` each sixteenth call stands for sixteen. One with a ``budget_ms`` is timed at every
+call.
 """
 
 from __future__ import annotations
 
-from bisect import bisect
 from collections.abc import Coroutine
 from math import inf
 from time import monotonic
@@ -19,10 +18,9 @@ from typing import Any, TypeVar
 
 from composer.runtime.budget import Budget
 from composer.runtime.core import Core
-from composer.runtime.durations import BOUNDS_S
-from composer.runtime.line import Work
+from composer.runtime.durations import TOGETHER
 from composer.runtime.statistics import CallbackStatistics
-from composer.runtime.strand import in_steps
+from composer.runtime.strand import Work, in_steps
 from composer.source import Located
 
 T = TypeVar("T")
@@ -33,75 +31,109 @@ _STANDS_FOR = 16
 
 
 class CallbackTimer:
-    """Takes the times of one callback, and names it when it takes longer than it may."""
+    """Takes the times of one callback, and names it when it takes longer than it may.
+
+    ``pause`` is how many of the calls to come need not be timed: whoever makes one that is not
+    counts it down.
+    """
+
+    __slots__ = (
+        "_budget",
+        "_budget_s",
+        "_looked_s",
+        "_mutations",
+        "_pause",
+        "_statistics",
+        "_times",
+        "_waiting",
+        "pause",
+    )
 
     def __init__(
         self, core: Core, statistics: CallbackStatistics, budget_ms: Located[float] | None
     ) -> None:
         self._statistics = statistics
         self._mutations = core.mutations
-        self._is_on = core.statistics.tracing or budget_ms is not None
         self._budget_s = inf if budget_ms is None else budget_ms.value / 1e3
         self._budget = Budget(core.log, statistics, self._budget_s)
+        self._times = statistics.times
+        self._waiting = statistics.times.waiting
+        self._looked_s = 0.0
+        is_on = core.statistics.tracing or budget_ms is not None
+        self._pause = self.pause = 0.0 if is_on else inf
+
+    def call(self, work: Work[T], item: T) -> Coroutine[Any, Any, None] | None:
+        """Do the work, timed."""
+        began_s = monotonic()
+        rest = work(item)
+        took_s = monotonic() - began_s
+        if rest is not None:
+            self._time_each(1)
+            return self._to_its_end(rest, took_s)
+        waiting = self._waiting
+        waiting.append(took_s)
+        if len(waiting) >= TOGETHER:
+            self._look(began_s)
+        self.pause = self._pause
+        if took_s > self._budget_s:
+            self._budget.take(took_s)
+        return None
 
     def around(self, work: Work[T]) -> Work[T]:
-        """Return ``work``, timed. It must not raise."""
-        if self._mutations is not None:
-            work = self._mutations.around(str(self._statistics), work)
-        if not self._is_on:
-            return work
-        times, buckets = self._statistics.times, self._statistics.times.buckets
-        budget_s, budget = self._budget_s, self._budget
-        hot_s = _STANDS_FOR / HOT_HZ if budget_s == inf else 0.0  # too soon for so many calls
-        untimed = 0  # so many calls to come
-        weight = 1  # so many calls the next one that is timed stands for
-        until_look = 0  # so many timed calls before it is seen how often they come
-        looked_s = 0.0
+        """Return ``work``, timed."""
+        work = self.watched(work)
 
         def timed(item: T) -> Coroutine[Any, Any, None] | None:
-            nonlocal untimed, weight, until_look, looked_s
-            if untimed:
-                untimed -= 1
+            if self.pause > 0:  # two threads may both count down the last
+                self.pause -= 1
                 return work(item)
-            began_s = monotonic()
-            rest = work(item)
-            took_s = monotonic() - began_s
-            if rest is not None:
-                return self._to_its_end(rest, took_s)
-            # As in Durations.take and _end, but without a call.
-            buckets[bisect(BOUNDS_S, took_s)] += weight
-            times.total_s += took_s * weight
-            if until_look:
-                until_look -= 1
-            else:
-                is_hot = began_s - looked_s < hot_s
-                untimed, until_look = (_STANDS_FOR - 1, 0) if is_hot else (0, _STANDS_FOR - 1)
-                weight, looked_s = untimed + 1, began_s
-            if took_s > times.longest_s:  # noqa: PLR1730  calling max takes as long as the rest
-                times.longest_s = took_s
-            if took_s > budget_s:
-                budget.take(took_s)
-            return None
+            return self.call(work, item)
 
         return timed
+
+    def watched(self, work: Work[T]) -> Work[T]:
+        """Return ``work``, after which messages are looked at where that is asked for."""
+        if self._mutations is None:
+            return work
+        return self._mutations.around(str(self._statistics), work)
 
     def steps(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
         """Return ``coroutine``, the steps of which are timed and count as one call."""
         if self._mutations is not None:
             coroutine = self._mutations.steps(str(self._statistics), coroutine)
-        return self._to_its_end(coroutine, 0.0) if self._is_on else coroutine
+        return coroutine if self.pause == inf else self._to_its_end(coroutine, 0.0)
 
     async def _to_its_end(self, coroutine: Coroutine[Any, Any, T], took_s: float) -> T:
         stopwatch = _Stopwatch(took_s)
         try:
             return await in_steps(stopwatch, coroutine)
         finally:
-            self._end(stopwatch.took_s)
+            self._times.take(stopwatch.took_s)
+            if stopwatch.took_s > self._budget_s:
+                self._budget.take(stopwatch.took_s)
 
-    def _end(self, took_s: float) -> None:
-        self._statistics.times.take(took_s)
-        if took_s > self._budget_s:
-            self._budget.take(took_s)
+    def _look(self, now_s: float) -> None:
+        """Put what waits into the histogram, and see how often the callback is called."""
+        self._times.settle()
+        if self._budget_s == inf:
+            calls = TOGETHER * (self._pause + 1)
+            is_hot = calls > HOT_HZ * (now_s - self._looked_s)
+            self._looked_s = now_s
+            self._time_each(_STANDS_FOR if is_hot else 1)
+
+    def _time_each(self, how_many: int) -> None:
+        """Time one of so many calls, for all of them."""
+        self._pause = how_many - 1.0
+        self._times.stand_for(how_many)
+
+
+class Untimed:
+    """Stands where there may be a timer."""
+
+    __slots__ = ("pause",)
+
+    def __init__(self) -> None:
+        self.pause = inf
 
 
 class _Stopwatch:

@@ -14,10 +14,11 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Callable, Coroutine
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any, Protocol
 from weakref import WeakSet
 
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.event_handler import EventHandler
@@ -37,9 +38,11 @@ from rclpy.waitable import Waitable
 from composer.runtime import actions
 from composer.runtime.loop import Loop
 from composer.runtime.node_executor import NodeExecutor
+from composer.runtime.scheduler import BUSY_S, MOMENT_S
 from composer.runtime.sources import Source, comes_by_itself, source_of
 
 _Execute = Callable[[], Coroutine[Any, Any, None]]
+_ADDING = "to wait set: "  # what rclpy was at when it says "action client pointer is invalid"
 _END = None  # what a thread of the pool finds in the queue when it is to end
 
 
@@ -63,6 +66,7 @@ class MendedExecutor(Executor):
         self._sources: dict[object, Source] = {}  # of the entities that were added by themselves
         self._served: WeakSet[Any] = WeakSet()
         self._ending = False
+        self._busy_until_s = 0.0
         self.threads: list[threading.Thread] = []  # those beside the one that calls turn
 
     def serve(self, entity: object, source: Source | None) -> None:
@@ -107,6 +111,10 @@ class MendedExecutor(Executor):
             return False
         except InvalidHandle:
             return True  # an entity was destroyed between the wait and the look at its result
+        except RCLError as error:
+            if _ADDING not in str(error):
+                raise
+            return True  # rclpy finds that an action is destroyed, and adds it nonetheless
         self._run(handler)
         return True
 
@@ -120,6 +128,11 @@ class MendedExecutor(Executor):
         return True
 
     def _is_ending(self) -> bool:
+        """Asked before each wait: also the time to let other threads have their turn."""
+        now_s = monotonic()
+        if now_s > self._busy_until_s:
+            sleep(MOMENT_S)
+            self._busy_until_s = now_s + BUSY_S
         return self._ending
 
     def _run(self, handler: Any) -> None:

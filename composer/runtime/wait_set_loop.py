@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import traceback
 from collections import deque
@@ -21,6 +20,7 @@ from composer.runtime import actions
 from composer.runtime.handover import Handover
 from composer.runtime.loop import ExceptionHandler, Reply
 from composer.runtime.sources import ServiceSource, SubscriptionSource
+from composer.runtime.stacks import where
 from composer.runtime.tasks import Future, Task, name_of
 from composer.runtime.timer_thread import TimerThread
 from composer.runtime.timers import ScheduledCall
@@ -187,13 +187,7 @@ class WaitSetLoop:
 
     def where(self) -> str:
         """Return the Python stacks of the callbacks that run now; empty when none does."""
-        frames = sys._current_frames()
-        stacks = [
-            "".join(traceback.format_stack(frames[ident]))
-            for ident in list(self._running)
-            if ident in frames
-        ]
-        return "\n".join(stacks)
+        return where(self.threads())
 
     def threads(self) -> tuple[int, ...]:
         """Return the identifiers of the threads that are in a callback now."""

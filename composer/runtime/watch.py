@@ -8,6 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from types import FrameType
 
 from composer.model import PrimaryState
 from composer.plan import Fault, FaultKind
@@ -52,8 +53,10 @@ class _Seen:
     """A callback that was there when somebody looked. ``since_s`` is when that was first so."""
 
     callback: RunningCallback
-    name: str  # the key of its node
+    loop: str
     since_s: float
+    node: str | None = None  # its key; of what was there once only, nobody asks whose it is
+    limit_s: float = math.inf
     interrupted_s: float | None = None
     given_up: bool = False
 
@@ -65,8 +68,7 @@ class Watch:
         self._crew = crew
         self._tell = tell
         self._end = threading.Event()
-        self._callbacks: dict[int, _Seen] = {}  # by thread
-        self._lost: list[_Seen] = []
+        self._callbacks: dict[FrameType, _Seen] = {}  # by their calls
         self._nodes = {name: _NodeWatch(name, crew) for name in crew.nodes}
         self._period_s = _period_s(crew)
         self._system_is_up = False
@@ -96,7 +98,7 @@ class Watch:
 
     def _look_at_nodes(self, now_s: float) -> None:
         """Look at what nodes do; those of a loop that is blocked can do nothing."""
-        blocked = {seen.callback.node.loop.name for seen in self._interrupted()} | self._crew.hung
+        blocked = {seen.loop for seen in self._interrupted()} | self._crew.hung
         for name, watch in self._nodes.items():
             if self._crew.nodes[name].loop.name not in blocked:
                 for fault in watch.look(now_s):
@@ -106,67 +108,78 @@ class Watch:
 
     def _look_at_callbacks(self, now_s: float) -> None:
         before, self._callbacks = self._callbacks, {}
-        names = {id(node): name for name, node in self._crew.nodes.items()}
         for loop in tuple(self._crew.loops.values()):
-            for callback in running_callbacks(loop, self._crew.nodes.values()):
-                seen = before.pop(callback.thread, None)
-                name = names.get(id(callback.node))
-                if name is None:
-                    continue  # made anew just now
-                if seen is None or seen.callback != callback:
-                    if seen is not None:
-                        self._take_end(seen)
-                    seen = _Seen(callback, name, now_s)
-                seen.callback = callback  # the same call, but by now it may be somewhere else
-                self._callbacks[callback.thread] = seen
-                self._judge(seen, now_s)
+            for found in running_callbacks(loop):
+                for callback in found:
+                    seen = before.pop(callback.call, None) or _Seen(callback, loop.name, now_s)
+                    seen.callback = callback  # the same call, but by now it may be somewhere else
+                    self._callbacks[callback.call] = seen
+                self._judge_thread([self._callbacks[callback.call] for callback in found], now_s)
         for seen in before.values():
             self._take_end(seen)
 
-    def _judge(self, seen: _Seen, now_s: float) -> None:
-        limit_s = self._limit_s(seen)
-        if now_s - seen.since_s < limit_s:
+    def _judge_thread(self, seen: list[_Seen], now_s: float) -> None:
+        """Judge the innermost callback; those that it keeps waiting do not hang themselves."""
+        innermost, *outer = seen
+        if innermost.since_s == now_s:
+            return
+        if innermost.node is None:
+            self._identify(innermost)
+        if innermost.node is not None:
+            self._judge(innermost, innermost.node, now_s)
+        if innermost.interrupted_s is not None:
+            for waiting in outer:
+                waiting.since_s = now_s
+
+    def _identify(self, seen: _Seen) -> None:
+        """Find whose it is, unless that was made anew just now."""
+        nodes = dict(self._crew.nodes)
+        owner = seen.callback.node(nodes.values())
+        for name, node in nodes.items():
+            if node is owner:
+                seen.node, seen.limit_s = name, self._limit_s(seen.callback, name, node)
+
+    def _limit_s(self, callback: RunningCallback, name: str, node: RunningNode) -> float:
+        """Return how long a callback may take; handlers of transitions have a limit of theirs."""
+        if callback.in_transition:
+            return self._crew.timeout_s(name) + _TRANSITION_MARGIN_S
+        limit = node.model.supervision.watch.callback_ms
+        return math.inf if limit is None else limit.value / 1000.0
+
+    def _judge(self, seen: _Seen, node: str, now_s: float) -> None:
+        if now_s - seen.since_s < seen.limit_s:
             return
         if seen.interrupted_s is None:
             seen.interrupted_s = now_s
             callback = seen.callback
-            self._tell(Hanging(seen.name, callback.name, limit_s, callback.stack()))
-            callback.node.stand_still()  # or the next callback hangs as soon as this one ends
+            self._tell(Hanging(node, callback.name, seen.limit_s, callback.stack()))
+            # Or the next callback hangs as soon as this one ends.
+            self._crew.nodes[node].stand_still()
             callback.interrupt()
         elif not seen.given_up and now_s - seen.interrupted_s > _ENDS_WITHIN_S:
             seen.given_up = True
-            self._tell(self._fault(seen, FaultKind.LOST, "does not return"))
+            what = f"{seen.callback.name} does not return"
+            self._tell(Fault(node, FaultKind.LOST, what, now_s))
 
     def _interrupted(self) -> list[_Seen]:
         return [seen for seen in self._callbacks.values() if seen.interrupted_s is not None]
 
     def _take_end(self, seen: _Seen) -> None:
         """Tell of the end of a callback that was interrupted."""
-        if seen.interrupted_s is None or seen.given_up or seen.callback.in_transition:
+        if seen.node is None or seen.interrupted_s is None:
             return
-        took = f"took longer than {1000.0 * self._limit_s(seen):g} ms"
-        self._tell(self._fault(seen, FaultKind.CALLBACK, took))
+        if not (seen.given_up or seen.callback.in_transition):
+            what = f"{seen.callback.name} took longer than {1000.0 * seen.limit_s:g} ms"
+            self._tell(Fault(seen.node, FaultKind.CALLBACK, what, time.monotonic()))
 
     def _look_at_hung_loops(self, now_s: float) -> None:
         """Tell of loops that were given up and go on; again and again, until somebody hears."""
         for loop in tuple(self._crew.hung):
             ages_s = [
-                now_s - seen.since_s
-                for seen in self._callbacks.values()
-                if seen.callback.node.loop.name == loop
+                now_s - seen.since_s for seen in self._callbacks.values() if seen.loop == loop
             ]
             if max(ages_s, default=0.0) < _GOES_ON_AFTER_S:
                 self._tell(Returned(loop))
-
-    def _limit_s(self, seen: _Seen) -> float:
-        """Return how long a callback may take; handlers of transitions have a limit of theirs."""
-        if seen.callback.in_transition:
-            return self._crew.timeout_s(seen.name) + _TRANSITION_MARGIN_S
-        limit = seen.callback.node.model.supervision.watch.callback_ms
-        return math.inf if limit is None else limit.value / 1000.0
-
-    def _fault(self, seen: _Seen, kind: FaultKind, what: str) -> Fault:
-        return Fault(seen.name, kind, f"{seen.callback.name} {what}", time.monotonic())
 
 
 class _NodeWatch:
@@ -223,12 +236,18 @@ class _NodeWatch:
 
 @dataclass(slots=True)
 class _Silence:
-    """How long one publisher, or all of a node's (None), have been silent."""
+    """How long one publisher, or all of a node's (None), have been silent.
+
+    What counts from look to look is the shorter of what went by of real time and of the node's own:
+    a simulation that is slow, paused or jumps makes no fault.
+    """
 
     publisher: str | None
     limit_s: float
     sent: int = -1  # when it was last looked at; -1: not since the node is active
-    since_s: float = 0.0
+    silent_s: float = 0.0
+    looked_s: float = 0.0
+    looked_own_s: float = 0.0  # by the node's time
 
     def begin_anew(self) -> None:
         """Forget what was seen."""
@@ -237,9 +256,14 @@ class _Silence:
     def look(self, node: RunningNode, now_s: float) -> str | None:
         """Return how long there was nothing, if that is too long."""
         sent = node.statistics.sent if self.publisher is None else node.sent(self.publisher)
+        own_now_s = node.now_s()
         if sent != self.sent:
-            self.sent, self.since_s = sent, now_s
-        if now_s - self.since_s <= self.limit_s:
+            self.sent, self.silent_s = sent, 0.0
+        else:
+            passed_s = min(now_s - self.looked_s, own_now_s - self.looked_own_s)
+            self.silent_s += max(passed_s, 0.0)
+        self.looked_s, self.looked_own_s = now_s, own_now_s
+        if self.silent_s <= self.limit_s:
             return None
         what = "silent" if self.publisher is None else f"silent on '{self.publisher}'"
         return f"{what} for {1000.0 * self.limit_s:g} ms"

@@ -32,7 +32,7 @@ NODE = """
     action_servers:
       drive: {type: composer_interfaces/action/Navigate, action: ~/drive, external: true}
     timers: {tick: {period_ms: 20}}
-    lifecycle: {timeout_ms: 300, watch: {callback_ms: 300}}
+    lifecycle: {timeout_ms: 1000, watch: {callback_ms: 300}}
 """
 MODULE = '''
 import time
@@ -63,7 +63,7 @@ class Faulty(Behavior):
         if fault == "none":
             return None
         while fault == "hang":
-            time.sleep(0.001)
+            time.sleep(0.01)  # it is to hang, not to wear out the machine
         if (self.name, place, "works") not in DONE:
             DONE.add((self.name, place, "works"))
             self.log.info(f"{place} works again")

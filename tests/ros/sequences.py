@@ -17,7 +17,8 @@ class Sequences:
         self.count = 0
         self.last: dict[int, int] = {}
         self.first: dict[int, int] = {}
-        self.wrong: list[str] = []
+        self.missing: dict[int, int] = {}
+        self.disordered: list[str] = []
 
     def take(self, received: int) -> None:
         """Look at a number that has come."""
@@ -26,7 +27,15 @@ class Sequences:
         last = self.last.get(writer)
         if last is None:
             self.first[writer] = sequence
-        elif sequence != last + 1:
-            what = "gap" if sequence > last else "again" if sequence == last else "out of order"
-            self.wrong.append(f"writer {writer}: {last}, {sequence}: {what}")
+        elif sequence > last + 1:
+            self.missing[writer] = self.missing.get(writer, 0) + sequence - last - 1
+        elif sequence <= last:
+            what = "again" if sequence == last else "out of order"
+            self.disordered.append(f"writer {writer}: {last}, {sequence}: {what}")
         self.last[writer] = sequence
+
+    @property
+    def wrong(self) -> list[str]:
+        """What is missing between the first and the last, came again, or out of order."""
+        gaps = [f"writer {writer}: {count} missing" for writer, count in self.missing.items()]
+        return gaps + self.disordered

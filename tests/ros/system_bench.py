@@ -100,9 +100,11 @@ class RunningSystem:
         """Let a node go through transitions, one after the other."""
         running_node = self.host._crew.nodes[node]
         for transition in transitions:
-            running_node.loop.run_task(running_node.change(transition))
+            # Told when all is done: the state is there before entities are given back.
+            made = running_node.loop.run_task(running_node.change(transition))
             goal = _GOALS[transition]
-            wait_until(lambda goal=goal: running_node.state == goal, f"{node} {goal}")
+            wait_until(made.done, f"{node} {goal}")
+            assert running_node.state == goal
 
     def log(self) -> list[str]:
         return [event.message for event in self.told(Logged)]

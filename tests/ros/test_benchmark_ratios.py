@@ -1,6 +1,7 @@
 """What must not get lost again: how little we need, against rclpy in the same run.
 
-The bounds leave room for a busy machine; ``make bench`` measures properly.
+The bounds leave room for a busy machine, and what is slow by chance is not so three times; ``make
+bench`` measures properly.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from benchmarks.figures import ratios
 from benchmarks.systems import cpu_us
 from benchmarks.turns import COMPOSED, SINGLE, Case, rows, take_turns
 
+ROUNDS = 3
+
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(180)]
 
 
@@ -18,11 +21,15 @@ pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(180)]
     ("shape", "nodes", "bound"),
     [
         pytest.param("ring", 10, 0.008, id="messages"),  # 0.003; by DDS it would be 0.015
-        pytest.param("service", 3, 0.15, id="services"),  # 0.045
+        pytest.param("service", 3, 0.04, id="services"),  # 0.015; with a task and a timer 0.045
     ],
 )
 def test_cpu_stays_within_a_bound(shape: str, nodes: int, bound: float) -> None:
     case = Case(shape, nodes, seconds=0.3, rounds=1)
-    (row,) = rows(shape, "CPU us", take_turns((COMPOSED, SINGLE), case), cpu_us)
-    (ratio,) = ratios(row)
-    assert ratio < bound, row
+    found: list[float] = []  # nothing of a round in which rclpy hung
+    for _ in range(ROUNDS):
+        (row,) = rows(shape, "CPU us", take_turns((COMPOSED, SINGLE), case), cpu_us)
+        found += ratios(row)
+        if found and found[-1] < bound:
+            return
+    pytest.fail(f"above the bound of {bound} in each of {ROUNDS} rounds: {found}")

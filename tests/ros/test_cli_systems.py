@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from composer.runtime.claim import claims
+from tests.ros.system_bench import wait_until
 
 COMPOSE = [sys.executable, "-m", "composer"]
 PATIENCE_S = 30.0
@@ -226,7 +227,7 @@ def test_what_does_not_answer_is_said_to_be_so_in_time(robot: Robot) -> None:
     assert "/fleet/planner did not answer within 1.5 s" in refusal
     began_s = time.monotonic()
     assert robot.states()["/fleet/planner"] == "activating"
-    assert time.monotonic() - began_s < 4.0
+    assert time.monotonic() - began_s < 10.0
 
     robot.kill(signal.SIGSTOP)
     try:
@@ -234,9 +235,51 @@ def test_what_does_not_answer_is_said_to_be_so_in_time(robot: Robot) -> None:
         assert f"its process is {robot.pid}" in refusal
         began_s = time.monotonic()
         assert "no answer, its process may be busy or gone" in said("ps")
-        assert time.monotonic() - began_s < 5.0
+        assert time.monotonic() - began_s < 10.0
     finally:
         robot.kill(signal.SIGCONT)
+
+
+def test_a_system_that_was_killed_is_said_not_to_run(robot: Robot) -> None:
+    robot.kill()
+    wait_until(lambda: not claims(), "its end")
+    began_s = time.monotonic()
+    assert said("ps") == "nothing is running\n"
+    assert said("lifecycle", "nodes") == ""
+    assert "there is no running system 'robot'" in refused("ps", "robot")
+    for command in ("up", "down", "pause", "resume", "reset"):
+        assert "there is no running system 'robot'" in refused(command, "robot")
+    for arguments in (("set", "planner", "deactivate"), ("get", "/fleet/planner")):
+        assert "there is no lifecycle node " in refused("lifecycle", *arguments)
+    assert "there is no running system" in refused(
+        "lifecycle", "set", "--system", "robot", "cleanup"
+    )
+    assert time.monotonic() - began_s < 11 * 5.0
+
+
+def test_a_command_does_not_wait_for_a_process_that_has_ended(robot: Robot) -> None:
+    said("param", "set", "/fleet/planner", "fault", "hang")
+    said("pause", "robot")
+    limit_s = 25.0
+    with subprocess.Popen(
+        [*COMPOSE, "resume", "robot", "--timeout", str(limit_s)], stderr=subprocess.PIPE, text=True
+    ) as resuming:
+        assert resuming.stderr is not None
+        wait_until(lambda: robot.states()["/fleet/planner"] == "activating", "it hangs")
+        robot.kill()
+        began_s = time.monotonic()
+        refusal = resuming.stderr.read()
+        assert time.monotonic() - began_s < limit_s / 3
+    assert resuming.returncode == 1
+    assert "/fleet/robot did not resume: its process has ended" in refusal
+
+
+def test_a_list_that_lacks_the_nodes_of_a_system_says_so(robot: Robot) -> None:
+    robot.kill(signal.SIGSTOP)
+    for arguments in (("nodes",), ("get", "planner"), ("set", "/fleet/*", "cleanup")):
+        refusal = refused("lifecycle", *arguments)
+        assert "system '/fleet/robot' does not answer, so its nodes are not known" in refusal
+        assert f"its process {robot.pid} may be busy or stopped" in refusal
 
 
 def test_a_system_that_does_not_come_up_is_no_background_process(path: Path) -> None:

@@ -30,6 +30,7 @@ from composer_interfaces.action import Navigate
 class Server(Behavior):
     def on_configure(self):
         self.goals = []
+        self.feedback = []
         self.results = []
 
     def accept_go(self, goal):
@@ -41,7 +42,8 @@ class Server(Behavior):
         while step < 3 or goal.request.max_velocity == 0.0:
             if goal.is_cancel_requested:
                 return Navigate.Result(message="turned back")
-            goal.publish_feedback(Navigate.Feedback(progress_percent=float(step)))
+            self.feedback.append(Navigate.Feedback(progress_percent=float(step)))
+            goal.publish_feedback(self.feedback[-1])
             step += 1
             await self.clock.sleep(0.001)
         self.results.append(Navigate.Result(success=True, message="arrived"))
@@ -70,6 +72,10 @@ class Client(Behavior):
 
     async def turn_back(self):
         assert await self.sent.cancel()
+"""
+COPIED = """
+connections:
+  - {action: /go, server: server.go, clients: client.go, isolation: copy}
 """
 
 
@@ -139,3 +145,25 @@ def test_somebody_outside_can_cancel_a_goal_of_the_process(tmp_path: Path) -> No
         assert len(answer.goals_canceling) == 1
         wait_until(lambda: client.outcomes)
         assert client.outcomes == [("canceled", "turned back")]
+
+
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
+@pytest.mark.parametrize("copied", [False, True])
+def test_the_ends_hold_the_same_objects_unless_copies_are_asked_for(
+    tmp_path: Path, kind: str, copied: bool
+) -> None:
+    text = TEXT.replace("KIND", kind).replace("DELIVERY", "auto") + (COPIED if copied else "")
+    with running(text, tmp_path, going=MODULE) as system:
+        server = system.host._crew.nodes["server"]._behavior
+        client = go(system, 1.0)
+        wait_until(lambda: client.outcomes)
+        assert client.outcomes == [("succeeded", "arrived")]
+        for there, here in (
+            (server.goals, client.goals),
+            (server.feedback, client.feedback),
+            (server.results, client.results),
+        ):
+            assert there == here
+            assert [one is not other for one, other in zip(there, here, strict=True)] == [
+                copied
+            ] * len(here)

@@ -143,3 +143,83 @@ def test_a_connection_may_ask_for_copies_or_for_dds(tmp_path: Path) -> None:
         for end in ("publisher 'by_dds'", "subscription 'input'")
     ]
     assert heard == {"shared": [2], "copied": [1], "by_dds": [1]}
+
+
+OF_THEIR_OWN = """
+system: own
+nodes:
+  source:
+    behavior: own:Source
+    publishers:
+      copied: {type: std_msgs/msg/Int64}
+      latched: {type: std_msgs/msg/Int64, qos: state}
+  first: {behavior: own:Changer, subscriptions: {input: {type: std_msgs/msg/Int64}}}
+  second: {behavior: own:Changer, subscriptions: {input: {type: std_msgs/msg/Int64}}}
+  late:
+    behavior: own:Changer
+    lifecycle: {autostart: unconfigured}
+    subscriptions: {input: {type: std_msgs/msg/Int64, qos: state}}
+connections:
+  - {topic: /copied, from: source.copied, to: [first.input, second.input], isolation: copy}
+  - {topic: /latched, from: source.latched, to: late.input, isolation: copy}
+"""
+CHANGERS = """
+from composer.behavior import Behavior
+from std_msgs.msg import Int64
+
+class Source(Behavior):
+    def send(self):
+        for publisher in (self.publishers.copied, self.publishers.latched):
+            message = Int64(data=1)
+            publisher.publish(message)
+            message.data = 7
+
+class Changer(Behavior):
+    def on_configure(self):
+        self.heard = []
+
+    def on_input(self, message):
+        self.heard.append(message.data)
+        message.data = 9
+"""
+
+
+def test_each_receiver_has_a_copy_of_its_own_also_of_what_is_latched(tmp_path: Path) -> None:
+    with running(OF_THEIR_OWN, tmp_path, own=CHANGERS) as system:
+        source = system.host._crew.nodes["source"]
+        source.loop.run(source._behavior.send)
+        system.change("late", "configure", "activate")
+        names = ("first", "second", "late")
+        wait_until(lambda: all(behavior(system, name).heard for name in names))
+        assert [behavior(system, name).heard for name in names] == [[1], [1], [1]]
+
+
+OVERRIDDEN = """
+system: overridden
+delivery: {whole}
+nodes:
+  source:
+    behavior: table:Source
+    publishers: {{one: {{type: std_msgs/msg/Int64}}, two: {{type: std_msgs/msg/Int64}}}}
+  one: {{behavior: table:Sink, subscriptions: {{input: {{type: std_msgs/msg/Int64}}}}}}
+  two: {{behavior: table:Sink, subscriptions: {{input: {{type: std_msgs/msg/Int64}}}}}}
+connections:
+  - {{topic: /one, from: source.one, to: one.input, delivery: {one}}}
+  - {{topic: /two, from: source.two, to: two.input}}
+"""
+
+
+@pytest.mark.parametrize(("whole", "one"), [("auto", "dds"), ("dds", "auto")])
+def test_what_a_connection_says_goes_before_the_system(
+    tmp_path: Path, whole: str, one: str
+) -> None:
+    text = OVERRIDDEN.format(whole=whole, one=one)
+    with running(text, tmp_path, table=MODULE) as system:
+        source = system.host._crew.nodes["source"]
+        source.loop.run(lambda: source._behavior.send(["one", "two"], 1))
+        sinks = [behavior(system, name) for name in ("one", "two")]
+        wait_until(lambda: all(sink.heard for sink in sinks))
+        same = [
+            sink.heard[0] is sent for sink, sent in zip(sinks, source._behavior.sent, strict=True)
+        ]
+        assert same == [one == "auto", whole == "auto"]

@@ -1,23 +1,35 @@
-"""Whoever joins, leaves or dies outside: inside, nothing is lost, doubled or out of order."""
+"""Whoever joins, leaves or dies outside: inside, nothing is lost, doubled or out of order.
+
+Everything is published twice, on a topic that stays in the process as far as it can, and on another
+by DDS alone. The same processes listen to both and talk on both, so that one is the control of the
+other: outside as well, no more may be missing than there.
+"""
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.ros.delivery_outsiders import STREAM, TOPICS, Missing, Outsider
+from tests.ros.sequences import Sequences
 from tests.ros.system_bench import RunningSystem, running, wait_until
 
-PEER = "tests.ros.delivery_peer"
 WRITERS = ("writer", "second")
-ROOT = Path(__file__).parents[2]
+#: Reliability and depth of those outside, by turns. The first are owed every message.
+OWED, *_ = PROFILES = (
+    ("RELIABLE", 5000),
+    ("BEST_EFFORT", 5000),
+    ("RELIABLE", 10),
+    ("BEST_EFFORT", 10),
+)
+ENOUGH = 1000  # messages that a listener has heard of each topic before it goes
+FIRST_TALKER = 100
+MOVES = 3  # of a reader inside, while each listener listens
+#: What is missing on the two topics differs by chance: both wait for the same processor.
+BY_CHANCE, BY_CHANCE_AT_ALL = 1.1, 50
 
 TEXT = """
 system: stress
@@ -28,26 +40,47 @@ qos_profiles:
 nodes:
   writer:
     behavior: stress:Writer
-    publishers: {stream: {type: std_msgs/msg/Int64, topic: /stream, qos: deep}}
+    publishers:
+      stream: {type: std_msgs/msg/Int64, qos: deep}
+      control: {type: std_msgs/msg/Int64, qos: deep}
     timers: {tick: {rate_hz: 1000}, burst: {period_ms: 200}}
   second:
     behavior: stress:Writer
     executor: other
     publishers:
-      stream: {type: std_msgs/msg/Int64, topic: /stream, qos: deep}
-      calm: {type: std_msgs/msg/Int64, topic: /calm, qos: deep}
+      stream: {type: std_msgs/msg/Int64, qos: deep}
+      control: {type: std_msgs/msg/Int64, qos: deep}
+      calm: {type: std_msgs/msg/Int64, qos: deep}
     timers: {tick: {rate_hz: 100}, burst: {period_ms: 500}}
   near:
     behavior: stress:Reader
-    subscriptions: {stream: {type: std_msgs/msg/Int64, topic: /stream, qos: deep}}
+    subscriptions:
+      stream: {type: std_msgs/msg/Int64, qos: deep}
+      control: {type: std_msgs/msg/Int64, qos: deep}
   far:
     behavior: stress:Reader
     executor: other
-    subscriptions: {stream: {type: std_msgs/msg/Int64, topic: /stream, qos: unreliable}}
+    subscriptions:
+      stream: {type: std_msgs/msg/Int64, qos: unreliable}
+      control: {type: std_msgs/msg/Int64, qos: unreliable}
+  guest:
+    behavior: stress:Reader
+    subscriptions:
+      stream: {type: std_msgs/msg/Int64, qos: deep}
+      control: {type: std_msgs/msg/Int64, qos: deep}
   pooled:
     behavior: stress:Reader
     executor: pool
-    subscriptions: {stream: {type: std_msgs/msg/Int64, topic: /calm, qos: deep}}
+    subscriptions: {calm: {type: std_msgs/msg/Int64, qos: deep}}
+connections:
+  - topic: /stream
+    from: [writer.stream, second.stream]
+    to: [near.stream, far.stream, guest.stream]
+  - topic: /control
+    from: [writer.control, second.control]
+    to: [near.control, far.control, guest.control]
+    delivery: dds
+  - {topic: /calm, from: second.calm, to: pooled.calm}
 """
 MODULE = """
 import itertools
@@ -75,7 +108,7 @@ class Writer(Behavior):
     def send(self, writer):
         sequence = self.next.get(writer, 0)
         self.next[writer] = sequence + 1
-        for publisher in self.outlets:
+        for publisher in self.outlets if sequence % 2 else reversed(self.outlets):
             publisher.publish(Int64(data=number(writer, sequence)))
 
     def run(self, writer):
@@ -101,73 +134,131 @@ class Writer(Behavior):
 
 class Reader(Behavior):
     def on_configure(self):
-        self.seen = Sequences()
+        self.seen = {"/stream": Sequences(), "/control": Sequences(), "/calm": Sequences()}
 
     def on_stream(self, message):
-        self.seen.take(message.data)
+        self.seen["/stream"].take(message.data)
+
+    def on_control(self, message):
+        self.seen["/control"].take(message.data)
+
+    def on_calm(self, message):
+        self.seen["/calm"].take(message.data)
 """
-
-
-@contextmanager
-def outside(*arguments: object) -> Iterator[subprocess.Popen[str]]:
-    command = [sys.executable, "-m", PEER, *map(str, arguments)]
-    environment = {**os.environ, "PYTHONPATH": f"{ROOT}:{os.environ.get('PYTHONPATH', '')}"}
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
 
 
 def behaviors(system: RunningSystem, *names: str) -> list[Any]:
     return [system.host._crew.nodes[name]._behavior for name in names]
 
 
-def said(process: subprocess.Popen[str], wanted: str) -> bool:
-    assert process.stdout is not None
-    return any(line.strip() == wanted for line in process.stdout)
+class Stress:
+    """Listeners and talkers that join, leave in order, and are killed, by turns."""
 
+    def __init__(self, system: RunningSystem, folder: Path) -> None:
+        self._system = system
+        self._folder = folder
+        #: By those who are owed everything, and by those whose QoS allows for losses.
+        self.owed, self.missing = Missing(), Missing()
 
-def stress(system: RunningSystem, rounds: int) -> None:
-    """Have listeners and talkers join, leave in order, and be killed, by turns."""
-    readers = behaviors(system, "near", "far")
-    for turn in range(rounds):
-        talker = 100 + turn
-        with outside("listen", "/stream") as listener, outside("talk", "/stream", talker) as talks:
-            assert said(listener, "heard")
-            assert said(talks, "matched")
-            wait_until(lambda t=talker: all(t in reader.seen.last for reader in readers))
-            talks.kill()
-            if turn % 2 == 0:
-                output, _ = listener.communicate(timeout=20.0)  # closes its standard input
-                seen = json.loads(output.strip().splitlines()[-1])
-                assert seen["count"] > 0
-                assert seen["wrong"] == []
+    def run(self, rounds: int) -> None:
+        """Have as many of both come and go, half of them by SIGKILL."""
+        for turn in range(rounds):
+            profile = PROFILES[turn % len(PROFILES)]
+            killed = (turn + turn // len(PROFILES)) % 2 == 1
+            heard = self._visit(profile, FIRST_TALKER + turn, killed=killed)
+            if profile == OWED:
+                self.owed.add_all(heard)
+            else:
+                self.missing.add_of_both(heard)
+            if not killed:
+                wait_until(self._is_alone, "nobody outside")
 
+    def verify(self) -> None:
+        """Have the writers end, and see that each reader has got everything there was for it."""
+        sent = {name: self._sent_by(name) for name in WRITERS}
+        everything = sent["writer"] | sent["second"]
+        for name in ("near", "far", "guest"):
+            self._verify(name, STREAM, everything)
+        self._verify("pooled", "/calm", sent["second"])
+        for name in ("near", "far", "guest"):
+            self._count_talkers(name)
+        assert self.owed.stream <= self.owed.control
+        by_chance = BY_CHANCE * self.missing.control + BY_CHANCE_AT_ALL
+        assert self.missing.stream <= by_chance, self.missing.control
 
-def verify(system: RunningSystem) -> None:
-    """Have the writers end, and see that each reader has got everything there was for it."""
-    sent: dict[str, dict[int, int]] = {}
-    for name, writer in zip(WRITERS, behaviors(system, *WRITERS), strict=True):
-        system.host._crew.nodes[name].loop.run(writer.end)
-        sent[name] = {key: count - 1 for key, count in writer.next.items()}
-        assert len(sent[name]) == 3
-    everything = sent["writer"] | sent["second"]
-    for name, wanted in (("near", everything), ("far", everything), ("pooled", sent["second"])):
-        (reader,) = behaviors(system, name)
-        seen = reader.seen
-        wait_until(lambda s=seen, w=wanted: w.items() <= s.last.items(), f"all for {name}")
-        assert seen.wrong == []
-        assert seen.count == sum(seen.last[key] - seen.first[key] + 1 for key in seen.last)
-        assert system.host._crew.nodes[name].statistics.queue_drops == 0
+    def _visit(
+        self, profile: tuple[str, int], talker: int, *, killed: bool
+    ) -> dict[str, list[int]]:
+        with (
+            Outsider("listen", profile, 0, self._folder) as listening,
+            Outsider("talk", profile, talker, self._folder) as talking,
+        ):
+            wait_until(lambda: all(talker in seen.last for seen in self._seen(profile)), "a talker")
+            wait_until(lambda: listening.has_heard(1), "a listener")
+            for _ in range(MOVES):
+                self._move_the_guest()
+            wait_until(lambda: listening.has_heard(ENOUGH), "a listener")
+            codes = [outsider.go(killed=killed) for outsider in (talking, listening)]
+            assert codes == ([-9, -9] if killed else [0, 0])
+        return listening.heard
+
+    def _seen(self, profile: tuple[str, int]) -> Iterator[Sequences]:
+        """Yield what those inside have seen who match somebody outside."""
+        names = ("near", "far") if profile[0] == "RELIABLE" else ("far",)
+        for reader in behaviors(self._system, *names):
+            yield from (reader.seen[topic] for topic in TOPICS)
+
+    def _move_the_guest(self) -> None:
+        """Take one of the readers inside away, and back, while somebody outside listens."""
+        (guest,) = behaviors(self._system, "guest")
+        wait_until(lambda: guest.seen[STREAM].count > 0, "the guest")
+        self._system.change("guest", "deactivate")
+        seen = guest.seen[STREAM]
+        assert seen.disordered == []
+        assert all(writer >= FIRST_TALKER for writer in seen.missing)
+        self._count_talkers("guest")
+        self._system.change("guest", "cleanup", "configure", "activate")
+
+    def _count_talkers(self, name: str) -> None:
+        """Compare what has come in from outside, all that is missing of it being lost by DDS."""
+        (reader,) = behaviors(self._system, name)
+        stream, control = (
+            {
+                writer: count
+                for writer, count in reader.seen[topic].missing.items()
+                if writer >= FIRST_TALKER
+            }
+            for topic in TOPICS
+        )
+        self.missing.add_counted(stream, control)
+
+    def _is_alone(self) -> bool:
+        """Say whether the publishers of the stream have matched nobody but the three inside."""
+        nodes = [self._system.host._crew.nodes[name] for name in WRITERS]
+        ports = [node._assembly.publishers["stream"] for node in nodes]
+        return all(port._publisher.get_subscription_count() == 3 for port in ports)
+
+    def _sent_by(self, name: str) -> dict[int, int]:
+        """End a node that writes; return the last of each of its writers."""
+        (behavior,) = behaviors(self._system, name)
+        self._system.host._crew.nodes[name].loop.run(behavior.end)
+        assert len(behavior.next) == 3
+        return {writer: count - 1 for writer, count in behavior.next.items()}
+
+    def _verify(self, name: str, topic: str, wanted: dict[int, int]) -> None:
+        (reader,) = behaviors(self._system, name)
+        seen = reader.seen[topic]
+        wait_until(lambda: wanted.items() <= seen.last.items(), f"all for {name}")
+        assert seen.disordered == []
+        assert not seen.missing.keys() & wanted.keys()
+        assert self._system.host._crew.nodes[name].statistics.queue_drops == 0
 
 
 @pytest.mark.parametrize(
-    "rounds", [2, pytest.param(50, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
+    "rounds", [4, pytest.param(50, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
 )
-def test_a_stress_of_outsiders_changes_nothing_inside(tmp_path: Path, rounds: int) -> None:
+def test_a_stress_of_outsiders_changes_nothing(tmp_path: Path, rounds: int) -> None:
     with running(TEXT, tmp_path, stress=MODULE) as system:
-        stress(system, rounds)
-        verify(system)
+        stress = Stress(system, tmp_path)
+        stress.run(rounds)
+        stress.verify()

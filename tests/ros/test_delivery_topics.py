@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rclpy.context import Context
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.subscription import Subscription
 from std_msgs.msg import Int64
 
+from composer.model import LogLevel
+from composer.runtime import marks
+from composer.runtime.host import HostOptions
 from tests.ros.system_bench import Peer, RunningSystem, running, wait_until
+
+NUMBERING_LISTENER = Path(__file__).with_name("numbering_listener.py")
 
 
 @pytest.fixture
@@ -115,6 +126,49 @@ def test_what_is_published_is_what_is_received_and_outsiders_hear_it_too(
         assert peer.node.count_subscribers("/numbers") == 3
 
 
+@pytest.mark.parametrize(("left", "level"), [(0, "info"), (100, "info"), (100, "debug")])
+def test_every_outsider_is_seen_to_come(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, left: int, level: str
+) -> None:
+    # Where no mark is left the middleware is asked at each message.
+    monkeypatch.setattr(marks, "_free", marks._free[:left])
+    context = Context()
+    context.init([])
+    node = Node("outsider", context=context)
+    apart = NUMBERS.replace("KIND", "events").replace("executors:", "namespace: /apart\nexecutors:")
+    options = HostOptions(log_level=LogLevel(level))
+    with running(apart, tmp_path, options=options, counting=MODULE) as system:
+        publisher = system.host._crew.nodes["source"]._assembly.publishers["numbers"]._publisher
+        for turn in range(5):
+            send(system, 10)
+            before = publisher.get_subscription_count()
+            subscription = node.create_subscription(Int64, "/apart/numbers", lambda _: None, 100)
+            wait_until(lambda before=before: publisher.get_subscription_count() > before)
+            send(system, 10)
+            first = 20 * turn + 10
+            assert [take(subscription) for _ in range(10)] == list(range(first, first + 10))
+            node.destroy_subscription(subscription)
+        near = behavior(system, "near")
+        wait_until(lambda: numbers(near.heard) == list(range(100)))
+    node.destroy_node()
+    context.try_shutdown()
+    assert len(marks._free) == left
+
+
+def take(subscription: Subscription) -> int:
+    """Wait for the next message. No executor: its wait set would keep the subscription alive."""
+    taken: list[Any] = []
+
+    def comes() -> bool:
+        with subscription.handle:
+            message = subscription.handle.take_message(Int64, False)
+        taken.extend([] if message is None else [message[0]])
+        return bool(taken)
+
+    wait_until(comes)
+    return int(taken[0].data)
+
+
 def test_what_is_under_way_when_its_reader_leaves_active_is_dropped(tmp_path: Path) -> None:
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
         system.change("near", "deactivate")
@@ -186,3 +240,75 @@ def test_who_joins_late_gets_what_is_latched_once_inside_and_outside(
         wait_until(lambda: len(outside) == 2)
         assert numbers(outside) == [2, 3]
     assert system.log() == ["late 2", "late 3"]
+
+
+def test_dds_is_used_only_while_somebody_outside_has_matched(tmp_path: Path) -> None:
+    """The middleware numbers what a publisher hands it: what stays inside has no number."""
+    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
+        port = system.host._crew.nodes["source"]._assembly.publishers["numbers"]
+        for visit in range(2):
+            send(system, 20)  # to nobody outside
+            command = [sys.executable, str(NUMBERING_LISTENER)]
+            with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as listener:
+                try:
+                    wait_until(lambda: port._publisher.get_subscription_count() == 3, "a listener")
+                    send(system, 5)
+                    printed, _ = listener.communicate(timeout=20.0)
+                finally:
+                    listener.kill()
+            first = visit * 25 + 20
+            assert json.loads(printed) == [
+                [first + step, visit * 5 + step + 1] for step in range(5)
+            ]
+            wait_until(lambda: port._publisher.get_subscription_count() == 2, "it has left")
+        wait_until(lambda: len(behavior(system, "near").heard) == 50)
+        assert numbers(behavior(system, "near").heard) == list(range(50))
+
+
+def test_a_publisher_that_is_not_active_reaches_nobody_inside(tmp_path: Path) -> None:
+    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
+        send(system, 2)
+        system.change("source", "deactivate")
+        send(system, 3)
+        system.change("source", "activate")
+        send(system, 1)
+        near = behavior(system, "near")
+        wait_until(lambda: 5 in numbers(near.heard))
+        assert numbers(near.heard) == [0, 1, 5]
+        assert system.host._crew.nodes["source"].statistics.sent == 3
+
+
+REMAPPED = """
+system: remapped
+nodes:
+  source:
+    namespace: left
+    behavior: counting:Source
+    remappings: {numbers: /lane/numbers}
+    publishers: {numbers: {type: std_msgs/msg/Int64}}
+  near:
+    namespace: right
+    behavior: counting:Listener
+    remappings: {/right/numbers: /lane/numbers}
+    subscriptions: {numbers: {type: std_msgs/msg/Int64}}
+  far:
+    namespace: left
+    behavior: counting:Listener
+    subscriptions: {numbers: {type: std_msgs/msg/Int64, external: true}}
+"""
+
+
+def test_ports_meet_by_the_names_that_remapping_gives_them(tmp_path: Path, peer: Peer) -> None:
+    with running(REMAPPED, tmp_path, counting=MODULE) as system:
+        source, near, far = (behavior(system, name) for name in ("source", "near", "far"))
+        intruder = peer.publisher(Int64, "/left/numbers")
+        outside = peer.listen(Int64, "/lane/numbers")
+        port = system.host._crew.nodes["source"]._assembly.publishers["numbers"]
+        wait_until(lambda: port._publisher.get_subscription_count() == 2)
+        send(system, 3)
+        intruder.publish(Int64(data=-1))  # where far is left: nothing else is said there
+        wait_until(lambda: len(near.heard) == len(outside) == 3)
+        wait_until(lambda: far.heard)
+        assert all(a is b for a, b in zip(near.heard, source.sent, strict=True))
+        assert numbers(outside) == [0, 1, 2]
+        assert numbers(far.heard) == [-1]

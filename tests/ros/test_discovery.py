@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 
 from std_msgs.msg import Empty
 
@@ -15,6 +16,8 @@ from tests.ros.system_bench import Peer, wait_until
 JOINS = 8
 #: Who is not met at once is met 1 to 3 s later; without the profile that is every second one.
 AT_ONCE_S = 0.7
+#: Their lease is 4 s, others have 20 s.
+FORGOTTEN_WITHIN_S = 10.0
 #: Enough to come in several packets.
 TOPICS = [f"/flood/topic_{number}" for number in range(250)]
 JOIN = f"""
@@ -33,6 +36,23 @@ for _ in range({JOINS}):
         found = dict(Names(session, Deadline(10.0)).topics())
         missing.append(sum(topic not in found for topic in {TOPICS}))
 print(json.dumps([took_s, missing]))
+"""
+#: What a command has open: UDP ports, and shared memory of Fast DDS.
+LOOK = """
+import json, os, re
+from pathlib import Path
+from composer.runtime.environment import prepare_environment
+prepare_environment()
+from composer.runtime.session import Deadline, Session, suit_commands
+
+suit_commands()
+with Session() as session:
+    session.wait_for(lambda: session.others() or None, Deadline(10.0))
+    sockets = {os.readlink(path) for path in Path("/proc/self/fd").iterdir() if path.is_socket()}
+    rows = [row.split() for row in Path("/proc/net/udp").read_text().splitlines()[1:]]
+    ports = [int(row[1].rpartition(":")[2], 16) for row in rows if f"socket:[{row[9]}]" in sockets]
+    shared = re.findall("/dev/shm/fast.*", Path("/proc/self/maps").read_text())
+    print(json.dumps([session.others(), ports, shared]))
 """
 
 
@@ -58,3 +78,29 @@ def test_each_participant_on_this_computer_is_counted(peer: Peer) -> None:
     finally:
         another.close()
     wait_until(lambda: participants_here(domain_id) == before, "it left")
+
+
+def test_a_command_meets_others_without_shared_memory_and_stays_on_this_computer(
+    peer: Peer,
+) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOOK], check=True, capture_output=True, text=True, timeout=50.0
+    )
+    others, ports, shared = json.loads(done.stdout.splitlines()[-1])
+    assert [peer.node.get_name(), peer.node.get_namespace()] in others
+    assert shared == []
+    multicast = 7400 + 250 * int(os.environ["ROS_DOMAIN_ID"])
+    assert ports
+    assert multicast not in ports
+
+
+def test_a_command_is_soon_forgotten(peer: Peer) -> None:
+    def participants() -> int:
+        return len(peer.node.get_publishers_info_by_topic("ros_discovery_info", no_mangle=True))
+
+    before = participants()
+    for _ in range(3):  # most of their goodbyes are lost
+        subprocess.run([sys.executable, "-c", LOOK], check=True, capture_output=True, timeout=50.0)
+    ended_s = time.monotonic()
+    wait_until(lambda: participants() <= before, "they are gone")
+    assert time.monotonic() - ended_s < FORGOTTEN_WITHIN_S

@@ -101,6 +101,18 @@ def wait_for(future: Any) -> Any:
     return future.result()
 
 
+def test_a_client_that_is_destroyed_while_the_loop_looks_at_it_is_no_error(on: Bench) -> None:
+    """rclpy finds that it is destroyed, and adds it to its wait set nonetheless."""
+    client = ActionClient(on.node, Navigate, "nowhere", callback_group=ReentrantCallbackGroup())
+    on.loop.add_action_client(client)
+    client._client_handle.destroy_when_not_in_use()  # as destroy begins, and an executor comes by
+    for _ in range(3):
+        on.loop.run(lambda: None)
+    on.loop.remove(client)
+    client.destroy()
+    assert on.errors() == []
+
+
 @pytest.mark.parametrize("error", ERRORS)
 @pytest.mark.parametrize("kind", ["plain", "async"])
 def test_a_goal_whose_execution_raises_is_aborted(

@@ -17,7 +17,7 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from type_description_interfaces.srv import GetTypeDescription
 
-from composer.runtime.tasks import Future, sleep, within, wrap_rclpy_future
+from composer.runtime.tasks import Future, sleep, within, wrap_future
 from tests.ros.loop_support import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
 
 ERRORS = [ValueError, SystemExit, KeyboardInterrupt]
@@ -119,7 +119,7 @@ def test_a_call_nobody_answers_times_out_and_is_forgotten(on: Bench) -> None:
     wait_until(client.service_is_ready)
 
     async def ask() -> Any:
-        answer = wrap_rclpy_future(client.call_async(Trigger.Request()))
+        answer = wrap_future(client.call_async(Trigger.Request()))
         return await within(on.loop, answer, 0.1)
 
     future = on.loop.run_task(ask())

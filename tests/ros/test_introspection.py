@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -16,6 +20,7 @@ from rcl_interfaces.srv import (
     SetParameters,
     SetParametersAtomically,
 )
+from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter
 
 from composer.drift import NodeSeen
@@ -156,3 +161,55 @@ def test_an_observer_sees_states_and_parameters(session: Session) -> None:
     assert (seen(TALKER).parameters or {})["speed"] == speed["speed"] > 1.0
     assert (seen("/whole").parameters or {})["size"] == 3
     assert not [name for name in seen("/lean/manager").parameters or {} if "speed" in name]
+
+
+def test_a_whole_node_has_what_any_lifecycle_node_has_and_nothing_twice(
+    system: RunningSystem, peer: Peer
+) -> None:
+    plain = LifecycleNode("plain", context=peer.context)
+
+    def endpoints(name: str) -> dict[str, Counter[str]]:
+        """What the node has by kinds, its own name left out, each with how often it is there."""
+        node = peer.node
+        publishers = [
+            topic
+            for topic, _ in node.get_publisher_names_and_types_by_node(name, "/")
+            for info in node.get_publishers_info_by_topic(topic)
+            if info.node_name == name
+        ]
+        services = [
+            service
+            for service, _ in node.get_service_names_and_types_by_node(name, "/")
+            for _ in range(node.count_services(service))
+        ]
+        found = {"publishers": publishers, "services": services}
+        return {
+            kind: Counter(item.replace(f"/{name}/", "~/") for item in names)
+            for kind, names in found.items()
+        }
+
+    try:
+        wait_until(lambda: {"plain", "whole"} <= set(peer.node.get_node_names()), "both nodes")
+        expected = endpoints("plain")
+        assert len(expected["services"]) == 12
+        assert set(expected["services"].values()) == set(expected["publishers"].values()) == {1}
+        wait_until(lambda: endpoints("whole") == expected, "all endpoints")
+    finally:
+        plain.destroy_node()
+
+
+def test_nobody_has_to_know_whom_a_command_asks(system: RunningSystem) -> None:
+    def said(*arguments: str) -> str:
+        command = [sys.executable, "-m", "composer", *arguments]
+        done = subprocess.run(command, capture_output=True, check=False, text=True, timeout=30.0)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert said("lifecycle", "set", "talker", "deactivate") == f"{TALKER}: active -> inactive\n"
+    (told,) = json.loads(said("ps", "--json"))["systems"]
+    states = {node["node"]: node["state"] for node in told["nodes"]}
+    assert states == {TALKER: "inactive", "/whole": "active"}
+    said("lifecycle", "set", "--system", "lean", "--to", "active")
+    said("param", "set", "talker", "speed", "3.5")
+    assert "3.5" in said("param", "get", "talker", "speed")
+    assert system.host._crew.nodes["talker"].state == "active"

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import gc
+from collections.abc import Coroutine
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from lifecycle_msgs.msg import Transition, TransitionEvent
@@ -11,6 +14,7 @@ from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTran
 from std_srvs.srv import Trigger
 
 from composer.runtime.host import HostOptions
+from composer.runtime.interruption import CallbackInterrupted
 from tests.ros.system_bench import Peer, finished, running, wait_until
 
 SUBJECT = """
@@ -93,6 +97,32 @@ def test_illegal_requests_are_refused_and_change_nothing(
         assert peer.change("/subject", Transition.TRANSITION_ACTIVE_SHUTDOWN)
         assert peer.state("/subject") == "finalized"
         assert not peer.change("/subject", "shutdown")
+
+
+def test_what_interrupts_a_transition_too_late_leaves_no_coroutine_behind(
+    tmp_path: Path,
+    peer: Peer,
+    monkeypatch: pytest.MonkeyPatch,
+    recwarn: pytest.WarningsRecorder,
+) -> None:
+    failing = QUIET.replace("pass", "def on_configure(self):\n        raise ValueError('no map')")
+    gc.collect()
+    recwarn.clear()  # what other tests have left behind is not told here
+    with running(SUBJECT, tmp_path, subject=failing) as system:
+        node = system.host._crew.nodes["subject"]
+        loop = node.loop
+        run_task = loop.run_task
+
+        def strike(work: Coroutine[Any, Any, Any]) -> Any:
+            if node.state == "errorprocessing":
+                raise CallbackInterrupted
+            return run_task(work)
+
+        monkeypatch.setattr(loop, "run_task", strike)
+        assert not peer.change("/subject", "configure")
+        assert peer.state("/subject") == "finalized"
+        gc.collect()
+    assert [str(warning.message) for warning in recwarn if "awaited" in str(warning.message)] == []
 
 
 OUTCOMES = [

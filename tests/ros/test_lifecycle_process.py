@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,6 +36,15 @@ nodes:
   other:
     services: {alive: {type: std_srvs/srv/Trigger, external: true, respond: {success: true}}}
 """
+SERVICES = "service list --include-hidden --show-types"
+#: What an outsider is shown of all that there is, and of the node.
+LISTS = (
+    "topic list --include-hidden --show-types",
+    SERVICES,
+    "action list --show-types",
+    "node list",
+    "node info /subject --include-hidden",
+)
 PORTS = ("input", "output", "trigger", "ask", "serve", "send")
 CYCLE = ("configure", "activate", "deactivate", "cleanup")
 #: Of memory that may be held in the end, so that it is 10 MB at the most after a thousand cycles.
@@ -152,6 +163,16 @@ class Usage:
         return {name for name in self.graph if name.split("/")[1] in PORTS}
 
 
+def lists_of_an_outsider() -> dict[str, str]:
+    """What somebody sees who has just come: he knows nothing of what was there before."""
+    return {words: _said(*words.split()) for words in LISTS}
+
+
+def _said(*words: str) -> str:
+    command = [sys.executable, "-m", "composer", *words]
+    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=30.0).stdout
+
+
 @pytest.mark.parametrize(
     "cycles", [60, pytest.param(1000, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
 )
@@ -173,6 +194,13 @@ def test_cycles_leave_nothing_behind(tmp_path: Path, peer: Peer, cycles: int) ->
         assert grown < KILOBYTES_AT_ALL + KILOBYTES_PER_CYCLE * cycles
         assert usage.file_descriptors == descriptors
         wait_until(lambda: not usage.ports, "no ports again")
+        worn = lists_of_an_outsider()
         assert subject.change("configure")
         wait_until(lambda: len(usage.ports) > 10, "it has ports again")
+        assert system.stop()[0] == 0
+    with running(tmp_path) as system:
+        fresh = lists_of_an_outsider()
+        assert "/alive" in fresh[SERVICES]
+        assert "/trigger" not in fresh[SERVICES]
+        assert worn == fresh
         assert system.stop()[0] == 0

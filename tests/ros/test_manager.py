@@ -13,7 +13,7 @@ from std_srvs.srv import Trigger
 from composer.model import PrimaryState
 from composer.runtime.events import RolledBack, RollingBack, StateChanged
 from composer.runtime.host import Host, HostOptions
-from composer.runtime.manager_topics import STATE_QOS
+from composer.runtime.manager_interface import STATE_QOS
 from composer.runtime.start_refused import StartRefused
 from tests.ros.system_bench import Peer, RunningSystem, running, system_of, wait_until
 
@@ -104,6 +104,21 @@ def test_a_system_is_paused_resumed_reset_and_started_from_outside(
     assert system.states()[-3:][0] in ("/fleet/camera finalized", "/fleet/motor finalized")
 
 
+def test_a_system_is_not_active_when_a_node_fails_that_was_only_to_be_inactive(
+    tmp_path: Path, peer: Peer
+) -> None:
+    camera = "camera: {behavior: planner:Planner, parameters: {fault: activate}, "
+    with running(ROBOT.replace("camera: {", camera), tmp_path, planner=PLANNER):
+        assert ask(peer, "is_active") == (True, "2 of 3 nodes active")
+        assert not peer.change("/fleet/camera", "activate")
+        wait_until(lambda: "/fleet/camera is down" in ask(peer, "is_active")[1], "it has failed")
+        success, message = ask(peer, "is_active")
+        assert not success
+        assert message.startswith("2 of 3 nodes active, /fleet/camera is down: activate ended in")
+        assert ask(peer, "startup") == (True, "2 of 3 nodes active")
+        assert ask(peer, "is_active")[0]
+
+
 def test_finalized_nodes_are_made_anew(tmp_path: Path, peer: Peer) -> None:
     with running(ROBOT, tmp_path, planner=PLANNER):
         assert peer.change("/fleet/planner", "shutdown")
@@ -151,9 +166,10 @@ def test_states_are_told_latched_on_change_and_every_second(tmp_path: Path, peer
         states = peer.listen(DiagnosticArray, "/fleet/robot/manager/state", STATE_QOS)
         wait_until(lambda: states, "the latched state")
         diagnostics = peer.listen(DiagnosticArray, "/diagnostics")
-        wait_until(lambda: len(diagnostics) >= 3, "one message a second")
+        wait_until(lambda: len(diagnostics) >= 5, "messages at once, then one a second")
+        each_second = diagnostics[-3:]
         spans = [
-            seconds(later) - seconds(earlier) for earlier, later in itertools.pairwise(diagnostics)
+            seconds(later) - seconds(earlier) for earlier, later in itertools.pairwise(each_second)
         ]
         assert all(0.8 < span < 1.2 for span in spans)
         told = latest(diagnostics)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from composer.runtime.host import HostOptions
 from tests.ros.system_bench import running, wait_until
+from tests.ros.systems.running import RunningSystem as InAProcess
 
 TEXT = """
 system: changing
@@ -78,3 +80,16 @@ def test_without_the_check_nobody_looks(tmp_path: Path) -> None:
         wait_until(lambda: reader.heard > 10)
         assert not any(entry.errors for entry in system.stop().nodes)
     assert "has changed" not in system.log_text()
+
+
+def test_people_ask_for_it_on_the_command_line(tmp_path: Path) -> None:
+    path = tmp_path / "changing.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    path.with_name("changing.py").write_text(MODULE, encoding="utf-8")
+    with InAProcess(str(path), "--check-mutation") as system:
+        line = system.wait_for(re.escape(FORGERY))
+        assert "[ERROR] [forger]" in line
+        system.wait_for(re.escape(USED_AGAIN))
+        code, _ = system.stop()
+    assert code == 0
+    assert "[reader]" not in system.output

@@ -67,7 +67,7 @@ def test_what_is_latched_while_inactive_comes_with_the_activation(
         source.publish(String(data="old"))
         source.publish(String(data="ready"))
         port = system.host._crew.nodes["listener"]._assembly.subscriptions["mode"]
-        wait_until(lambda: [message.data for message in port._latched or ()] == ["ready"])
+        wait_until(lambda: [message.data for _, message in port._latched or ()] == ["ready"])
         assert system.log() == []
         assert peer.change("/listener", "activate")
         system.wait_for_log("ready")

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import Any
 
 import pytest
 from rclpy.qos import HistoryPolicy
@@ -16,6 +17,9 @@ from std_msgs.msg import Int64, String
 from std_srvs.srv import Trigger
 
 from composer.model import ExecutorKind
+from composer.runtime import readiness
+from composer.runtime.event_loop import EventLoop
+from composer.runtime.slots import Slot
 from composer.runtime.tasks import Future
 from tests.ros.loop_support import Bench, bench, last_line, peer, wait_until
 
@@ -95,6 +99,117 @@ def test_a_full_queue_starves_no_other_subscription(on: Bench) -> None:
     wait_until(lambda: len(flood) == 2000)
     assert len(served_at) == 1
     assert served_at[0] < 200  # not behind the two thousand
+
+
+def test_an_answer_behind_those_for_others_is_found_at_once(on: Bench) -> None:
+    """A client is sent all answers of its service, and a take passes over one for another."""
+    requests: list[Any] = []
+    on.serve(Trigger, "ask", lambda _, reply: requests.append(reply))
+    clients = [on.client(Trigger, "ask") for _ in range(2)]
+    wait_until(lambda: all(client.service_is_ready() for client in clients))
+    futures = []
+    for client in (clients[0], clients[0], clients[0], clients[1]):
+        futures.append(client.call_async(Trigger.Request()))
+        wait_until(lambda: len(requests) == len(futures))
+    answers_there = readiness.Signal()
+    probe = on.node.create_client(Trigger, "ask")
+    answers_there.attach(probe.handle, readiness.RESPONSE)
+    seen: list[int] = []
+
+    def answer_all() -> None:  # and keep the loop from looking until everybody has got them
+        for number, reply in enumerate(requests):
+            reply(Trigger.Response(message=str(number)))
+        until_s = time.monotonic() + 5.0
+        while sum(seen) < len(requests) and time.monotonic() < until_s:
+            seen.append(answers_there.count())
+
+    on.loop.run(answer_all, 10.0)
+    wait_until(lambda: all(future.done() for future in futures))
+    assert [future.result().message for future in futures] == ["0", "1", "2", "3"]
+    answers_there.close()
+    on.node.destroy_client(probe)
+
+
+def slot_of(on: Bench, subscription: object) -> Slot:
+    assert isinstance(on.loop, EventLoop)
+    return on.loop._slots_of[subscription]
+
+
+def takes_of(slot: Slot) -> list[bool]:
+    """Return what says from now on, for each take of the slot's source, whether something came."""
+    takes: list[bool] = []
+    source: Any = slot.sources[0]
+    take = source.take
+
+    def counted() -> Any:
+        taken = take()
+        takes.append(taken is not None)
+        return taken
+
+    source.take = counted
+    return takes
+
+
+def test_what_a_full_queue_dropped_is_not_looked_for_again(on: Bench) -> None:
+    seen: list[int] = []
+    subscription = on.subscribe(
+        Int64, "numbers", lambda message: seen.append(message.data), depth=3
+    )
+    takes = takes_of(slot_of(on, subscription))
+    publisher = on.node.create_publisher(Int64, "numbers", 50)
+    wait_until(publisher.get_subscription_count)
+
+    def publish() -> None:
+        for number in range(50):
+            publisher.publish(Int64(data=number))
+
+    on.loop.run(publish, 10.0)
+    wait_until(lambda: seen[-1:] == [49])
+    on.loop.run(lambda: None, 5.0)
+    assert seen == [47, 48, 49]
+    assert takes.count(True) == 3
+    assert takes.count(False) <= 2, "one look into the empty queue, and perhaps one at the start"
+
+
+def test_a_message_is_taken_once_and_nothing_is_looked_for_after_it(on: Bench) -> None:
+    seen: list[int] = []
+    subscription = on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
+    publisher = on.node.create_publisher(Int64, "numbers", 10)
+    wait_until(publisher.get_subscription_count)
+    on.loop.run(lambda: None, 5.0)
+    takes = takes_of(slot_of(on, subscription))
+    for number in range(20):
+        publisher.publish(Int64(data=number))
+        wait_until(lambda number=number: seen[-1:] == [number])
+    assert takes == [True] * 20
+
+
+def test_an_exception_between_two_callbacks_loses_nothing(
+    on: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[int] = []
+    subscription = on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
+    publisher = on.node.create_publisher(Int64, "numbers", 10)
+    wait_until(publisher.get_subscription_count)
+    slot = slot_of(on, subscription)
+    serve = EventLoop._serve
+    struck: list[bool] = []
+
+    def strike(loop: EventLoop, wanted: Slot) -> None:
+        if wanted is slot and not struck:
+            struck.append(True)
+            raise SystemExit
+        serve(loop, wanted)
+
+    monkeypatch.setattr(EventLoop, "_serve", strike)
+
+    def publish() -> None:
+        for number in range(5):
+            publisher.publish(Int64(data=number))
+
+    on.loop.run(publish, 5.0)
+    wait_until(lambda: seen == [0, 1, 2, 3, 4])
+    assert on.errors() == [SystemExit]
 
 
 def test_destroying_before_removing_is_survived(on: Bench) -> None:

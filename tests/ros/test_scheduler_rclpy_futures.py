@@ -10,7 +10,7 @@ import pytest
 from rclpy.task import Future as RclpyFuture
 
 from composer.runtime.strand import Strand, Turns
-from composer.runtime.tasks import Future, Task, wrap_rclpy_future
+from composer.runtime.tasks import Future, Task, wrap_future
 
 
 class Calls:
@@ -75,21 +75,21 @@ def test_an_rclpy_future_that_failed_raises_where_it_is_awaited() -> None:
 
 def test_a_wrapped_future_has_the_outcome_of_the_rclpy_future() -> None:
     foreign = RclpyFuture()
-    future = wrap_rclpy_future(foreign)
+    future = wrap_future(foreign)
     assert not future.done()
     foreign.set_result("answer")
     assert future.result() == "answer"
     failing = RclpyFuture()
-    failed = wrap_rclpy_future(failing)
+    failed = wrap_future(failing)
     failing.set_exception(ValueError("broken"))
     assert isinstance(failed.exception(), ValueError)
 
 
 def test_cancelling_goes_both_ways_through_a_wrapped_future() -> None:
     foreign = RclpyFuture()
-    wrap_rclpy_future(foreign).cancel()
+    wrap_future(foreign).cancel()
     assert foreign.cancelled()
     foreign = RclpyFuture()
-    future = wrap_rclpy_future(foreign)
+    future = wrap_future(foreign)
     foreign.cancel()
     assert future.cancelled()

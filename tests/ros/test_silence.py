@@ -90,7 +90,8 @@ class Outside:
         assert self.peer.set_parameter("/subject", "fault", "") == ""
         assert self.peer.call(Trigger, "/silence/manager/startup").success
         wait_until(lambda: self.peer.state("/subject") == "active")
-        wait_until(lambda: self._orders.get_subscription_count() == 1)
+        # Of two participants in one process, one may never notice that a subscription has gone.
+        wait_until(lambda: self._orders.get_subscription_count() >= 1)
         wait_until(self._drive.server_is_ready)
 
     def goal(self) -> Any:

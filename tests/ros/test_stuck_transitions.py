@@ -81,3 +81,21 @@ def test_who_asks_gets_an_answer_and_the_others_go_on(path: Path, peer: Peer) ->
     for kind in KINDS:
         state = "finalized" if kind == "multi_threaded" else "activating"
         assert re.search(rf"^/{kind} +{state} ", system.output, re.MULTILINE), kind
+
+
+def test_who_waits_for_a_turn_on_a_busy_executor_is_not_stuck(tmp_path: Path) -> None:
+    """Each takes half of its time; the last has to wait for much longer than that."""
+    path = tmp_path / "slow.yaml"
+    nodes = "".join(f"  n{number}: {{behavior: slow:Slow}}\n" for number in range(12))
+    path.write_text(f"system: slow\nlifecycle: {{timeout_ms: 300}}\nnodes:\n{nodes}", "utf-8")
+    slow = """
+    import time
+
+    class Slow:
+        def on_configure(self):
+            time.sleep(0.15)  # half of what it may take
+    """
+    path.with_suffix(".py").write_text(dedent(slow), encoding="utf-8")
+    with RunningSystem(str(path)) as system:
+        system.wait_for("12 of 12 nodes active")
+        assert system.stop()[0] == 0

@@ -99,3 +99,41 @@ def test_without_tracing_only_what_has_a_budget_is_timed(tmp_path: Path) -> None
         wait_until(lambda: callbacks["timer", "tock"].times.count > 20, "calls")
     assert callbacks["timer", "tick"].times.count == 0
     assert callbacks["timer", "tick"].lateness.count == 0
+
+
+FLOOD = """
+system: flood
+nodes:
+  source:
+    behavior: flood:Source
+    publishers: {number: {type: std_msgs/msg/Int64, qos: {depth: 5000}}}
+    timers: {tick: {period_ms: 10}}
+  sink:
+    behavior: flood:Sink
+    subscriptions: {number: {type: std_msgs/msg/Int64, qos: {depth: 5000}}}
+"""
+SOURCE_AND_SINK = """
+from std_msgs.msg import Int64
+
+class Source:
+    def on_tick(self):
+        if self.publishers.number.sent == 0:
+            for number in range(4100):
+                self.publishers.number.publish(Int64(data=number))
+
+class Sink:
+    def on_number(self, message):
+        return None if message.data < 4000 else self.later()
+
+    async def later(self):
+        pass
+"""
+
+
+def test_of_what_comes_often_each_call_counts_once_also_where_it_awaits(tmp_path: Path) -> None:
+    """While they come often, one of sixteen is timed and stands for them, where none awaits."""
+    with running(FLOOD, tmp_path, flood=SOURCE_AND_SINK) as system:
+        node = system.host._crew.nodes["sink"]
+        wait_until(lambda: node.statistics.received == 4100, "all are there")
+        times = node.statistics.callbacks["subscription", "number"].times
+        wait_until(lambda: abs(times.count - 4100) < 32, f"{times.count} counted")

@@ -12,7 +12,7 @@ from composer.document import parse_document
 from composer.expand import expand
 from composer.model import System
 from composer.project import Project
-from composer.resolve import read_overrides, resolve
+from composer.resolve import CommandLine, read_overrides, resolve
 from composer.source import SourceFile, Span
 
 NOWHERE = Path("/nowhere")
@@ -29,7 +29,7 @@ def resolve_text(
     tree, findings = parse_document(source)
     assert tree is not None, [finding.message for finding in findings]
     expanded, _ = expand(tree, {})
-    overrides, found = read_overrides(settings, namespace)
+    overrides, found = read_overrides(CommandLine(tuple(settings), namespace))
     system, more = resolve(
         expanded,
         source,

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
-from composer.runtime.discovery import complete_discovery, leave_discovery_alone
+from composer.runtime.discovery import (
+    complete_discovery,
+    leave_discovery_alone,
+    suit_commands,
+)
 
 
 def test_a_profile_is_chosen_that_is_there_and_is_xml(tmp_path: Path) -> None:
@@ -38,11 +43,84 @@ def test_a_file_that_fast_dds_finds_by_itself_is_left_alone(tmp_path: Path) -> N
     assert environment == {}
 
 
-def test_the_profile_is_taken_back_and_no_other(tmp_path: Path) -> None:
+def test_what_concerns_discovery_is_taken_back_of_our_profile_alone(tmp_path: Path) -> None:
     environment: dict[str, str] = {}
     complete_discovery(environment, tmp_path)
+    everything = _settings(environment)
     leave_discovery_alone(environment)
-    assert environment == {}
+    left = _settings(environment)
+    assert left == {setting for setting in everything if "data_writer" in setting}
+    assert left
     chosen = {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
     leave_discovery_alone(chosen)
     assert chosen == {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
+
+
+@pytest.mark.parametrize("reach", [None, "SUBNET", "SYSTEM_DEFAULT"])
+def test_a_command_uses_udp_alone(reach: str | None, tmp_path: Path) -> None:
+    environment = {} if reach is None else {"ROS_AUTOMATIC_DISCOVERY_RANGE": reach}
+    complete_discovery(environment, tmp_path)
+    before = dict(environment)
+    suit_commands(environment)
+    profile = environment.pop("FASTRTPS_DEFAULT_PROFILES_FILE")
+    assert profile != before.pop("FASTRTPS_DEFAULT_PROFILES_FILE")
+    assert environment == before | {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
+
+
+def test_on_this_computer_alone_the_profile_says_what_the_range_would(tmp_path: Path) -> None:
+    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    complete_discovery(environment, tmp_path)
+    suit_commands(environment)
+    assert environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SYSTEM_DEFAULT"
+    profile = ElementTree.parse(environment["FASTRTPS_DEFAULT_PROFILES_FILE"])
+    texts = [text.strip() for text in profile.getroot().itertext() if text.strip()]
+    assert "127.0.0.1" in texts
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"},
+        {"ROS_DISCOVERY_SERVER": "127.0.0.1:11811"},
+        {"FASTDDS_BUILTIN_TRANSPORTS": "LARGE_DATA"},
+        {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_STATIC_PEERS": "10.0.0.7"},
+        {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_LOCALHOST_ONLY": "1"},
+    ],
+)
+def test_a_command_keeps_to_what_the_user_chose(chosen: dict[str, str], tmp_path: Path) -> None:
+    environment = dict(chosen)
+    complete_discovery(environment, tmp_path)
+    before = dict(environment)
+    suit_commands(environment)
+    assert environment == before
+
+
+def test_each_profile_says_what_the_one_before_it_says_and_more(tmp_path: Path) -> None:
+    environment: dict[str, str] = {}
+    complete_discovery(environment, tmp_path)
+    of_all = _settings(environment)
+    of_commands, of_commands_here = (
+        _settings(_suited(environment | {"ROS_AUTOMATIC_DISCOVERY_RANGE": reach}))
+        for reach in ("SUBNET", "LOCALHOST")
+    )
+    assert of_all
+    assert of_all < of_commands < of_commands_here
+
+
+def _suited(environment: dict[str, str]) -> dict[str, str]:
+    suit_commands(environment)
+    return environment
+
+
+def _settings(environment: dict[str, str]) -> set[tuple[str, ...]]:
+    """Return the values of the profile with their paths."""
+    profile = environment["FASTRTPS_DEFAULT_PROFILES_FILE"]
+
+    def walk(element: ElementTree.Element, path: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+        here = (*path, element.tag.rpartition("}")[2])
+        if not len(element):
+            yield (*here, (element.text or "").strip())
+        for child in element:
+            yield from walk(child, here)
+
+    return set(walk(ElementTree.parse(profile).getroot(), ()))

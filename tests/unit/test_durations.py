@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from random import Random
 from types import SimpleNamespace
 from typing import Any
@@ -45,6 +46,27 @@ def test_the_ends_of_the_scale_are_no_limits() -> None:
 def test_nothing_counted_is_zero() -> None:
     durations = counted()
     assert (durations.count, durations.mean_s, durations.percentile_s(0.99)) == (0, 0.0, 0.0)
+
+
+def test_a_time_can_stand_for_several() -> None:
+    durations = counted(0.5)
+    durations.stand_for(16)
+    durations.take(0.25)
+    assert (durations.count, durations.total_s, durations.longest_s) == (17, 4.5, 0.5)
+    durations.stand_for(1)
+    durations.take(0.25)
+    assert (durations.count, durations.total_s) == (18, 4.75)
+
+
+def test_who_asks_while_others_count_loses_nothing() -> None:
+    durations = Durations()
+    asked: list[int] = []
+    counting = threading.Thread(target=lambda: [durations.take(0.001) for _ in range(20_000)])
+    counting.start()
+    while counting.is_alive():
+        asked.append(durations.count)
+    assert durations.count == 20_000
+    assert asked == sorted(asked)
 
 
 def test_a_callback_is_counted_on_after_its_node_was_configured_anew() -> None:

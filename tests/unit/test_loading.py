@@ -8,6 +8,7 @@ from composer.diagnostics import Severity
 from composer.files import find_files
 from composer.interfaces import Interfaces
 from composer.loading import Loading, load, load_bytes
+from composer.resolve import CommandLine
 from composer.resources import nodes_folder, systems_folder
 
 GOOD = """\
@@ -101,8 +102,9 @@ def test_the_command_line_is_checked_like_the_file(tmp_path: Path, interfaces: I
     path = write(tmp_path, GOOD)
     loading = load(
         path,
-        parameter_overrides=["talker.speed=9.0", "talker.sped=1.0", "nobody.speed=1.0", "nonsense"],
-        namespace="//",
+        said=CommandLine(
+            ("talker.speed=9.0", "talker.sped=1.0", "nobody.speed=1.0", "nonsense"), "//"
+        ),
         interfaces=interfaces,
     )
     found = errors(loading)
@@ -116,8 +118,7 @@ def test_the_command_line_is_checked_like_the_file(tmp_path: Path, interfaces: I
 def test_a_good_setting_is_taken(tmp_path: Path, interfaces: Interfaces) -> None:
     loading = load(
         write(tmp_path, GOOD),
-        parameter_overrides=["talker.speed=2"],
-        namespace="left",
+        said=CommandLine(("talker.speed=2",), "left"),
         interfaces=interfaces,
     )
     assert errors(loading) == []

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from composer.model import Channel, ChannelKind, Delivery, Port, System, channels
 from composer.qos import Liveliness, QosProfile, incompatibilities
-from composer.runtime.manager_topics import CALLBACKS_TOPIC, NAME, STATE_TOPIC
+from composer.runtime.manager_interface import CALLBACKS_TOPIC, NAME, STATE_TOPIC
 
 #: What the runtime and rclpy publish themselves, not through ports.
 _NOT_BY_PORTS = frozenset({"/rosout", "/parameter_events", "/diagnostics"})

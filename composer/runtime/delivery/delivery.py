@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, TypeVar
 
 from rclpy.publisher import Publisher
@@ -34,17 +35,19 @@ class Delivery:
         rclpy must be initialized.
         """
         self._objections = dict(shared)
+        #: Why topics go by DDS that the system would have stay; None where none do.
+        self.refusal: str | None = None
         self._topics: dict[ChannelKey, Topic] = {}
         self._servers: dict[ChannelKey, Server] = {}
         self._action_servers: dict[ChannelKey, LocalActionServer] = {}
         for key in [key for key, objection in shared.items() if objection is None]:
             if key[0] is not ChannelKind.TOPIC:
                 continue
-            reason = why_not_ignored()
-            if reason is None:
+            self.refusal = why_not_ignored()
+            if self.refusal is None:
                 self._topics[key] = Topic()
             else:
-                self._objections[key] = reason
+                self._objections[key] = self.refusal
 
     def objection(self, port: Port) -> str | None:
         """Return why DDS has to do although the other end is in the process, or None."""
@@ -75,17 +78,17 @@ class Delivery:
         """Let clients of the process find ``server``; return what ends that."""
         return self._add(self._servers, port, server)
 
-    def server(self, port: Port) -> Server | None:
-        """Return the server in the process that the client port reaches now, if there is one."""
-        return self._servers.get(channel_of(port))
+    def find_server(self, port: Port) -> Callable[[], Server | None]:
+        """Return what finds the server in the process that the client port reaches now, if any."""
+        return partial(self._servers.get, channel_of(port))
 
     def add_action_server(self, port: Port, server: LocalActionServer) -> Leave:
         """Let action clients of the process find ``server``; return what ends that."""
         return self._add(self._action_servers, port, server)
 
-    def action_server(self, port: Port) -> LocalActionServer | None:
-        """Return the server in the process that the action client port reaches now, if any."""
-        return self._action_servers.get(channel_of(port))
+    def find_action_server(self, port: Port) -> Callable[[], LocalActionServer | None]:
+        """Return what finds the server in the process that the action client port reaches now."""
+        return partial(self._action_servers.get, channel_of(port))
 
     def _add(self, servers: dict[ChannelKey, S], port: Port, server: S) -> Leave:
         key = channel_of(port)

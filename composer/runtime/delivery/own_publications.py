@@ -14,6 +14,7 @@ from functools import cache
 from typing import Any
 from uuid import uuid4
 
+from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
@@ -73,13 +74,17 @@ def ignore_own_publications(subscription: Subscription) -> None:
 
 
 @cache
-def why_not_ignored() -> str | None:
-    """Try it, once per process. Return why it does not work here, or None when it does."""
+def why_not_ignored(context: Context | None = None) -> str | None:
+    """Try it, once per process. Return why it does not work here, or None when it does.
+
+    ``context`` is the one of rclpy's that is tried with, its default unless given.
+    """
     middleware = get_rmw_implementation_identifier()
     if middleware not in _MIDDLEWARES:
         return f"nothing is known of {middleware}"
     node = Node(
         _TRIAL,
+        context=context,
         enable_rosout=False,
         start_parameter_services=False,
         use_global_arguments=False,

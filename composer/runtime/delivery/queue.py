@@ -43,8 +43,13 @@ class Queue:
         if len(messages) == self._depth:
             self._on_drop()
         messages.append(message)
-        if self._idle:
-            self._wake()
+        idle = self._idle
+        if idle:  # as in _take_another, but without a call: this is done for each message
+            try:
+                idle.pop()
+            except IndexError:
+                return  # somebody was faster
+            self._call_soon(self._serve)
 
     def close(self) -> None:
         """Have nothing received any more."""
@@ -60,13 +65,13 @@ class Queue:
             else:
                 self._idle.append(True)
                 if messages:  # put there while nobody thought us idle
-                    self._wake()
+                    self._take_another()
 
-    def _wake(self) -> None:
+    def _take_another(self) -> None:
         try:
             self._idle.pop()
         except IndexError:
-            return  # somebody was faster
+            return  # who has put it there takes the turn
         self._call_soon(self._serve)
 
 

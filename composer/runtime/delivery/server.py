@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from typing import Any
+from weakref import ref
 
 from composer.model import Isolation, Port
 from composer.runtime.delivery.copying import copy_of
@@ -25,24 +26,25 @@ class Server:
         self._receive = receive
         self._isolated = port.isolation is Isolation.COPY
 
-    def ask(self, request: Any) -> Future[Any]:
-        """Send a request, from any thread; the future is the response.
+    def ask(self, request: Any, answer: Future[Any]) -> None:
+        """Send a request, from any thread; ``answer`` is to be the response.
 
-        As by DDS, a callback that raises gives an empty one.
+        As by DDS, a callback that raises gives an empty one. Who waits keeps ``answer``: the
+        server does not.
         """
-        answer: Future[Any] = Future()
         content = copy_of(request) if self._isolated else request
-        self._call_soon(partial(self._serve, content, answer))
-        return answer
+        self._call_soon(partial(self._serve, content, partial(self._reply, ref(answer))))
 
-    def _serve(self, request: Any, answer: Future[Any]) -> None:
+    def _serve(self, request: Any, reply: Reply) -> None:
         try:
-            self._receive(request, partial(self._reply, answer))
+            self._receive(request, reply)
         except BaseException:
-            answer.set_result(self._response_type())
+            reply(self._response_type())
             raise
 
-    def _reply(self, answer: Future[Any], response: Any) -> None:
+    def _reply(self, waiting: ref[Future[Any]], response: Any) -> None:
         if not isinstance(response, self._response_type):
             raise TypeError(f"service '{self._name}': {type(response).__name__} is no response")
-        answer.set_result(copy_of(response) if self._isolated else response)
+        answer = waiting()
+        if answer is not None:
+            answer.set_result(copy_of(response) if self._isolated else response)

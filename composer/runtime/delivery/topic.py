@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
@@ -14,6 +14,7 @@ from composer.model import Isolation, Port
 from composer.qos import Durability, incompatibilities
 from composer.runtime.delivery.copying import copy_of
 from composer.runtime.delivery.queue import Queue
+from composer.runtime.marks import MARKS, MatchMark
 
 Send = Callable[[Any], None]
 
@@ -29,16 +30,50 @@ class Inlet:
         self.isolated = port.isolation is Isolation.COPY
         self.queue = queue
 
-    def put_copy(self, message: Any) -> None:
+
+class Target(Protocol):
+    """Where messages are put."""
+
+    def put(self, message: Any) -> None:
+        """Have the message received."""
+
+
+class Copies:
+    """Puts copies into a queue."""
+
+    __slots__ = ("_queue",)
+
+    def __init__(self, queue: Queue) -> None:
+        self._queue = queue
+
+    def put(self, message: Any) -> None:
         """Have a copy of the message received."""
-        self.queue.put(copy_of(message))
+        self._queue.put(copy_of(message))
 
 
 class Outlet:
     """A publisher: hands each message to the inlets it matches, and to DDS where that is needed.
 
-    ``send`` may be called from any thread.
+    ``send`` may be called from any thread. Whether somebody outside listens is asked of the
+    middleware when something has matched or left, which a byte of ``MARKS`` says: asking takes half
+    a microsecond, of a message that takes little more than one.
     """
+
+    __slots__ = (
+        "_changed_at",
+        "_count_matched",
+        "_has_outsiders",
+        "_inlets",
+        "_isolated",
+        "_latched",
+        "_lock",
+        "_mark",
+        "_publish",
+        "_targets",
+        "message_type",
+        "profile",
+        "send",
+    )
 
     def __init__(self, publisher: Publisher, port: Port) -> None:
         profile = port.qos.profile
@@ -47,9 +82,11 @@ class Outlet:
         self._isolated = port.isolation is Isolation.COPY
         self._publish: Send = publisher.publish
         self._count_matched: Callable[[], int] = publisher.handle.get_subscription_count
+        self._mark = MatchMark(publisher)
+        self._changed_at = self._mark.index
+        self._has_outsiders = False
         self._inlets: tuple[Inlet, ...] = ()
-        self._puts: tuple[Send, ...] = ()
-        self._matched_here = 0
+        self._targets: tuple[Target, ...] = ()
         self._latched: deque[Any] | None = None
         self.send: Send = self._send
         if profile.durability is Durability.TRANSIENT_LOCAL:
@@ -69,27 +106,37 @@ class Outlet:
         with self._lock:
             if inlet.profile.durability is Durability.TRANSIENT_LOCAL:
                 for message in self._latched:
-                    self._put_into(inlet)(message)
+                    self._target(inlet).put(message)
             self._reach((*self._inlets, inlet))
 
     def leave(self, inlet: Inlet) -> None:
         """Hand it no more."""
         self._reach(tuple(kept for kept in self._inlets if kept is not inlet))
 
+    def close(self) -> None:
+        """Send nothing any more. To be called before the publisher is destroyed."""
+        self._mark.close()
+
     def _reach(self, inlets: tuple[Inlet, ...]) -> None:
         self._inlets = inlets
-        self._matched_here = len(inlets)
-        self._puts = tuple(self._put_into(inlet) for inlet in inlets)
+        self._targets = tuple(self._target(inlet) for inlet in inlets)
+        self._look_outside()
 
-    def _put_into(self, inlet: Inlet) -> Send:
-        return inlet.put_copy if self._isolated or inlet.isolated else inlet.queue.put
+    def _target(self, inlet: Inlet) -> Target:
+        return Copies(inlet.queue) if self._isolated or inlet.isolated else inlet.queue
+
+    def _look_outside(self) -> None:
+        self._mark.set()  # before the look: who matches in between is seen next time
+        self._has_outsiders = self._count_matched() > len(self._inlets)
 
     def _send(self, message: Any) -> None:
         if message.__class__ is not self.message_type:
             message = self._converted(message)
-        for put in self._puts:
-            put(message)
-        if self._count_matched() > self._matched_here:
+        for target in self._targets:
+            target.put(message)
+        if not MARKS[self._changed_at]:
+            self._look_outside()
+        if self._has_outsiders:
             self._publish(message)
 
     def _send_and_latch(self, message: Any) -> None:
@@ -97,8 +144,8 @@ class Outlet:
         with self._lock:
             if self._latched is not None:
                 self._latched.append(copy_of(message) if self._isolated else message)
-            for put in self._puts:
-                put(message)
+            for target in self._targets:
+                target.put(message)
             self._publish(message)  # somebody who is not here yet may want it
 
     def _converted(self, message: Any) -> Any:
@@ -129,6 +176,7 @@ class Topic:
         """Forget it, and what is latched in it."""
         with self._lock:
             self._outlets.remove(outlet)
+            outlet.close()
 
     def add_inlet(self, inlet: Inlet) -> None:
         """Have it meet everybody who publishes."""

@@ -13,11 +13,12 @@ from rclpy.node import Node
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from composer.qos import incompatibilities
+from composer.runtime.delivery.own_publications import why_not_ignored
 from composer.runtime.doctor.finding import Finding, error, fine, note, warning
 from composer.runtime.inspect_names import Names
-from composer.runtime.inspect_topics import End, TopicInfo, topic_info
 from composer.runtime.messages import MessageError, interface_class
 from composer.runtime.session import Deadline, Session
+from composer.runtime.topic_ends import End, TopicInfo, topic_info
 
 _TESTED_MIDDLEWARE = "rmw_fastrtps_cpp"
 #: Fast DDS announces a participant anew every 3 s.
@@ -33,6 +34,18 @@ def look_at_middleware() -> Finding:
         "middleware",
         f"{used} is used; the composer is tested with {_TESTED_MIDDLEWARE}",
         f"set RMW_IMPLEMENTATION={_TESTED_MIDDLEWARE} for all processes where something is odd",
+    )
+
+
+def look_at_delivery(session: Session) -> Finding:
+    """Say whether messages between the nodes of one process can stay there."""
+    reason = why_not_ignored(session.node.context)
+    if reason is None:
+        return fine("delivery", "messages within a process can go past the middleware")
+    return note(
+        "delivery",
+        f"messages within a process go through the middleware, which costs more: {reason}",
+        f"use {_TESTED_MIDDLEWARE} of ROS 2 Jazzy, or say 'delivery: dds' in the system",
     )
 
 

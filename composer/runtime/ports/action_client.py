@@ -13,13 +13,13 @@ from rclpy.action.client import ActionClient
 from composer.behavior import CallCancelled, CallError, GoalRejected
 from composer.model import Event, Port
 from composer.runtime.core import Core
-from composer.runtime.line import Line
+from composer.runtime.line import line_for
 from composer.runtime.messages import interface_class
 from composer.runtime.ports.client import DEFAULT_TIMEOUT_MS
 from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.ports.waiting import Waiting
 from composer.runtime.reactions import RunningReaction
-from composer.runtime.tasks import Future, wrap_rclpy_future
+from composer.runtime.tasks import Future
 from composer.runtime.tracing import CallbackTimer
 
 OnFeedback = Callable[[Any], Any]
@@ -65,7 +65,7 @@ class ActionClientPort:
 
     def __init__(self, core: Core, port: Port) -> None:
         self._core = core
-        self._port = port
+        self._find_server = core.delivery.find_action_server(port)
         self._name = port.name.value
         self._timeout_ms = DEFAULT_TIMEOUT_MS if port.timeout_ms is None else port.timeout_ms.value
         limit = port.result_timeout_ms
@@ -76,8 +76,9 @@ class ActionClientPort:
         self._under_way: dict[bytes, Any] = {}
         traced = core.statistics.callback(port.kind.value, self._name)
         timer = CallbackTimer(core, traced, port.budget_ms)
-        take = timer.around(self._take_feedback)
-        self._feedback = Line(core, take, depth=None, reentrant=port.reentrant)
+        self._feedback = line_for(
+            core, self._take_feedback, timer, depth=None, reentrant=port.reentrant
+        )
         self._run = timer.around(self._carry_out)
         profile = rclpy_profile(port.qos.profile)
         self._client = ActionClient(
@@ -169,23 +170,20 @@ class ActionClientPort:
         return SentGoal(self, handle, ended)
 
     def _has_server(self) -> bool:
-        there = self._core.delivery.action_server(self._port) is not None
-        return there or self._client.server_is_ready()
+        return self._find_server() is not None or self._client.server_is_ready()
 
-    def _ask(self, goal: Any, on_feedback: OnFeedback | None) -> Future[Any]:
+    def _ask(self, goal: Any, on_feedback: OnFeedback | None) -> Any:
         take = partial(self._on_feedback, goal, on_feedback)
-        server = self._core.delivery.action_server(self._port)
+        server = self._find_server()
         if server is None:
-            return wrap_rclpy_future(
-                self._client.send_goal_async(goal, lambda message: take(message.feedback))
-            )
+            return self._client.send_goal_async(goal, lambda message: take(message.feedback))
         call_soon = self._core.loop.call_soon
         return server.send_goal(goal, lambda feedback: call_soon(partial(take, feedback)))
 
     async def _end(self, goal: Any, handle: Any) -> Ended:
         try:
             waiting = Waiting(self._core, self._what, self._result_timeout_ms)
-            answer = await waiting.until_done(wrap_rclpy_future(handle.get_result_async()))
+            answer = await waiting.until_done(handle.get_result_async())
         except CallError as error:
             self._react(Event.FAILURE, failure=str(error), goal=goal)
             raise
@@ -197,7 +195,7 @@ class ActionClientPort:
 
     async def _cancel(self, handle: Any) -> bool:
         waiting = Waiting(self._core, self._what, self._timeout_ms)
-        answer = await waiting.until_done(wrap_rclpy_future(handle.cancel_goal_async()))
+        answer = await waiting.until_done(handle.cancel_goal_async())
         return bool(answer.goals_canceling)
 
     async def _send(self, goal: Any) -> None:

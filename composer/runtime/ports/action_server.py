@@ -12,7 +12,7 @@ from composer.behavior import CallCancelled
 from composer.model import FeedbackSteps, Port
 from composer.runtime.core import Core
 from composer.runtime.delivery.action import LocalActionServer
-from composer.runtime.line import Line
+from composer.runtime.line import line_for
 from composer.runtime.messages import Build, compile_message, interface_class
 from composer.runtime.ports.goal import RunningGoal
 from composer.runtime.ports.port import callback_group
@@ -20,6 +20,7 @@ from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.reactions import RunningReaction
 from composer.runtime.tasks import Cancelled, Future, sleep, within
 from composer.runtime.tracing import CallbackTimer
+from composer.runtime.user_code import calls_user_code
 
 #: How long handlers may take to end their goals once the node leaves *active*.
 CANCEL_LIMIT_S = 1.0
@@ -61,7 +62,7 @@ class ActionServerPort:
         self._count = 0
         traced = core.statistics.callback(port.kind.value, self._name)
         self._timer = CallbackTimer(core, traced, port.budget_ms)
-        self._line = Line(core, self._run, depth=None, reentrant=port.reentrant)
+        self._line = line_for(core, self._run, None, depth=None, reentrant=port.reentrant)
         profile = rclpy_profile(port.qos.profile)
         self._server = ActionServer(
             core.node,
@@ -120,6 +121,7 @@ class ActionServerPort:
         self._core.log.info(f"{self._callback} rejects a goal: {reason}")
         return GoalResponse.REJECT
 
+    @calls_user_code
     async def _objection(self, request: Any) -> str | None:
         """Return why the goal is not taken, or None when it is."""
         if not self._core.gate.incoming:
@@ -174,6 +176,7 @@ class ActionServerPort:
         else:
             self._finish(goal, result)
 
+    @calls_user_code
     async def _work(self, goal: RunningGoal) -> Any:
         scope = self._core.names | {"goal": goal.request}
         scope |= {"count": self._count, "now": self._core.now_s()}
@@ -200,8 +203,8 @@ class ActionServerPort:
             if self._feedback is not None:
                 now = {"count": step, "now": self._core.now_s()}
                 goal.publish_feedback(self._feedback(scope | now))
-            pause = sleep(self._core.loop, steps.period_ms.value / 1000.0)
-            await self._core.gate.hold(pause)
+            pause = sleep(self._core.clock, steps.period_ms.value / 1000.0)
+            await self._core.gate.pending.hold(pause)
 
     # --- after the goal
 

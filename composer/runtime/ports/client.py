@@ -7,11 +7,12 @@ from typing import Any
 from composer.behavior import CallCancelled, CallError
 from composer.model import Event, Port
 from composer.runtime.core import Core
+from composer.runtime.delivery.server import Server
 from composer.runtime.messages import interface_class
 from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.ports.waiting import Waiting
 from composer.runtime.reactions import RunningReaction
-from composer.runtime.tasks import Future, wrap_rclpy_future
+from composer.runtime.tasks import Future, wrap_future
 from composer.runtime.tracing import CallbackTimer
 
 #: The limit of a call when the YAML names none.
@@ -23,7 +24,7 @@ class ClientPort:
 
     def __init__(self, core: Core, port: Port) -> None:
         self._core = core
-        self._port = port
+        self._find_server = core.delivery.find_server(port)
         self._name = port.name.value
         self._timeout_ms = DEFAULT_TIMEOUT_MS if port.timeout_ms is None else port.timeout_ms.value
         self._what = f"service '{port.full_name}'"
@@ -59,7 +60,11 @@ class ClientPort:
                 f"not {type(request).__name__}"
             )
         limit_ms = self._timeout_ms if timeout_ms is None else timeout_ms
-        return self._core.spawn(self._call(request, limit_ms))
+        server = self._find_server()
+        if server is None or self._reactions:
+            called = self._core.spawn(self._call(request, limit_ms))
+            return wrap_future(called, self._take_failure)
+        return self._call_at_once(server, request, limit_ms)
 
     def send(self, content: Any) -> None:
         """Send a request for a reaction; failures without ``on_failure`` are logged."""
@@ -76,6 +81,18 @@ class ClientPort:
         self._core.loop.remove(self._client)
         self._core.node.destroy_client(self._client)
 
+    def _call_at_once(self, server: Server, request: Any, timeout_ms: float) -> Future[Any]:
+        """Call a server of the process: only the answer is waited for, which needs no task."""
+        answer: Future[Any] = Future(self._take_failure)
+        try:
+            waiting = Waiting(self._core, self._what, timeout_ms)
+        except CallCancelled as error:
+            answer.set_exception(error)
+            return answer
+        self._core.statistics.calls += 1
+        server.ask(request, waiting.hold(answer))
+        return answer
+
     async def _call(self, request: Any, timeout_ms: float) -> Any:
         try:
             waiting = Waiting(self._core, self._what, timeout_ms)
@@ -89,23 +106,29 @@ class ClientPort:
         return response
 
     def _has_server(self) -> bool:
-        there = self._core.delivery.server(self._port) is not None
-        return there or self._client.service_is_ready()
+        return self._find_server() is not None or self._client.service_is_ready()
 
-    def _ask(self, request: Any) -> Future[Any]:
-        server = self._core.delivery.server(self._port)
+    def _ask(self, request: Any) -> Any:
+        """Send ``request``; the future response is one of ours or of rclpy's."""
+        server = self._find_server()
         if server is not None:
-            return server.ask(request)
-        return wrap_rclpy_future(self._client.call_async(request))
+            answer: Future[Any] = Future()
+            server.ask(request, answer)
+            return answer
+        return self._client.call_async(request)
 
     async def _send(self, request: Any) -> None:
         try:
             await self._call(request, self._timeout_ms)
-        except CallCancelled as error:
-            self._core.log.debug(f"client '{self._name}': {error}")
         except CallError as error:
-            if Event.FAILURE not in self._reactions:
-                self._core.faults.note(f"client '{self._name}'", str(error))
+            self._take_failure(error)
+
+    def _take_failure(self, error: BaseException) -> None:
+        """Tell of a failed call that nobody else looks after."""
+        if isinstance(error, CallCancelled):
+            self._core.log.debug(f"client '{self._name}': {error}")
+        elif Event.FAILURE not in self._reactions:
+            self._core.faults.note(f"client '{self._name}'", str(error))
 
     def _react(self, event: Event, **values: Any) -> None:
         reaction = self._reactions.get(event)

@@ -2,16 +2,34 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
+
+from rclpy.event_handler import PublisherEventCallbacks
 
 from composer.model import Port
 from composer.runtime.core import Core
 from composer.runtime.messages import interface_class
 from composer.runtime.ports.profiles import rclpy_profile
+from composer.runtime.ports.qos_events import QosEvents
 
 
 class PublisherPort:
     """Publishes while the node is active; drops, counts and says so once while it is not."""
+
+    __slots__ = (
+        "_core",
+        "_gate",
+        "_leave",
+        "_mutations",
+        "_name",
+        "_publisher",
+        "_qos_events",
+        "_send",
+        "_statistics",
+        "_warned",
+        "message_type",
+        "sent",
+    )
 
     def __init__(self, core: Core, port: Port) -> None:
         self._core = core
@@ -20,11 +38,13 @@ class PublisherPort:
         self._mutations = core.mutations
         self._name = port.name.value
         self.message_type: Any = interface_class(port.interface.value)
+        self._qos_events = QosEvents(core, port)
         self._publisher = core.node.create_publisher(
             self.message_type,
             port.full_name,
             rclpy_profile(port.qos.profile),
             callback_group=core.group,
+            event_callbacks=cast(PublisherEventCallbacks, self._qos_events),
         )
         send, self._leave = core.delivery.add_publisher(port, self._publisher)
         self._send = core.chains.sending(port, send)
@@ -51,6 +71,7 @@ class PublisherPort:
 
     def destroy(self) -> None:
         """Leave the topic."""
+        self._qos_events.close()
         self._leave()
         self._core.node.destroy_publisher(self._publisher)
 

@@ -8,7 +8,7 @@ from typing import Any
 from composer.model import Port
 from composer.runtime.core import Core
 from composer.runtime.delivery.server import Server
-from composer.runtime.line import Line
+from composer.runtime.line import line_for
 from composer.runtime.log import describe
 from composer.runtime.loop import Reply
 from composer.runtime.messages import interface_class
@@ -17,6 +17,7 @@ from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.reactions import RunningReaction
 from composer.runtime.tasks import Cancelled
 from composer.runtime.tracing import CallbackTimer
+from composer.runtime.user_code import calls_user_code
 
 Handler = Callable[[Any, Any], Any]
 
@@ -54,15 +55,17 @@ class ServicePort:
         self._core = core
         self._name = port.name.value
         self._type = interface_class(port.interface.value)
-        self._explains = _explains(self._type.Response)
+        self._response_type: Any = self._type.Response
+        self._explains = _explains(self._response_type)
         self._reaction = reaction
         self._handler = handler
         self._open: set[Request] = set()
         # Whoever asks waits for an answer and gives up in time, so none is pushed out.
         traced = core.statistics.callback(port.kind.value, self._name)
-        self._line = Line(
+        self._line = line_for(
             core,
-            CallbackTimer(core, traced, port.budget_ms).around(self._work),
+            self._work,
+            CallbackTimer(core, traced, port.budget_ms),
             depth=None,
             reentrant=port.reentrant,
         )
@@ -109,11 +112,12 @@ class ServicePort:
         request.answer(self._failure(reason))
 
     def _failure(self, reason: str) -> Any:
-        response = self._type.Response()
+        response = self._response_type()
         if self._explains:
             response.message = reason
         return response
 
+    @calls_user_code
     def _work(self, request: Request) -> Coroutine[Any, Any, None] | None:
         response = None
         if self._reaction is not None:
@@ -123,7 +127,7 @@ class ServicePort:
                 self._failed(request, f"service '{self._name}'", error)
                 return None
         if response is None:
-            response = self._type.Response()
+            response = self._response_type()
         if self._handler is None:
             request.answer(response)
             return None
@@ -132,7 +136,7 @@ class ServicePort:
         except BaseException as error:
             self._failed(request, self._callback, error)
             return None
-        if isinstance(result, Awaitable):
+        if not isinstance(result, self._response_type) and isinstance(result, Awaitable):
             return self._answer_later(request, result)
         self._answer(request, result)
         return None
@@ -141,6 +145,7 @@ class ServicePort:
     def _callback(self) -> str:
         return f"on_{self._name}"
 
+    @calls_user_code
     async def _answer_later(self, request: Request, result: Awaitable[Any]) -> None:
         try:
             self._answer(request, await result)
@@ -152,7 +157,7 @@ class ServicePort:
             self._core.take(self._callback, error)
 
     def _answer(self, request: Request, result: Any) -> None:
-        if isinstance(result, self._type.Response):
+        if isinstance(result, self._response_type):
             request.answer(result)
             return
         wanted = f"{self._type.__name__}.Response"

@@ -7,10 +7,10 @@ from collections.abc import Callable, Coroutine, Mapping
 from typing import Any
 
 from composer.expressions import EvaluationError, Expression
-from composer.model import Period
+from composer.model import Period, TimerClock
 from composer.model import Timer as TimerModel
 from composer.runtime.core import Core
-from composer.runtime.line import Line
+from composer.runtime.line import line_for
 from composer.runtime.loop import Timer
 from composer.runtime.reactions import RunningReaction
 from composer.runtime.tracing import CallbackTimer
@@ -51,14 +51,16 @@ class TimerPort:
         """Make it, standing still. Raises PeriodError."""
         self._core = core
         self._name = timer.name.value
+        self._clock = core.loop if timer.clock is TimerClock.STEADY else core.clock
         self._period = timer.period
         self._period_s = period_s(timer.period, core.names["parameters"])
         self._reaction = reaction
         self._handler = handler
         self._traced = core.statistics.callback("timer", self._name)
-        self._line = Line(
+        self._line = line_for(
             core,
-            CallbackTimer(core, self._traced, timer.budget_ms).around(self._work),
+            self._work,
+            CallbackTimer(core, self._traced, timer.budget_ms),
             depth=0,
             reentrant=timer.reentrant,
         )
@@ -69,14 +71,17 @@ class TimerPort:
         seconds = period_s(self._period, self._core.names["parameters"])
         if seconds != self._period_s:
             self._period_s = seconds
-            if self._timer is not None:
-                self.deactivate()
-                self.activate()
+            self._begin_anew()
+
+    def follow_clock(self) -> None:
+        """Take over that the node's time has become another."""
+        if self._clock is self._core.clock:
+            self._begin_anew()
 
     def activate(self) -> None:
         """Start; the first call comes one period from now."""
         if self._timer is None:
-            self._timer = self._core.loop.call_every(self._period_s, self._tick)
+            self._timer = self._clock.call_every(self._period_s, self._tick)
 
     def deactivate(self) -> None:
         """Stand still."""
@@ -87,6 +92,11 @@ class TimerPort:
     def destroy(self) -> None:
         """End for good."""
         self.deactivate()
+
+    def _begin_anew(self) -> None:
+        if self._timer is not None:
+            self.deactivate()
+            self.activate()
 
     def _tick(self) -> None:
         if not self._core.gate.incoming:

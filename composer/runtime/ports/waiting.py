@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
+from math import inf
+from typing import Any, TypeVar
 
 from composer.behavior import CallCancelled, CallTimeout, ServerUnavailable
 from composer.runtime.core import Core
-from composer.runtime.tasks import Future, sleep, within
+from composer.runtime.tasks import Future, sleep, wrap_future
+
+T = TypeVar("T")
 
 #: rclpy does not tell when a server appears; looking costs microseconds.
 _LOOK_EVERY_S = 0.01
@@ -17,43 +20,52 @@ _LOOK_EVERY_S = 0.01
 class Waiting:
     """The time limit of one call. ``what`` names it in errors, for example ``service '/plan'``."""
 
+    __slots__ = ("_core", "_end_s", "_period", "_timeout_ms", "_what")
+
     def __init__(self, core: Core, what: str, timeout_ms: float | None) -> None:
         """Without ``timeout_ms`` there is no limit. Raises CallCancelled in the wrong state."""
+        self._period = core.gate.period  # looked at first, so that no end of it is missed
         if not core.gate.outgoing:
             raise CallCancelled(core.gate.refusal)
         self._core = core
-        self._period = core.gate.period
         self._what = what
         self._timeout_ms = timeout_ms
-        self._end_s = None if timeout_ms is None else time.monotonic() + timeout_ms / 1000.0
+        self._end_s = inf if timeout_ms is None else time.monotonic() + timeout_ms / 1000.0
 
     async def until_there(self, is_there: Callable[[], bool]) -> None:
         """Wait for the server. Raises ServerUnavailable and CallCancelled."""
         while not is_there():
-            if self._end_s is not None and time.monotonic() >= self._end_s:
+            if time.monotonic() >= self._end_s:
                 raise ServerUnavailable(
                     f"no server of {self._what} was there within {self._timeout_ms:g} ms"
                 )
-            await self._hold(sleep(self._core.loop, _LOOK_EVERY_S))
+            await self._held(sleep(self._core.loop, _LOOK_EVERY_S), inf)
 
-    async def until_done(self, future: Future[Any]) -> Any:
-        """Return the outcome of ``future``. Raises CallTimeout and CallCancelled.
+    async def until_done(self, answer: Any) -> Any:
+        """Return the outcome of a future, of ours or of rclpy's. Raises CallTimeout, CallCancelled.
 
-        ``future`` is cancelled when it is not waited for any more.
+        It is cancelled when it takes too long, so that the client forgets what it has asked. Where
+        the node leaves *active* the answer may come: rclpy warns of answers that it has forgotten.
         """
-        self._hold(future)
-        if self._end_s is None:
-            return await future
+        future = answer if isinstance(answer, Future) else wrap_future(answer)
         try:
-            return await within(self._core.loop, future, max(0.0, self._end_s - time.monotonic()))
-        except TimeoutError as error:
-            raise CallTimeout(
-                f"{self._what} did not answer within {self._timeout_ms:g} ms"
-            ) from error
+            return await self.hold(future)
+        except CallCancelled:
+            raise
+        except BaseException:
+            answer.cancel()
+            raise
 
-    def _hold(self, future: Future[Any]) -> Future[Any]:
-        """Let ``future`` end when the node leaves *active*, also if it has left it just now."""
-        if self._core.gate.period != self._period:
-            future.set_exception(CallCancelled(self._core.gate.refusal))
-            return future
-        return self._core.gate.hold(future)
+    def hold(self, future: Future[T]) -> Future[T]:
+        """Let ``future`` end in time, with CallTimeout or CallCancelled; return it."""
+        return self._held(future, self._end_s)
+
+    def _held(self, future: Future[T], until_s: float) -> Future[T]:
+        gate = self._core.gate
+        gate.pending.hold(future, until_s, self._too_late)
+        if gate.period != self._period:  # the node has left *active* just now
+            future.set_exception(CallCancelled(gate.refusal))
+        return future
+
+    def _too_late(self) -> CallTimeout:
+        return CallTimeout(f"{self._what} did not answer within {self._timeout_ms:g} ms")

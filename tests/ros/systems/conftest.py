@@ -11,9 +11,9 @@ from rclpy.context import Context
 from tests.ros.systems.running import Outsider
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def outside(ros_domain_id: int) -> Iterator[Context]:
-    """One DDS participant for all tests: Fast DDS has crashed on deleting many in a row."""
+    """One DDS participant for many tests: Fast DDS has crashed on deleting many in a row."""
     context = Context()
     rclpy.init(context=context)
     yield context

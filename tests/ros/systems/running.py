@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
@@ -24,13 +24,14 @@ T = TypeVar("T")
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 PATIENCE_S = 20.0
+COMPOSE = (sys.executable, "-m", "composer")
 
 
 class RunningSystem:
     """``compose run`` in a process of its own; what it prints is read as it comes."""
 
-    def __init__(self, system: str, *options: str) -> None:
-        command = [sys.executable, "-m", "composer", "run", system, *options]
+    def __init__(self, system: str, *options: str, program: Sequence[str] = COMPOSE) -> None:
+        command = [*program, "run", system, *options]
         self.process = subprocess.Popen(
             command,
             cwd=REPOSITORY,
@@ -41,6 +42,7 @@ class RunningSystem:
             env={**os.environ, "PYTHONUNBUFFERED": "1"},
         )
         self.lines: list[str] = []
+        self._has_ended = False
         self._news = threading.Condition()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -65,7 +67,7 @@ class RunningSystem:
         return "\n".join(self.lines)
 
     def wait_for(self, pattern: str, timeout_s: float = PATIENCE_S) -> str:
-        """Wait for a printed line that matches and return it."""
+        """Wait for a printed line that matches and return it. Fails when none is to come."""
         searched = re.compile(pattern)
         end_s = time.monotonic() + timeout_s
         with self._news:
@@ -73,6 +75,7 @@ class RunningSystem:
                 for line in self.lines:
                     if searched.search(line):
                         return line
+                assert not self._has_ended, f"no line like {pattern!r}, it ended: {self._code()}"
                 if not self._news.wait(end_s - time.monotonic()):
                     raise AssertionError(f"no line like {pattern!r} within {timeout_s:g} s")
 
@@ -100,6 +103,12 @@ class RunningSystem:
             with self._news:
                 self.lines.append(line.rstrip("\n"))
                 self._news.notify_all()
+        with self._news:
+            self._has_ended = True
+            self._news.notify_all()
+
+    def _code(self) -> int:
+        return self.process.wait(timeout=PATIENCE_S)
 
 
 class Outsider:

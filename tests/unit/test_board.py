@@ -1,0 +1,32 @@
+"""What is told of a system as a whole."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from composer.runtime.board import NodeStatus, SystemStatus
+
+PLANNER = NodeStatus("/planner", "active", state="active")
+CAMERA = NodeStatus("/camera", "inactive", starts_active=False, state="inactive")
+
+
+@pytest.mark.parametrize(
+    ("nodes", "is_active"),
+    [
+        ((PLANNER, CAMERA), True),
+        ((PLANNER, replace(CAMERA, state="active")), True),
+        ((PLANNER, replace(CAMERA, state="unconfigured")), True),  # moved by hand
+        ((replace(PLANNER, state="inactive"), CAMERA), False),
+        ((replace(PLANNER, state="deactivating"), CAMERA), False),
+        ((PLANNER, replace(CAMERA, state="unconfigured", held_down="no lens")), False),
+        ((replace(PLANNER, held_down="its executor hangs"), CAMERA), False),
+        ((CAMERA,), False),  # nothing is to be active, and nothing is
+    ],
+)
+def test_a_system_is_active_when_all_is_that_ought_to_be(
+    nodes: tuple[NodeStatus, ...], is_active: bool
+) -> None:
+    status = SystemStatus("robot", "running", nodes, "host", 1, 0.0)
+    assert status.is_active is is_active

@@ -1,0 +1,156 @@
+"""What is waited for, each future until its time: on one timer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from math import inf
+from time import monotonic
+
+import pytest
+
+from composer.runtime import pending as module
+from composer.runtime.pending import Pending
+from composer.runtime.tasks import Future
+
+
+class Clock:
+    """A steady clock that is set by hand, and the timers on it."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+        self.timers: list[tuple[float, Callable[[], object]]] = []
+        self.ordered = 0
+
+    def call_later(self, delay_s: float, callback: Callable[[], object]) -> None:
+        self.ordered += 1
+        self.timers.append((self.now_s + delay_s, callback))
+
+    def pass_s(self, seconds: float) -> None:
+        """Let time pass, from timer to timer."""
+        end_s = self.now_s + seconds
+        while due := [timer for timer in self.timers if timer[0] <= end_s]:
+            timer = min(due, key=lambda entry: entry[0])
+            self.timers.remove(timer)
+            self.now_s = max(self.now_s, timer[0])
+            timer[1]()
+        self.now_s = end_s
+
+
+class TooLate(Exception):
+    pass
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(module, "monotonic", lambda: clock.now_s)
+    return clock
+
+
+@pytest.fixture
+def pending(clock: Clock) -> Pending:
+    return Pending(clock.call_later)
+
+
+def hold(pending: Pending, until_s: float) -> Future[str]:
+    return pending.hold(Future(), until_s, TooLate)
+
+
+def test_each_ends_at_its_own_time(clock: Clock, pending: Pending) -> None:
+    ends_s = (105.0, 103.0, 104.0, 103.0, 109.0)
+    futures = [hold(pending, end_s) for end_s in ends_s]
+    for second in range(101, 111):
+        clock.pass_s(1.0)
+        assert [future.done() for future in futures] == [end_s <= second for end_s in ends_s]
+    assert all(isinstance(future.exception(), TooLate) for future in futures)
+    assert not clock.timers
+
+
+def test_what_is_done_in_time_keeps_its_outcome(clock: Clock, pending: Pending) -> None:
+    early, late = hold(pending, 101.0), hold(pending, 102.0)
+    early.set_result("answer")
+    clock.pass_s(5.0)
+    assert early.result() == "answer"
+    assert isinstance(late.exception(), TooLate)
+
+
+def test_one_call_after_the_other_takes_one_timer_for_all(clock: Clock, pending: Pending) -> None:
+    for _ in range(1000):
+        hold(pending, clock.now_s + 5.0).set_result("answer")
+        clock.pass_s(0.001)
+    assert clock.ordered == 1
+    unanswered = hold(pending, clock.now_s + 5.0)
+    clock.pass_s(4.5)
+    assert clock.ordered == 2  # the first one has gone off meanwhile
+    assert not unanswered.done()
+    clock.pass_s(0.5)
+    assert isinstance(unanswered.exception(), TooLate)
+    assert not clock.timers
+
+
+def test_a_sooner_time_is_kept_though_a_later_one_was_there_first(
+    clock: Clock, pending: Pending
+) -> None:
+    later, sooner = hold(pending, 150.0), hold(pending, 101.0)
+    clock.pass_s(1.0)
+    assert sooner.done()
+    assert not later.done()
+    clock.pass_s(49.0)
+    assert later.done()
+
+
+def test_without_a_limit_there_is_no_timer_and_the_end_ends_it(
+    clock: Clock, pending: Pending
+) -> None:
+    unlimited, limited = pending.hold(Future()), hold(pending, 103.0)
+    assert clock.ordered == 1
+    clock.pass_s(1000.0)
+    assert not unlimited.done()
+    last = hold(pending, inf)
+    pending.end(lambda: ValueError("over"))
+    for future in (unlimited, last):
+        assert str(future.exception()) == "over"
+    assert isinstance(limited.exception(), TooLate)
+    assert hold(pending, 2000.0).done() is False, "the end of others is not its own"
+
+
+def test_what_is_done_is_let_go(pending: Pending) -> None:
+    done: Future[str] = Future()
+    done.set_result("answer")
+    pending.hold(done)
+    hold(pending, 200.0).cancel()
+    hold(pending, 200.0).set_result("answer")
+    assert not pending._futures
+
+
+def test_who_waits_again_when_his_time_is_up_is_held_again(clock: Clock, pending: Pending) -> None:
+    seen: list[Future[str]] = []
+    hold(pending, 101.0).add_done_callback(lambda _: seen.append(hold(pending, 102.0)))
+    clock.pass_s(1.0)
+    assert [future.done() for future in seen] == [False]
+    clock.pass_s(1.0)
+    assert [future.done() for future in seen] == [True]
+
+
+def test_a_time_that_has_passed_ends_it_at_the_next_look(clock: Clock, pending: Pending) -> None:
+    future = hold(pending, 99.0)
+    assert not future.done()
+    clock.pass_s(0.0)
+    assert future.done()
+
+
+def test_none_is_forgotten_while_threads_hold_and_the_timer_looks() -> None:
+    due: list[Callable[[], object]] = []
+    pending = Pending(lambda _, look: due.append(look))
+
+    def hold_some(_: int) -> list[Future[str]]:
+        return [hold(pending, monotonic()) for _ in range(200)]
+
+    with ThreadPoolExecutor(3) as pool:
+        making = [pool.submit(hold_some, number) for number in range(3)]
+        # In this order: who is through makes nothing due any more.
+        while not all(made.done() for made in making) or due:
+            if due:
+                due.pop(0)()
+    assert all(future.done() for made in making for future in made.result())

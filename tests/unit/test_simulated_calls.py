@@ -1,0 +1,181 @@
+"""Calls at a time that is told: in order, once each, whatever time does."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+
+import pytest
+
+from composer.runtime.simulated_calls import NANOSECONDS, SimulatedCalls
+
+
+class Loop:
+    """Calls when it is told to."""
+
+    def __init__(self) -> None:
+        self.soon: deque[Callable[[], object]] = deque()
+
+    def call_soon(self, callback: Callable[[], object]) -> None:
+        self.soon.append(callback)
+
+    def run(self) -> None:
+        while self.soon:
+            self.soon.popleft()()
+
+
+class Bench:
+    """A simulation that goes from time to time, and when what was called."""
+
+    def __init__(self) -> None:
+        self.loop = Loop()
+        self.calls = SimulatedCalls(self.loop)
+        self.called: list[float] = []
+
+    def note(self) -> None:
+        self.called.append(self.calls.now_ns / NANOSECONDS)
+
+    def pass_to(self, *times_s: float) -> list[float]:
+        """Return when calls were made on the way."""
+        self.called.clear()
+        for time_s in times_s:
+            self.calls.take_time(round(time_s * NANOSECONDS))
+            self.loop.run()
+        return list(self.called)
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_before_the_first_time_everything_stands_and_with_it_begins(bench: Bench) -> None:
+    bench.calls.add(0.1, bench.note, repeats=True)
+    assert bench.pass_to(0.0, 0.0) == []
+    assert bench.pass_to(1_700_000_000.0) == []
+    assert bench.pass_to(1_700_000_000.1) == [1_700_000_000.1]
+
+
+def test_a_period_is_met_exactly_however_many_there_were(bench: Bench) -> None:
+    bench.pass_to(1_700_000_000.0)
+    bench.calls.add(0.1, bench.note, repeats=True)
+    start_ns = bench.calls.now_ns
+    for step in range(1, 10_001):
+        bench.calls.take_time(start_ns + step * 100_000_000)
+        bench.loop.run()
+    assert len(bench.called) == 10_000
+
+
+def test_a_jump_forward_calls_once_and_keeps_the_beat(bench: Bench) -> None:
+    bench.pass_to(10.0)
+    bench.calls.add(1.0, bench.note, repeats=True)
+    assert bench.pass_to(110.5, 110.9, 111.0) == [110.5, 111.0]
+
+
+def test_a_jump_backward_waits_no_longer_than_a_period(bench: Bench) -> None:
+    bench.pass_to(100.0)
+    bench.calls.add(1.0, bench.note, repeats=True)
+    bench.calls.add(5.0, bench.note)
+    assert bench.pass_to(7.0, 7.9, 8.0, 9.0) == [8.0, 9.0]
+    assert bench.pass_to(11.9) == [11.9]
+    assert bench.pass_to(12.0) == [12.0, 12.0]
+
+
+def test_a_little_jump_backward_shifts_nothing(bench: Bench) -> None:
+    bench.pass_to(100.0)
+    bench.calls.add(1.0, bench.note, repeats=True)
+    assert bench.pass_to(100.9, 100.5, 100.9, 100.6, 101.0) == [101.0]
+
+
+def test_a_call_that_is_under_way_when_time_jumps_back_begins_anew(bench: Bench) -> None:
+    bench.pass_to(100.0)
+
+    def jump_back() -> None:
+        bench.note()
+        bench.calls.take_time(5 * NANOSECONDS)
+
+    bench.calls.add(1.0, jump_back, repeats=True)
+    assert bench.pass_to(101.0) == [101.0]
+    assert bench.pass_to(5.9, 6.0) == [6.0]
+
+
+def test_a_busy_loop_gets_no_call_twice(bench: Bench) -> None:
+    bench.pass_to(1.0)
+    bench.calls.add(0.1, bench.note, repeats=True)
+    for tenth in range(11, 21):
+        bench.calls.take_time(tenth * NANOSECONDS // 10)
+    assert len(bench.loop.soon) == 1
+    bench.loop.run()
+    assert bench.called == [2.0]
+    assert bench.pass_to(2.1) == [2.1]
+
+
+def test_calls_come_in_the_order_they_are_due(bench: Bench) -> None:
+    bench.pass_to(1.0)
+    order: list[str] = []
+    bench.calls.add(0.3, lambda: order.append("later"))
+    bench.calls.add(0.1, lambda: order.append("sooner"))
+    bench.pass_to(2.0)
+    assert order == ["sooner", "later"]
+
+
+@pytest.mark.parametrize("repeats", [True, False])
+def test_a_cancelled_call_does_not_come(bench: Bench, repeats: bool) -> None:
+    bench.pass_to(1.0)
+    waiting = bench.calls.add(0.1, bench.note, repeats=repeats)
+    handed_over = bench.calls.add(0.1, bench.note, repeats=repeats)
+    waiting.cancel()
+    waiting.cancel()
+    bench.calls.take_time(2 * NANOSECONDS)
+    handed_over.cancel()
+    bench.loop.run()
+    assert bench.pass_to(3.0) == []
+
+
+def test_a_timer_that_raises_goes_on(bench: Bench) -> None:
+    bench.pass_to(1.0)
+
+    def fall_over() -> None:
+        bench.note()
+        raise RuntimeError("fell over")
+
+    bench.calls.add(1.0, fall_over, repeats=True)
+    with pytest.raises(RuntimeError, match="fell over"):
+        bench.pass_to(2.0)
+    with pytest.raises(RuntimeError, match="fell over"):
+        bench.pass_to(3.0)
+    assert bench.called == [3.0]
+
+
+@pytest.mark.parametrize("delay_s", [0.0, -1.0, -math.inf])
+def test_what_is_due_now_is_called_while_time_stands(bench: Bench, delay_s: float) -> None:
+    bench.calls.add(delay_s, bench.note)
+    bench.loop.run()
+    assert bench.called == [0.0]
+
+
+@pytest.mark.parametrize("delay_s", [1e12, math.inf])
+def test_a_delay_may_be_longer_than_anybody_waits(bench: Bench, delay_s: float) -> None:
+    bench.calls.add(delay_s, bench.note)
+    bench.calls.add(1.0, bench.note)
+    assert bench.pass_to(1.0, 2.0, 1.5, 3.0) == [2.0]
+
+
+def test_how_late_a_call_is_counts_in_the_simulation(bench: Bench) -> None:
+    bench.pass_to(1.0)
+    late_s: list[float] = []
+    call = bench.calls.add(1.0, lambda: late_s.append(call.late_s), repeats=True)
+    bench.pass_to(2.25)
+    assert late_s == [0.25]
+
+
+@pytest.mark.parametrize("period_s", [0.0, -1.0, math.nan])
+def test_a_period_must_be_positive(bench: Bench, period_s: float) -> None:
+    with pytest.raises(ValueError, match="a period must be positive"):
+        bench.calls.add(period_s, bench.note, repeats=True)
+
+
+def test_a_delay_must_be_a_number(bench: Bench) -> None:
+    with pytest.raises(ValueError, match="must be a number"):
+        bench.calls.add(math.nan, bench.note)

@@ -1,0 +1,72 @@
+"""Stacks of threads that go on, looked at while no garbage is collected."""
+
+from __future__ import annotations
+
+import gc
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from composer.runtime.stacks import shown, stacks_of, undisturbed
+
+
+@pytest.fixture
+def waiting() -> Iterator[int]:
+    """A thread that waits in a function of its own; its identifier."""
+    is_there, may_go = threading.Event(), threading.Event()
+
+    def wait_here() -> None:
+        is_there.set()
+        may_go.wait()
+
+    thread = threading.Thread(target=wait_here)
+    thread.start()
+    is_there.wait()
+    assert thread.ident is not None
+    yield thread.ident
+    may_go.set()
+    thread.join()
+
+
+def test_the_innermost_frame_is_first_and_shown_last(waiting: int) -> None:
+    stack = stacks_of((waiting,))[waiting]
+    names = [frame.f_code.co_name for frame in stack]
+    assert "wait_here" in names
+    assert names[-1] == "_bootstrap"
+    lines = shown(stack).splitlines()
+    assert lines[0].endswith("in _bootstrap")
+    assert "may_go.wait()" in shown(stack)
+
+
+def test_threads_that_are_no_more_are_left_out(waiting: int) -> None:
+    assert list(stacks_of((0, waiting))) == [waiting]
+
+
+@pytest.mark.parametrize("collects", [True, False])
+def test_garbage_is_collected_afterwards_as_before(collects: bool) -> None:
+    before = gc.isenabled()
+    try:
+        (gc.enable if collects else gc.disable)()
+        with undisturbed(), undisturbed():
+            assert not gc.isenabled()
+        assert gc.isenabled() is collects
+    finally:
+        (gc.enable if before else gc.disable)()
+
+
+def test_who_looks_at_the_same_time_waits_so_that_nobody_turns_it_on_too_early() -> None:
+    seen = []
+
+    def look() -> None:
+        for _ in range(2000):
+            with undisturbed():
+                seen.append(gc.isenabled())
+
+    threads = [threading.Thread(target=look) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not any(seen)
+    assert gc.isenabled()
