@@ -14,7 +14,8 @@ import signal
 import sys
 
 TERMINAL = 0
-PASSED_ON = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+#: All but the first are passed on.
+AWAITED = (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def _owns_terminal():
@@ -35,25 +36,22 @@ def _start(command):
         os.setpgid(0, 0)
         _give_terminal(os.getpgrp())
         signal.signal(signal.SIGTTOU, signal.SIG_DFL)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, PASSED_ON)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, AWAITED)
         os.execvp(command[0], command)
     return child
-
-
-def _pass_signals_on(child):
-    def pass_on(number, _frame):
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(child, number)
-
-    for number in PASSED_ON:
-        signal.signal(number, pass_on)
 
 
 def _wait(child):
     """Return the wait status of the child's end; stop and go on together with it (Ctrl-Z, fg)."""
     own_group = os.getpgrp()
     while True:
-        _, status = os.waitpid(child, os.WUNTRACED)
+        number = signal.sigwait(AWAITED)
+        if number != signal.SIGCHLD:
+            os.kill(child, number)  # it is there until it was waited for
+            continue
+        ended_or_stopped, status = os.waitpid(child, os.WUNTRACED | os.WNOHANG)
+        if not ended_or_stopped:
+            continue
         _give_terminal(own_group)
         if not os.WIFSTOPPED(status):
             return status
@@ -69,11 +67,9 @@ def main(command):
         os.execvp(command[0], command)
     # Whoever hands the terminal over from behind would be stopped by it.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_BLOCK, PASSED_ON)
-    child = _start(command)
-    _pass_signals_on(child)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, PASSED_ON)
-    code = os.waitstatus_to_exitcode(_wait(child))
+    # Blocked and waited for, none can come in the moment between a look and a sleep.
+    signal.pthread_sigmask(signal.SIG_BLOCK, AWAITED)
+    code = os.waitstatus_to_exitcode(_wait(_start(command)))
     return code if code >= 0 else 128 - code
 
 

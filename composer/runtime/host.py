@@ -152,8 +152,8 @@ class Host:
         if self._leaves_at_once:
             leave_discovery_alone(os.environ)
         namespace = manager_namespace(self._system.namespace, self._system.name.value)
-        ends_process = self._options.ends_process
-        with claimed(namespace), stop_signals(self.stop, ends_process=ends_process):
+        signals = stop_signals(self.stop, self._inbox.bell, ends_process=self._options.ends_process)
+        with claimed(namespace), signals:
             self._limit_start()
             _start_ros()
             try:

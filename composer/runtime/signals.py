@@ -8,12 +8,19 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from composer.runtime.doorbell import Doorbell
+
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
-def stop_signals(stop: Callable[[str], None], *, ends_process: bool) -> Iterator[None]:
+def stop_signals(
+    stop: Callable[[str], None], bell: Doorbell, *, ends_process: bool
+) -> Iterator[None]:
     """Call ``stop(name of the signal)`` for each signal, on the main thread.
+
+    That happens between two instructions of Python. The main thread therefore sleeps only until
+    ``bell`` rings, or for a limited time.
 
     Where the process ends after this, as the signals ask for, they are ignored from then on: it is
     to say how the run was, and not to die of an impatient Ctrl-C.
@@ -29,8 +36,10 @@ def stop_signals(stop: Callable[[str], None], *, ends_process: bool) -> Iterator
         stop(signal.Signals(number).name)
 
     before = {number: signal.signal(number, handle) for number in _SIGNALS}
+    rung_before = signal.set_wakeup_fd(bell.fd, warn_on_full_buffer=False)
     try:
         yield
     finally:
+        signal.set_wakeup_fd(rung_before)
         for number, handler in before.items():
             signal.signal(number, signal.SIG_IGN if ends_process else handler)

@@ -1,0 +1,38 @@
+"""Signals that ask for the end are heard, whenever they come."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+ROUNDS = 20_000
+SENDER = """
+import os, signal
+while os.read(0, 1):
+    os.kill(os.getppid(), signal.SIGTERM)
+"""
+RECEIVER = f"""
+import os, random, subprocess, sys, time
+from composer.runtime.inbox import Inbox
+from composer.runtime.signals import stop_signals
+
+inbox = Inbox()
+sender = subprocess.Popen([sys.executable, "-c", '''{SENDER}'''], stdin=subprocess.PIPE)
+with stop_signals(inbox.ask, inbox.bell, ends_process=True):
+    for _ in range({ROUNDS}):
+        os.write(sender.stdin.fileno(), b"!")
+        until_s = time.perf_counter() + random.uniform(0.0, 100e-6)  # the signal is on its way
+        while time.perf_counter() < until_s:
+            pass
+        while not inbox.closing:
+            inbox.take()
+        print(inbox.reason)
+        inbox.reason = None
+"""
+
+
+def test_no_signal_slips_past_a_thread_that_is_about_to_sleep() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", RECEIVER], capture_output=True, text=True, timeout=60.0, check=False
+    )
+    assert (ended.stdout, ended.stderr) == ("SIGTERM\n" * ROUNDS, "")
