@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -229,6 +230,15 @@ nodes:
 """
 
 
+#: From the first time that is told; today is far behind.
+SIMULATED_NS = range(1000 * NANOSECONDS, 10**9 * NANOSECONDS)
+
+
+def stamp_ns(message: Any) -> int:
+    """Return the time in a header, or in what has a stamp as one."""
+    return int(message.stamp.sec * NANOSECONDS + message.stamp.nanosec)
+
+
 def test_stamps_are_simulated_and_the_manager_tells_the_parameter_for_nodes_without_services(
     tmp_path: Path, peer: Peer
 ) -> None:
@@ -237,17 +247,18 @@ def test_stamps_are_simulated_and_the_manager_tells_the_parameter_for_nodes_with
         logged = peer.listen(Log, "/rosout")
         told = peer.listen(DiagnosticArray, "/diagnostics")
         simulator = Simulator(peer, system)
-        simulator.tell(1000.0)
-        for tenth in range(1, 100):  # the first may come before who listens is known
-            simulator.tell(1000.0 + tenth / 10)
-            if heard and logged:
-                break
-        told_ns = {100_000_000 * tenth for tenth in range(1, 100)}
+        tenths = itertools.count(10_000)
+
+        def is_told_by_all() -> object:
+            """Let a tenth of a second pass: what was sent before all were found is lost."""
+            simulator.tell(next(tenths) / 10)
+            stamps_ns = [stamp_ns(array.header) for array in told]
+            return heard and logged and any(stamp in SIMULATED_NS for stamp in stamps_ns)
+
+        wait_until(is_told_by_all)
         for message in (*heard, *logged):
-            assert message.stamp.sec * NANOSECONDS + message.stamp.nanosec - 10**12 in told_ns
-        assert heard
-        assert logged
-        wait_until(lambda: any(message.header.stamp.sec == 1000 for message in told))
+            assert stamp_ns(message) in SIMULATED_NS
+            assert stamp_ns(message) % (NANOSECONDS // 10) == 0
         names = ["/a.use_sim_time", "/wall.use_sim_time"]
         values = peer.call(
             GetParameters, "/stamped/manager/get_parameters", GetParameters.Request(names=names)
