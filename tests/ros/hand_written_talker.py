@@ -66,13 +66,15 @@ class Talker(Node):
         return GoalResponse.REJECT if goal.max_velocity == 0.0 else GoalResponse.ACCEPT
 
     def execute(self, handle: Any) -> Navigate.Result:
+        while not self.count_subscribers("navigate/_action/feedback"):
+            time.sleep(0.005)  # a goal may be there before it is known who listens
         steps = 3 if handle.request.max_velocity > 0.0 else 100_000
         for step in range(steps):
             if handle.is_cancel_requested:
                 handle.canceled()
                 return Navigate.Result(message="stopped")
-            handle.publish_feedback(Navigate.Feedback(progress_percent=float(step)))
             time.sleep(0.05)
+            handle.publish_feedback(Navigate.Feedback(progress_percent=float(step)))
         handle.succeed()
         return Navigate.Result(success=True, message="there", distance_traveled=2.5)
 

@@ -62,6 +62,8 @@ def test_a_declared_action_gives_feedback_and_a_result(
 ) -> None:
     with running(SERVER.replace("KIND", kind), tmp_path) as system:
         navigator = Navigator(peer)
+        server = system.host._crew.nodes["server"]._core.node
+        wait_until(lambda: server.count_subscribers("/navigate/_action/feedback"), "who listens")
         status, result = navigator.result(navigator.send(3.0))
         assert system.log() == ["goal to 3.0"]
     assert status == GoalStatus.STATUS_SUCCEEDED
