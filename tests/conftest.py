@@ -14,11 +14,16 @@ from pathlib import Path
 from typing import TextIO
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 TESTS_WITH_ROS = Path(__file__).parent / "ros"
 NO_ROS = "rclpy cannot be imported"
 # Domain 0 is where people's robots are; above 101 the ports meet Linux' ephemeral ones.
 DOMAIN_IDS = range(1, 102)
+
+# How long an example takes says how busy the machine is, and what it imports for the first time.
+settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("unhurried")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
