@@ -106,6 +106,11 @@ class RunningSystem:
             wait_until(made.done, f"{node} {goal}")
             assert running_node.state == goal
 
+    def wait_for_listener(self, node: str, publisher: str) -> None:
+        """Wait until a publisher knows who listens outside: what it sends before is lost."""
+        port: Any = self.host._crew.nodes[node]._assembly.publishers[publisher]
+        wait_until(port._publisher.get_subscription_count, f"a listener to {publisher} of {node}")
+
     def log(self) -> list[str]:
         return [event.message for event in self.told(Logged)]
 

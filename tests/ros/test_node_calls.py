@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from std_srvs.srv import Trigger
 
-from tests.ros.system_bench import Peer, running, wait_until
+from composer.model import PrimaryState
+from tests.ros.system_bench import Peer, RunningSystem, running, wait_until
 
 ASKER = """
 system: asker
@@ -30,11 +31,20 @@ def declared(on_failure: bool) -> str:
     return ASKER.replace("    timers:", (TOLD if on_failure else "") + "    timers:")
 
 
+def activate_once_the_server_is_known(system: RunningSystem) -> None:
+    """Find the server first: that may take longer than the only call may."""
+    client = system.host._crew.nodes["asker"]._assembly.clients["trigger"]
+    wait_until(client._has_server, "the server")
+    system.change("asker", "activate")
+
+
 def test_a_declared_call_is_answered(tmp_path: Path, peer: Peer) -> None:
     peer.node.create_service(
         Trigger, "/trigger", lambda _, response: Trigger.Response(message="yes")
     )
-    with running(ASKER, tmp_path) as system:
+    text = ASKER.replace("timeout_ms: 200", "timeout_ms: 20000")
+    with running(text, tmp_path, autostart=PrimaryState.INACTIVE) as system:
+        activate_once_the_server_is_known(system)
         system.wait_for_log("yes, number 0")
         assert system.summary("/asker").calls == 1
 
@@ -61,7 +71,9 @@ def test_a_server_that_does_not_answer_is_told_of(tmp_path: Path, peer: Peer) ->
         return response
 
     peer.node.create_service(Trigger, "/trigger", answer_late)
-    with running(declared(on_failure=True), tmp_path) as system:
+    text = declared(on_failure=True)
+    with running(text, tmp_path, autostart=PrimaryState.INACTIVE) as system:
+        activate_once_the_server_is_known(system)
         line = system.wait_for_log("failed")
         held.set()
     assert line == "failed: service '/trigger' did not answer within 200 ms"
@@ -113,9 +125,10 @@ def test_calls_and_sleeps_end_when_the_node_leaves_active(
     with running(CALLER.replace("KIND", kind), tmp_path, caller=MODULE) as system:
         system.wait_for_log("asking")
         system.wait_for_log("resting")
+        core = system.host._crew.nodes["caller"]._core
+        wait_until(lambda: len(core.gate.pending._futures) == 2, "both wait")
         assert peer.change("/caller", "deactivate")
         assert peer.state("/caller") == "inactive"
-        core = system.host._crew.nodes["caller"]._core
         wait_until(lambda: not core.tasks, "nothing runs any more")
         counted = system.summary("/caller")
     assert "cancelled: /caller is deactivating, not active" in system.log()

@@ -19,7 +19,7 @@ nodes:
     parameters:
       rate_hz: {type: double, default: 0.02, unit: Hz, description: Calls a second.}
     publishers:
-      output: {type: std_msgs/msg/Int64, external: true}
+      output: {type: std_msgs/msg/Int64, external: true, qos: {depth: 1000}}
     timers:
       tick: {rate_hz: "{parameters.rate_hz}", publish: {output: {data: "{count}"}}}
 """
@@ -29,7 +29,7 @@ def test_a_timer_follows_its_parameter_and_stands_when_the_node_is_not_active(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(TIMED, tmp_path) as system:
-        heard = peer.listen(Int64, "/output")
+        heard = peer.listen(Int64, "/output", 1000)
         assert peer.set_parameter("/timed", "rate_hz", 100.0) == ""
         wait_until(lambda: len(heard) >= 10)
         assert peer.change("/timed", "deactivate")
@@ -63,12 +63,12 @@ def test_a_call_that_is_due_while_the_one_before_awaits_is_left_out(tmp_path: Pa
     class Late(Behavior):
         async def on_tick(self):
             self.log.info("begin")
-            await self.clock.sleep(0.2)
+            await self.clock.sleep(60.0)
     """
     with running(text, tmp_path, late=module) as system:
         statistics = system.host._crew.nodes["late"].statistics
         wait_until(lambda: statistics.skipped > 10)
-        assert len(system.log()) <= 2
+        assert system.log() == ["begin"]
 
 
 PARAMETERS = """

@@ -28,6 +28,7 @@ nodes:
 def test_a_reaction_publishes_and_logs_what_it_works_out(tmp_path: Path, peer: Peer) -> None:
     with running(RELAY, tmp_path) as system:
         heard = peer.listen(Int64, "/output")
+        system.wait_for_listener("relay", "output")
         peer.publisher(Int64, "/input").publish(Int64(data=41))
         wait_until(lambda: heard)
     assert heard[0].data == 42
@@ -37,6 +38,7 @@ def test_a_reaction_publishes_and_logs_what_it_works_out(tmp_path: Path, peer: P
 def test_nothing_gets_through_a_node_that_is_not_active(tmp_path: Path, peer: Peer) -> None:
     with running(RELAY, tmp_path) as system:
         heard = peer.listen(Int64, "/output")
+        system.wait_for_listener("relay", "output")
         source = peer.publisher(Int64, "/input")
         assert peer.change("/relay", "deactivate")
         for number in range(5):
@@ -67,7 +69,7 @@ def test_what_is_latched_while_inactive_comes_with_the_activation(
         source.publish(String(data="old"))
         source.publish(String(data="ready"))
         port = system.host._crew.nodes["listener"]._assembly.subscriptions["mode"]
-        wait_until(lambda: [message.data for _, message in port._latched or ()] == ["ready"])
+        wait_until(lambda: [message.data for _, message in tuple(port._latched)] == ["ready"])
         assert system.log() == []
         assert peer.change("/listener", "activate")
         system.wait_for_log("ready")
@@ -104,8 +106,7 @@ def test_a_node_has_a_first_and_a_last_word_but_none_when_it_is_not_active(
     with running(TALKATIVE, tmp_path, talkative=module) as system:
         assert peer.change("/talkative", "deactivate")
         heard = peer.listen(String, "/output")
-        publisher = system.host._crew.nodes["talkative"]._assembly.publishers["output"]._publisher
-        wait_until(lambda: publisher.get_subscription_count() == 1)
+        system.wait_for_listener("talkative", "output")
         assert peer.change("/talkative", "activate")
         assert peer.change("/talkative", "deactivate")
         assert peer.change("/talkative", "cleanup")
