@@ -65,9 +65,9 @@ class SimulatedTime:
             self._loop.add_subscription(self._subscription, self._take)
         elif not self._followers and self._subscription is not None:
             self._loop.remove(self._subscription)
+            self._now = UNKNOWN  # what was heard long ago is no time to start from
             self._node.destroy_subscription(self._subscription)
             self._subscription = None
-            self._now = UNKNOWN  # what was heard long ago is no time to start from
 
     def _take(self, message: ClockMessage) -> None:
         now = Time.from_msg(message.clock)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from rclpy.duration import Duration
+from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
@@ -24,6 +25,15 @@ def counts(system: RunningSystem, node: str) -> dict[str, int]:
 
 def lines(system: RunningSystem, part: str) -> list[str]:
     return [line for line in system.log() if part in line]
+
+
+def publishers(node: Node, topic: str) -> list[str]:
+    """Return the names of those who publish, as a node knows them."""
+    return [end.node_name for end in node.get_publishers_info_by_topic(topic)]
+
+
+def told(system: RunningSystem, pattern: str) -> bool:
+    return any(re.fullmatch(pattern, line) for line in system.log())
 
 
 TIMED = """
@@ -50,14 +60,15 @@ def test_a_missed_deadline_within_the_process_is_told_at_once_and_then_summed_up
     with running(TIMED.format(kind=kind, deadline_ms=200), tmp_path) as system:
         wait_until(lambda: len(lines(system, "heard")) > 10)
         assert peer.set_parameter("/talker", "period_ms", 1e6) == ""
-        wait_until(lambda: len(lines(system, OF_PUBLISHER)) >= 2)
-        wait_until(lambda: len(lines(system, OF_SUBSCRIPTION)) >= 2)
-        summed_up = re.escape(OF_PUBLISHER) + r" \(\d+ times more within 1 s\)"
-        assert re.fullmatch(summed_up, lines(system, OF_PUBLISHER)[1])
-        from_talker = re.escape(OF_SUBSCRIPTION) + r"; it is published by /talker.*"
-        assert re.fullmatch(from_talker, lines(system, OF_SUBSCRIPTION)[0])
-        assert counts(system, "talker")["deadline_missed"] > 2
-        assert counts(system, "listener")["deadline_missed"] > 2
+        # A busy machine may have made the talker miss one before: that one is told alone.
+        more = r" \(\d+ times more within 1 s\)"
+        of_talker = "; it is published by /talker"
+        wait_until(lambda: told(system, re.escape(OF_PUBLISHER) + more))
+        wait_until(lambda: told(system, re.escape(OF_SUBSCRIPTION + of_talker) + more))
+        assert lines(system, OF_PUBLISHER)[0] == OF_PUBLISHER
+        assert lines(system, OF_SUBSCRIPTION)[0] == OF_SUBSCRIPTION + of_talker
+        for node in ("talker", "listener"):
+            wait_until(lambda node=node: counts(system, node)["deadline_missed"] > 2)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -87,7 +98,7 @@ def test_who_keeps_a_deadline_misses_none(tmp_path: Path) -> None:
     with running(TIMED.format(kind="events", deadline_ms=60_000), tmp_path) as system:
         over_s = time.monotonic() + 1.0
         wait_until(lambda: time.monotonic() > over_s, "a second of beats")
-        assert lines(system, "heard")
+        wait_until(lambda: lines(system, "heard"))
         assert counts(system, "talker") == counts(system, "listener") == {}
 
 
@@ -108,6 +119,8 @@ def test_a_deadline_that_somebody_outside_misses_is_told_with_his_name(
     with running(LISTENER, tmp_path) as system:
         qos = QoSProfile(depth=10, deadline=Duration(nanoseconds=200_000_000))
         publisher = peer.publisher(String, "/beat", qos)
+        node = system.host._crew.nodes["listener"]._core.node
+        wait_until(lambda: publishers(node, "/beat") == [peer.node.get_name()], "its name")
         publisher.publish(String())
         system.wait_for_log("heard")
         name = peer.node.get_fully_qualified_name()

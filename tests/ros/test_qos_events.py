@@ -51,6 +51,8 @@ def test_outsiders_with_another_qos_are_named_with_the_policy(
 ) -> None:
     with running(ENDS.format(kind=kind), tmp_path) as system:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        known = system.host._crew.nodes["a"]._core.node.get_node_names
+        wait_until(lambda: peer.node.get_name() in known(), "the peer's name")
         peer.node.create_publisher(String, "/input", BEST_EFFORT)
         peer.node.create_subscription(String, "/output", lambda _: None, latched)
         name = peer.node.get_fully_qualified_name()
@@ -113,14 +115,19 @@ def test_a_lifespan_holds_between_nodes_of_the_process(
         system.change("listener", *away)
         say.publish(String(data="old"))
         system.wait_for_log("said old")
-        over_s = time.monotonic() + 0.6
+        over_s = time.monotonic() + 1.0
         wait_until(lambda: time.monotonic() > over_s, "the end of a short life")
         back = ("configure", "activate") if "cleanup" in away else ("activate",)
         system.change("listener", *back)
         wait_until(lambda: heard is not None or lines(system, "heard old"))
-        say.publish(String(data="new"))
-        system.wait_for_log("heard new")
-        assert lines(system, "heard") == (heard or ["heard old", "heard new"])
+
+        def new_is_heard() -> bool:
+            """Say it again until then: on a busy machine a short life ends on the way."""
+            say.publish(String(data="new"))
+            return "heard new" in system.log()
+
+        wait_until(new_is_heard)
+        assert [*dict.fromkeys(lines(system, "heard"))] == (heard or ["heard old", "heard new"])
 
 
 def test_ps_tells_the_counts(tmp_path: Path, peer: Peer) -> None:
@@ -130,11 +137,11 @@ def test_ps_tells_the_counts(tmp_path: Path, peer: Peer) -> None:
         system.wait_for_log("subscription 'input'")
         wait_until(lambda: "incompatible=1" in qos_events_of(told))
         listed = subprocess.run(
-            [sys.executable, "-m", "composer", "ps", "ends", "--json"],
+            [sys.executable, "-m", "composer", "ps", "ends", "--json", "--timeout", "20"],
             check=True,
             capture_output=True,
             text=True,
-            timeout=30,
+            timeout=50,
         ).stdout
     nodes = json.loads(listed)["systems"][0]["nodes"]
     assert [node["qos_events"] for node in nodes] == [{"incompatible": 1}]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import pytest
@@ -37,6 +38,18 @@ def ticks(system: RunningSystem) -> list[float]:
     return [float(line.removeprefix("at ")) for line in system.log() if line.startswith("at ")]
 
 
+def wait_for_ticks(system: RunningSystem, *times_s: float) -> None:
+    """Wait until the timer was called at these times and waits for the next one."""
+    wait_until(lambda: ticks(system) == list(times_s), f"calls at {times_s}")
+    wait_for_timer(system)
+
+
+def wait_for_timer(system: RunningSystem) -> None:
+    """Wait until the timer in simulated time waits: what jumps before that it does not see."""
+    clock = system.host._crew.nodes["a"]._core.clock
+    wait_until(lambda: clock._calls._waiting, "a timer that waits")
+
+
 def let_real_time_pass(system: RunningSystem) -> None:
     """Wait until the timer in real time was called some times more."""
     before = system.log().count("real")
@@ -55,17 +68,17 @@ def test_timers_stand_start_pause_and_jump_with_the_clock(
         let_real_time_pass(system)
         assert ticks(system) == []
         simulator.tell(1000.05, 1000.1)
-        wait_until(lambda: ticks(system) == [1000.1])
+        wait_for_ticks(system, 1000.1)
         let_real_time_pass(system)  # a pause
         simulator.tell(1100.1)  # far ahead
-        wait_until(lambda: ticks(system) == [1000.1, 1100.1])
+        wait_for_ticks(system, 1000.1, 1100.1)
         let_real_time_pass(system)
         simulator.tell(1100.15, 1100.2)
-        wait_until(lambda: ticks(system) == [1000.1, 1100.1, 1100.2])
+        wait_for_ticks(system, 1000.1, 1100.1, 1100.2)
         simulator.tell(7.0, 7.05)  # back
         let_real_time_pass(system)
         simulator.tell(7.1)
-        wait_until(lambda: ticks(system) == [1000.1, 1100.1, 1100.2, 7.1])
+        wait_for_ticks(system, 1000.1, 1100.1, 1100.2, 7.1)
         let_real_time_pass(system)
         assert len(ticks(system)) == 4
         assert system.told(Fault) == []
@@ -81,11 +94,11 @@ def test_timers_are_as_quick_as_the_clock(
         with simulator.runs(1_700_000_000.0, factor):
             wait_until(lambda: len(ticks(system)) >= 11)
         found = ticks(system)
-    took_s = found[10] - found[0]
-    assert took_s >= 0.9  # ten periods, never less; each call is at most a step of the clock late
-    assert took_s <= 1.0 + 1.0 * factor  # a second for a busy machine
-    for early, late in itertools.pairwise(found):
-        assert early < late
+    # Whatever the first call is late, the next ones are due at different multiples of the period.
+    assert found[10] - found[0] >= 0.899
+    gaps_s = [late - early for early, late in itertools.pairwise(found)]
+    assert min(gaps_s) > 0.0
+    assert median(gaps_s) <= 0.1 + 0.08 * factor  # 80 ms for a busy machine, half of the time
 
 
 SLEEPER = """
@@ -129,6 +142,7 @@ def test_a_coroutine_sleeps_in_simulated_time(tmp_path: Path, peer: Peer, kind: 
         system.wait_for_log("awake 55.0")
         go.publish(String())
         system.wait_for_log("asleep 55.0")
+        let_real_time_pass(system)  # until he is
         simulator.tell(10.0, 14.0)  # nobody sleeps until it is 60 again
         let_real_time_pass(system)
         assert system.log_text().count("awake") == 1
@@ -141,6 +155,7 @@ def test_a_node_that_is_deactivated_waits_no_more(tmp_path: Path, peer: Peer, ki
     with running(SLEEPING.format(kind=kind), tmp_path, sleeper=SLEEPER) as system:
         peer.publisher(String, "/go").publish(String())  # before there is any time at all
         system.wait_for_log("asleep 0.0")
+        let_real_time_pass(system)
         simulator = Simulator(peer, system)
         simulator.tell(50.0)
         assert peer.change("/a", "deactivate")
@@ -161,12 +176,15 @@ def test_the_parameter_switches_a_running_node(tmp_path: Path, peer: Peer, kind:
         wait_until(lambda: len(ticks(system)) >= 3, "calls in real time")
         assert min(ticks(system)) > 1e9
         assert peer.set_parameter("/a", "use_sim_time", True) == ""
+        wait_for_timer(system)
         simulator.tell(30.0)  # it was 20 for the others all the time
         wait_until(lambda: ticks(system)[-1] == 30.0)
+        wait_for_timer(system)
         before = len(ticks(system))
         let_real_time_pass(system)
         simulator.tell(30.1)
         wait_until(lambda: ticks(system)[before:] == [30.1])
+        wait_for_timer(system)
         assert "bool" in peer.set_parameter("/a", "use_sim_time", "yes").lower()
         simulator.tell(30.2)
         wait_until(lambda: ticks(system)[before:] == [30.1, 30.2])
@@ -288,11 +306,11 @@ system: watched
 nodes:
   a:
     parameters: {use_sim_time: true, period_ms: 20.0}
-    lifecycle: {watch: {topic_silence_ms: 100}}
+    lifecycle: {watch: {topic_silence_ms: 500}}
     publishers: {output: {type: std_msgs/msg/Header, external: true}}
     timers:
       beat: {period_ms: "{parameters.period_ms}", publish: {output: {}}}
-      real: {period_ms: 50, clock: steady, log: "real"}
+      real: {period_ms: 125, clock: steady, log: "real"}
 """
 
 
@@ -309,7 +327,7 @@ def test_silence_counts_while_the_simulation_goes_on(tmp_path: Path, peer: Peer)
         assert system.states("/a") == ["/a inactive", "/a active"]
         assert peer.set_parameter("/a", "period_ms", 1e6) == ""
         with simulator.runs(100.0, 1.0):
-            wait_until(lambda: system.states()[-1] == "/a unconfigured", "the node has failed")
+            wait_until(lambda: "/a unconfigured" in system.states(), "the node has failed")
 
 
 def test_a_node_that_holds_up_its_loop_holds_up_nobody_s_time(tmp_path: Path, peer: Peer) -> None:
