@@ -117,13 +117,13 @@ def scope() -> dict[str, Any]:
 
 def evaluate(source: str) -> object:
     """Evaluate, and let nothing but the two documented errors be caught."""
-    started = time.perf_counter()
+    started = time.process_time()
     try:
         return compile_expression(source).evaluate(scope())
     except (ExpressionError, EvaluationError) as error:
         return error
     finally:
-        assert time.perf_counter() - started < 0.5
+        assert time.process_time() - started < 0.5
 
 
 @pytest.mark.parametrize("source", ESCAPES)

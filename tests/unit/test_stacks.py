@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import gc
+import sys
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -24,6 +26,8 @@ def waiting() -> Iterator[int]:
     thread.start()
     is_there.wait()
     assert thread.ident is not None
+    while sys._current_frames()[thread.ident].f_code.co_name != "wait":
+        time.sleep(0.001)  # it is there, but on its way still
     yield thread.ident
     may_go.set()
     thread.join()
