@@ -47,6 +47,17 @@ def call_service(
     return session.call(service, name, message, deadline)
 
 
+class _Client(ActionClient):
+    """Takes all feedback that is there before a result: with that rclpy drops what is left."""
+
+    def take_data(self) -> Any:
+        """Take what has come; the result stays where it is while feedback comes."""
+        self._is_result_response_ready = (
+            self._is_result_response_ready and not self._is_feedback_ready
+        )
+        return super().take_data()
+
+
 class Goal:
     """A goal that an action server has taken."""
 
@@ -110,7 +121,7 @@ def sent_goal(session: Session, deadline: Deadline, sending: Sending) -> Iterato
     name = sending.name
     action = class_of(sending.type_name)
     message = compile_content(sending.goal, action.Goal, "the goal")({})
-    client = ActionClient(session.node, action, name)
+    client = _Client(session.node, action, name)
     try:
         ready = session.wait_for(
             lambda: client.server_is_ready() or sending.stop() or None, deadline
