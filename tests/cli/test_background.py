@@ -15,6 +15,9 @@ def test_a_process_that_says_nothing_is_killed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+    # Read by Python at its start: the process hangs, however late somebody looks at it.
+    (tmp_path / "sitecustomize.py").write_text("import time\ntime.sleep(60.0)\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with pytest.raises(Failure, match=r"did not come up within 0\.01 s and was killed") as why:
         run_in_background("minimal", ["minimal"], 0.01)
     (log,) = tmp_path.glob("minimal-*.log")

@@ -8,9 +8,10 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 import rclpy
@@ -60,13 +61,25 @@ def finished(process: subprocess.Popen[str]) -> str:
     return output
 
 
-def listed(*arguments: str) -> str:
-    """Ask again while nothing is found: on a busy machine discovery outlasts a command."""
+def listed(parts: tuple[str, ...], *arguments: str) -> str:
+    """Ask again until all parts are found: on a busy machine discovery outlasts a command."""
+    return asked_until(lambda text: all(part in text for part in parts), *arguments)
+
+
+def measured(fits: Callable[[dict[str, Any]], bool], *arguments: str) -> dict[str, Any]:
+    """Measure again until it fits: what else a machine does changes rates and ages for a while."""
+    text = asked_until(lambda text: fits(json.loads(text.splitlines()[-1])), *arguments)
+    found: dict[str, Any] = json.loads(text.splitlines()[-1])
+    return found
+
+
+def asked_until(fits: Callable[[str], bool], *arguments: str) -> str:
+    """Return the first answer that fits, or the last one there is patience for."""
     until_s = time.monotonic() + PATIENCE_S
     while True:
-        found = out(*arguments)
-        if found.strip() not in ("", "0", "[]") or time.monotonic() > until_s:
-            return found
+        text = out(*arguments)
+        if fits(text) or time.monotonic() > until_s:
+            return text
 
 
 def error(*arguments: str) -> str:
@@ -76,33 +89,37 @@ def error(*arguments: str) -> str:
 
 
 def test_nodes() -> None:
-    assert listed("node", "list") == "/lab/talker\n"
-    assert listed("node", "list", "--count") == "1\n"
-    assert json.loads(listed("node", "list", "--json")) == ["/lab/talker"]
+    assert listed(("/lab/talker",), "node", "list") == "/lab/talker\n"
+    assert listed(("1",), "node", "list", "--count") == "1\n"
+    assert json.loads(listed(("/lab/talker",), "node", "list", "--json")) == ["/lab/talker"]
 
 
 def test_a_node_tells_what_it_offers_and_uses() -> None:
-    found = json.loads(out("node", "info", "talker", "--json"))
+    names = ("/lab/count", "/lab/in", "/lab/add", "/lab/navigate")
+    found = json.loads(listed(names, "node", "info", "talker", "--json"))
     assert ["/lab/count", ["std_msgs/msg/Int32"]] in found["publishers"]
     assert found["subscriptions"] == [["/lab/in", ["std_msgs/msg/String"]]]
     assert ["/lab/add", ["std_srvs/srv/SetBool"]] in found["services"]
     assert found["action_servers"] == [["/lab/navigate", ["composer_interfaces/action/Navigate"]]]
     assert not any("_action" in name for name, _ in found["services"])
-    text = out("node", "info", "/lab/talker")
+    text = listed(names, "node", "info", "/lab/talker")
     assert "  Action Servers:\n    /lab/navigate:  composer_interfaces/action/Navigate\n" in text
 
 
 def test_topics() -> None:
-    names = listed("topic", "list").split()
-    assert {"/lab/count", "/lab/text", "/lab/in"} <= set(names)
+    expected = ("/lab/count", "/lab/text", "/lab/in")
+    names = listed(expected, "topic", "list").split()
+    assert set(expected) <= set(names)
     assert not any("_action" in name for name in names)
-    assert "/lab/navigate/_action/feedback" in listed("topic", "list", "--include-hidden")
-    types = {item["name"]: item["types"] for item in json.loads(listed("topic", "list", "--json"))}
+    hidden = ("/lab/navigate/_action/feedback",)
+    assert hidden[0] in listed(hidden, "topic", "list", "--include-hidden")
+    found = json.loads(listed(expected, "topic", "list", "--json"))
+    types = {item["name"]: item["types"] for item in found}
     assert types["/lab/count"] == ["std_msgs/msg/Int32"]
 
 
 def test_a_topic_tells_who_is_at_its_ends_with_which_qos() -> None:
-    found = json.loads(out("topic", "info", "/lab/text", "--json"))
+    found = json.loads(listed(("/lab/talker",), "topic", "info", "/lab/text", "--json"))
     assert found["types"] == ["std_msgs/msg/String"]
     assert found["subscriptions"] == []
     assert found["publishers"] == [
@@ -116,8 +133,9 @@ def test_a_topic_tells_who_is_at_its_ends_with_which_qos() -> None:
             },
         }
     ]
-    assert "Publisher count: 1\n" in out("topic", "info", "lab/text")
-    assert "durability: transient_local" in out("topic", "info", "-v", "/lab/text")
+    one, kept = "Publisher count: 1\n", "durability: transient_local"
+    assert one in listed((one,), "topic", "info", "lab/text")
+    assert kept in listed((kept,), "topic", "info", "-v", "/lab/text")
 
 
 def test_echo_gets_what_a_best_effort_publisher_sends() -> None:
@@ -152,7 +170,7 @@ def test_echo_says_what_is_wrong_with_names_and_fields() -> None:
 def test_echo_ends_quietly_at_ctrl_c() -> None:
     process = start("topic", "echo", "/lab/count")
     assert process.stdout is not None
-    assert process.stdout.readline().startswith("data: ")
+    assert any(line.startswith("data: ") for line in process.stdout)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
@@ -161,19 +179,39 @@ def test_echo_ends_quietly_at_ctrl_c() -> None:
 
 def test_echo_and_hz_agree_with_a_hand_written_subscriber_to_one_percent() -> None:
     with hand_written_subscriber() as heard:
-        # All three look at the same messages, whatever the machine does meanwhile to their rate.
-        first = heard[-1][1] + 150
-        since = ("--filter", f"message.data >= {first}", "--count", "250")
-        by_echo = start("topic", "echo", "/lab/count", *since, "--field", "data", "--csv")
-        by_hz = start("topic", "hz", "/lab/count", *since, "--json")
-        rate = json.loads(finished(by_hz).splitlines()[-1])
-        values = [int(line) for line in finished(by_echo).splitlines()]
-    seen_s = {value: at_s for at_s, value in heard if first <= value <= values[-1]}
+        # Who starts too late for the first message, or is kept from a processor at the first or
+        # the last one, looks at something else than the others: once more, with more time.
+        for lead in (150, 300, 600):
+            values, seen_s, rate = side_by_side(heard, lead)
+            by_hand_hz = (len(seen_s) - 1) / (max(seen_s.values()) - min(seen_s.values()))
+            close_hz = pytest.approx(by_hand_hz, rel=0.01)
+            if len(seen_s) == len(values) and rate["average_hz"] == close_hz:
+                break
     assert len(set(values) & seen_s.keys()) == pytest.approx(len(seen_s), rel=0.01)
     assert len(values) == pytest.approx(len(seen_s), rel=0.01)
     assert rate["window"] == 249
-    by_hand_hz = (len(seen_s) - 1) / (max(seen_s.values()) - min(seen_s.values()))
-    assert rate["average_hz"] == pytest.approx(by_hand_hz, rel=0.01)
+    assert rate["average_hz"] == close_hz
+
+
+def side_by_side(
+    heard: list[tuple[float, int]], lead: int
+) -> tuple[list[int], dict[int, float], dict[str, Any]]:
+    """Let echo and hz look at the same 250 messages, which begin in ``lead`` messages.
+
+    Returns what echo printed, when each of these was heard by hand, and what hz found.
+    """
+    first = heard[-1][1] + lead
+    since = ("--filter", f"message.data >= {first}", "--count", "250")
+    by_echo = start("topic", "echo", "/lab/count", *since, "--field", "data", "--csv")
+    by_hz = start("topic", "hz", "/lab/count", *since, "--json")
+    rate = json.loads(finished(by_hz).splitlines()[-1])
+    values = [int(line) for line in finished(by_echo).splitlines()]
+    until_s = time.monotonic() + PATIENCE_S
+    while heard[-1][1] < values[-1]:
+        assert time.monotonic() < until_s
+        time.sleep(0.02)
+    seen_s = {value: at_s for at_s, value in tuple(heard) if first <= value <= values[-1]}
+    return values, seen_s, rate
 
 
 @contextmanager
@@ -214,19 +252,23 @@ def test_hz_tells_people_in_words() -> None:
 
 
 def test_bw_counts_serialized_bytes() -> None:
-    last = out("topic", "bw", "/lab/count", "--count", "50", "--json").splitlines()[-1]
-    found = json.loads(last)
+    expected = pytest.approx(8 * 50.0, rel=0.5)  # on a busy machine
+    bandwidth = ("topic", "bw", "/lab/count", "--count", "50", "--json")
+    found = measured(lambda found: found["bytes_per_s"] == expected, *bandwidth)
     assert (found["smallest"], found["largest"]) == (8, 8)  # header of 4, int32
-    assert found["bytes_per_s"] == pytest.approx(8 * 50.0, rel=0.5)  # on a busy machine
+    assert found["bytes_per_s"] == expected
 
 
 def test_measuring_looks_at_wanted_messages_only_and_does_not_wait_for_ever() -> None:
     even = ("--filter", "message.data % 2 == 0", "--count", "20", "--json")
-    last = out("topic", "hz", "/lab/count", *even).splitlines()[-1]
-    assert json.loads(last)["average_hz"] == pytest.approx(25.0, rel=0.3)  # of 50 on a busy machine
-    # Of a best-effort publisher a reliable subscription hears nothing.
-    silent = ("topic", "bw", "/lab/count", "--qos-reliability", "reliable", "--timeout", "2")
-    assert "nothing came over '/lab/count' for 2 s" in error(*silent)
+    expected = pytest.approx(25.0, rel=0.3)  # of 50 on a busy machine
+    rate = ("topic", "hz", "/lab/count", *even)
+    found = measured(lambda found: found["average_hz"] == expected, *rate)
+    assert found["average_hz"] == expected
+    # Of a best-effort publisher a reliable subscription hears nothing. The topic has to be found
+    # within the same time.
+    silent = ("topic", "bw", "/lab/count", "--qos-reliability", "reliable", "--timeout", "5")
+    assert "nothing came over '/lab/count' for 5 s" in error(*silent)
 
 
 def test_what_is_published_arrives() -> None:
@@ -234,8 +276,9 @@ def test_what_is_published_arrives() -> None:
     done = compose("topic", "pub", "-r", "20", "--times", "2", "--print", "2", *arguments)
     assert done.stdout == ""
     assert done.stderr == "published #2: std_msgs.msg.String(data='number 1')\n"
-    heard = out("topic", "echo", "/lab/heard", "--once", "--field", "data")
-    assert heard == "number 1\n---\n"
+    last = "number 1\n---\n"  # the talker may still be at the one before
+    echo = ("topic", "echo", "/lab/heard", "--once", "--field", "data")
+    assert listed((last,), *echo) == last
     once = ("topic", "pub", "--once", "--json", "--qos-history", "keep_all", *arguments)
     assert json.loads(out(*once)) == {"data": "number 0"}
 
@@ -251,7 +294,7 @@ def test_publishing_says_what_is_wrong() -> None:
 
 
 def test_services() -> None:
-    assert "/lab/add" in listed("service", "list").split()
+    assert "/lab/add" in listed(("/lab/add\n",), "service", "list").split()
     assert out("service", "type", "/lab/add") == "std_srvs/srv/SetBool\n"
     assert json.loads(out("service", "type", "/lab/add", "--json")) == ["std_srvs/srv/SetBool"]
     answer = {"success": True, "message": "switched"}
@@ -265,11 +308,11 @@ def test_services() -> None:
 
 
 def test_actions() -> None:
-    assert listed("action", "list", "-t").split() == [
+    assert listed(("/lab/navigate",), "action", "list", "-t").split() == [
         "/lab/navigate",
         "composer_interfaces/action/Navigate",
     ]
-    info = json.loads(out("action", "info", "/lab/navigate", "--json"))
+    info = json.loads(listed(("/lab/talker",), "action", "info", "/lab/navigate", "--json"))
     assert info["servers"] == ["/lab/talker"]
 
 
@@ -279,6 +322,20 @@ def test_a_goal_gives_feedback_and_a_result() -> None:
     assert [item["feedback"]["progress_percent"] for item in told[:-1]] == [0.0, 1.0, 2.0]
     assert told[-1]["status"] == "succeeded"
     assert told[-1]["result"]["distance_traveled"] == 2.5
+
+
+def test_feedback_that_comes_together_with_the_result_is_shown() -> None:
+    goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: 1.0}", "--feedback", "--json")
+    process = start(*goal)
+    assert process.stdout is not None
+    first = json.loads(next(line for line in process.stdout if "feedback" in line))
+    process.send_signal(signal.SIGSTOP)
+    time.sleep(0.5)  # the talker tells the rest and ends the goal
+    process.send_signal(signal.SIGCONT)
+    told = [first, *map(json.loads, process.stdout)]
+    finished(process)
+    assert [item["feedback"]["progress_percent"] for item in told[:-1]] == [0.0, 1.0, 2.0]
+    assert told[-1]["status"] == "succeeded"
 
 
 def test_a_rejected_goal_is_told() -> None:
@@ -297,7 +354,7 @@ def test_ctrl_c_cancels_a_goal() -> None:
     goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: -1}", "--feedback", "--json")
     process = start(*goal, "--timeout", "20")
     assert process.stdout is not None
-    assert "feedback" in process.stdout.readline()
+    assert any("feedback" in line for line in process.stdout)
     process.send_signal(signal.SIGINT)
     rest, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
@@ -340,9 +397,10 @@ def test_a_parameter_is_described() -> None:
 
 
 def test_parameters_of_all_nodes_are_listed_and_several_described() -> None:
-    everything = json.loads(out("param", "list", "--json"))
+    everything = json.loads(listed(("/lab/talker",), "param", "list", "--json"))
     assert {"speed", "name", "gains"} <= set(everything["/lab/talker"])
-    assert "/lab/talker:\n" in out("param", "list")
+    head = "/lab/talker:\n"
+    assert head in listed((head,), "param", "list")
     several = json.loads(out("param", "describe", "talker", "speed", "name", "--json"))
     assert [item["name"] for item in several] == ["speed", "name"]
 

