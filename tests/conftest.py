@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import fcntl
 import importlib.util
-import itertools
 import os
 import signal
 import sys
@@ -80,34 +79,36 @@ def _leave_out(config: pytest.Config, items: list[pytest.Item], marker: str) -> 
         items[:] = [item for item in items if item not in left_out]
 
 
-def _hold_domain_id(begin: int) -> tuple[int, TextIO]:
-    """Take a domain id that no other test process on this machine has, from ``begin`` on.
+def _hold_domain_id() -> tuple[int, TextIO]:
+    """Take the domain id that has been free longest, of those no other test process here has.
 
-    The lock lasts as long as the returned file is open, however the process ends.
+    So what a killed process has left on the network, or nodes that hang in one of the test
+    processes, do not meet the next modules. The lock lasts as long as the returned file is open,
+    however the process ends.
     """
     locks = Path(tempfile.gettempdir()) / f"ros2-composer-domain-ids-{os.getuid()}"
     locks.mkdir(exist_ok=True)
-    start = begin % len(DOMAIN_IDS)
-    for domain_id in (*DOMAIN_IDS[start:], *DOMAIN_IDS[:start]):
-        lock = (locks / str(domain_id)).open("w", encoding="ascii")
+
+    def used_s(domain_id: int) -> float:
+        lock = locks / str(domain_id)
+        return lock.stat().st_mtime if lock.exists() else 0.0
+
+    for domain_id in sorted(DOMAIN_IDS, key=used_s):
+        lock = (locks / str(domain_id)).open("a", encoding="ascii")
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             lock.close()
         else:
+            os.utime(lock.fileno())
             return domain_id, lock
     pytest.exit(f"all {len(DOMAIN_IDS)} domain ids are taken by other test processes", 3)
-
-
-#: Where to look for the next domain id. What a killed process left on the network, or nodes that
-#: hang in this one, do not meet the next module, or the next process.
-_next_domain_id = itertools.count(os.getpid())
 
 
 @pytest.fixture(scope="module", autouse=True)
 def ros_domain_id() -> Iterator[int]:
     """The domain id of this module, set for it and for every process it starts."""
-    domain_id, lock = _hold_domain_id(next(_next_domain_id))
+    domain_id, lock = _hold_domain_id()
     with pytest.MonkeyPatch.context() as environment, lock:
         environment.setenv("ROS_DOMAIN_ID", str(domain_id))
         environment.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
@@ -116,3 +117,4 @@ def ros_domain_id() -> Iterator[int]:
         if "AMENT_PREFIX_PATH" not in os.environ:  # the wheels do not set it, a sourced ROS does
             environment.setenv("AMENT_PREFIX_PATH", sys.prefix)
         yield domain_id
+        os.utime(lock.fileno())  # free from now on
