@@ -239,7 +239,8 @@ class _Silence:
     """How long one publisher, or all of a node's (None), have been silent.
 
     What counts from look to look is the shorter of what went by of real time and of the node's own:
-    a simulation that is slow, paused or jumps makes no fault.
+    a simulation that is slow, paused or jumps makes no fault. A look that comes late counts as two
+    at the most: what has held it up may have held up the node, too.
     """
 
     publisher: str | None
@@ -261,7 +262,8 @@ class _Silence:
             self.sent, self.silent_s = sent, 0.0
         else:
             passed_s = min(now_s - self.looked_s, own_now_s - self.looked_own_s)
-            self.silent_s += max(passed_s, 0.0)
+            most_s = 2.0 * self.limit_s / _LOOKS_PER_LIMIT
+            self.silent_s += min(max(passed_s, 0.0), most_s)
         self.looked_s, self.looked_own_s = now_s, own_now_s
         if self.silent_s <= self.limit_s:
             return None
