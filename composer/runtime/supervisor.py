@@ -266,9 +266,12 @@ class Supervisor:
                 self._board.set_error(name, text)
 
     def _force_down(self, name: str) -> None:
-        """Shut down a failed node that refuses to go any other way."""
+        """Shut down a failed node that refuses to go any other way.
+
+        One that somebody else has taken up by now does not refuse.
+        """
         node = self._crew.nodes[name]
-        if node.state in _DOWN or self._crew.is_lost(name):
+        if self._crew.settled().get(name, PrimaryState.UNCONFIGURED) is PrimaryState.UNCONFIGURED:
             return
         step = Step(1, "shutdown", name, node.full_name, "it would not go down")
         self._conductor.carry_out(Plan((step,)), _LENIENT)
