@@ -202,6 +202,15 @@ class Peer:
         wait_until(client.service_is_ready, f"service {name}")
         return client
 
+    def servers(self, name: str) -> set[bytes]:
+        """Return whose requests to a service go to, as far as the peer knows by now.
+
+        Who asks a node that is being made anew must wait for the new one: what is sent to the old
+        one is lost.
+        """
+        ends = self.node.get_subscriptions_info_by_topic(f"rq{name}Request", no_mangle=True)
+        return {bytes(end.endpoint_gid) for end in ends}
+
     def call(self, kind: Any, name: str, request: Any = None) -> Any:
         return finished(self.client(kind, name).call_async(request or kind.Request()))
 

@@ -15,7 +15,7 @@ import yaml
 from std_srvs.srv import Trigger
 
 from composer.runtime.shared_memory import SHARED_MEMORY
-from tests.ros.system_bench import PATIENCE_S, Peer, running
+from tests.ros.system_bench import PATIENCE_S, Peer, running, wait_until
 
 NODES = 24
 #: Others give up on a participant that says nothing after so long.
@@ -97,11 +97,11 @@ def test_a_state_can_be_asked_for_while_the_node_is_destroyed(tmp_path: Path) ->
         looking = threading.Thread(target=look)
         looking.start()
         outcome = system.stop()
+        wait_until(lambda: "finalized" in states, "it still looks")
         over.set()
         looking.join(PATIENCE_S)
     assert (outcome.exit_code, outcome.hung) == (0, False)
     assert {node.state for node in crew.nodes.values()} == {"finalized"}
-    assert "finalized" in states
 
 
 def shared_memory_of(pid: int) -> set[Path]:

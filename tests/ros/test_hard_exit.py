@@ -72,15 +72,23 @@ def wait_for_line(process: subprocess.Popen[str], words: str) -> None:
     raise AssertionError(f"it ended without '{words}'")
 
 
+def rest_of(process: subprocess.Popen[str]) -> str:
+    """Wait for the end; return what was said since the line that was waited for."""
+    assert process.stderr is not None
+    said = process.stderr.read()  # communicate() would leave out what has been read ahead
+    process.wait(PATIENCE_S)
+    return said
+
+
 def test_a_start_that_hangs_in_the_middleware_ends(hanging_rcl: Path) -> None:
     hanging = {"LD_PRELOAD": str(hanging_rcl), "HANG_IN": "rcl_node_init"}
     process = start("minimal", "--grace", 1, **hanging)
     wait_for_line(process, "hanging")
     began_s = time.monotonic()
     process.send_signal(signal.SIGTERM)
-    _, said = process.communicate(timeout=PATIENCE_S)
+    said = rest_of(process)
     assert process.returncode == 1
-    assert time.monotonic() - began_s < 7.0  # the start of a system gets 5 s at the least
+    assert time.monotonic() - began_s < 9.0  # the start of a system gets 5 s at the least
     assert "manager.py" in said, "the Python stack says where"
 
 
@@ -90,9 +98,9 @@ def test_an_end_that_hangs_in_the_middleware_ends(hanging_rcl: Path) -> None:
     wait_for_line(process, "1 of 1 nodes active")
     began_s = time.monotonic()
     process.send_signal(signal.SIGTERM)
-    _, said = process.communicate(timeout=PATIENCE_S)
+    said = rest_of(process)
     assert process.returncode == 1
-    assert time.monotonic() - began_s < 3.0
+    assert time.monotonic() - began_s < 5.0  # by default it gets 10 s
     assert "in destroy_node" in said
 
 
@@ -118,7 +126,7 @@ def test_a_thread_of_a_behaviour_does_not_hold_up_the_end(tmp_path: Path) -> Non
     process = start(path, "--for", 0.1, "--grace", 1)
     wait_for_line(process, "stopping: 0.1 s are over")
     began_s = time.monotonic()
-    _, said = process.communicate(timeout=PATIENCE_S)
+    said = rest_of(process)
     assert process.returncode == 1
-    assert time.monotonic() - began_s < 3.0
+    assert time.monotonic() - began_s < 5.0
     assert "in work_for_ever" in said

@@ -63,7 +63,9 @@ def test_what_is_called_of_ours_is_not_struck_but_the_user_who_calls_it(
         # A lookup of a publisher or a parameter changes nothing, and may be struck as well.
         where = [frame for frame in frames if frame[1] != "__getattr__"]
         assert where[-1] == ("chatter.py", "on_tick"), traceback
-        wait_until(lambda: heard[-1].data == "a last word", "it is asked to end, and may speak")
+        wait_until(
+            lambda: heard and heard[-1].data == "a last word", "it is asked to end, and may speak"
+        )
         # Its neighbour hears the next who speaks.
         said.publish(String(data="your turn"))
         wait_until(lambda: heard[-1].data == "your turn", "the relay goes on")
@@ -79,17 +81,17 @@ nodes:
     behavior: nested:Caller
     publishers: {said: {type: std_msgs/msg/String}}
     timers: {tick: {period_ms: 20}}
-    lifecycle: {watch: {callback_ms: 100}}
+    lifecycle: {watch: {callback_ms: 500}}
   relay:
     executor: own
     subscriptions: {said: {type: std_msgs/msg/String, publish: {passed: {data: "{message.data}"}}}}
     publishers: {passed: {type: std_msgs/msg/String}}
-    lifecycle: {watch: {callback_ms: 100}}
+    lifecycle: {watch: {callback_ms: 500}}
   hanging:
     executor: own
     behavior: nested:Hanging
     subscriptions: {passed: {type: std_msgs/msg/String}}
-    lifecycle: {watch: {callback_ms: 200}}
+    lifecycle: {watch: {callback_ms: 1000}}
 """
 CALLER_AND_HANGING = """
 from composer.behavior import Behavior
@@ -110,7 +112,7 @@ def test_those_who_wait_for_a_callback_that_hangs_do_not_hang_themselves(tmp_pat
     with running(NESTED, tmp_path, nested=CALLER_AND_HANGING) as system:
         wait_until(lambda: "/hanging unconfigured" in system.states(), "it is isolated")
         failed = [(event.node, event.reason) for event in system.told(NodeFailed)]
-        assert failed == [("/hanging", "on_passed took longer than 200 ms")]
+        assert failed == [("/hanging", "on_passed took longer than 1000 ms")]
         assert system.states("/caller")[-1] == "/caller active"
         assert system.states("/relay")[-1] == "/relay active"
 

@@ -68,21 +68,22 @@ def services_of(peer: Peer, name: str, namespace: str) -> set[str]:
     return {service for service, _ in found}
 
 
+def publishers_of(peer: Peer, topic: str) -> set[str]:
+    return {info.node_name for info in peer.node.get_publishers_info_by_topic(topic)}
+
+
 def test_what_is_given_up_is_never_created(system: RunningSystem, peer: Peer) -> None:
     known = peer.node.get_fully_qualified_node_names
     wait_until(lambda: {"/whole", TALKER} <= set(known()), "both nodes")
     peer.listen(Log, "/rosout")
     peer.listen(ParameterEvent, "/parameter_events")
-    wait_until(lambda: services_of(peer, "whole", "/"), "the services of a whole node")
+    expected = {"/whole/get_state", "/whole/get_type_description", "/whole/list_parameters"}
+    wait_until(lambda: expected <= services_of(peer, "whole", "/"), "the services of a whole node")
     wait_until(lambda: peer.node.count_publishers("/far/talker/transition_event"), "the topic")
     assert services_of(peer, "talker", "/far") == set()
-    assert {"/whole/get_state", "/whole/get_type_description", "/whole/list_parameters"} <= (
-        services_of(peer, "whole", "/")
-    )
     for topic in ("/rosout", "/parameter_events"):
-        publishers = {info.node_name for info in peer.node.get_publishers_info_by_topic(topic)}
-        assert "whole" in publishers
-        assert "talker" not in publishers
+        wait_until(lambda topic=topic: "whole" in publishers_of(peer, topic), f"{topic} of a node")
+        assert "talker" not in publishers_of(peer, topic)
     assert {"here I am", "so am I"} <= set(system.log())
 
 

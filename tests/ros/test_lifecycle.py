@@ -13,7 +13,7 @@ from lifecycle_msgs.msg import Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions
 from std_srvs.srv import Trigger
 
-from composer.runtime.host import HostOptions
+from composer.runtime.events import NodeFailed
 from composer.runtime.interruption import CallbackInterrupted
 from tests.ros.system_bench import Peer, finished, running, wait_until
 
@@ -206,24 +206,23 @@ def test_an_error_in_on_error_finalizes_the_node(tmp_path: Path, peer: Peer) -> 
         assert not peer.change("/subject", "configure")
         assert peer.state("/subject") == "finalized"
         assert peer.call(Trigger, "/trigger").success
+        wait_until(lambda: system.told(NodeFailed), "the failure, before the end is asked for")
     assert "on_error: RuntimeError: second, after first" in system.log_text()
     assert system.end().exit_code == 1
 
 
-SLOW = """
-from composer.behavior import Behavior
-from composer.runtime.tasks import Future
-
-class Subject(Behavior):
-    async def on_configure(self):
-        self.log.info("begin")
-        await SOMETHING
-"""
-
-
 def test_requests_in_mid_transition_are_refused(tmp_path: Path, peer: Peer) -> None:
-    module = SLOW.replace("SOMETHING", "self.clock.sleep(0.3)")
-    with running(SUBJECT, tmp_path, subject=module) as system:
+    module = """
+    from composer.behavior import Behavior
+
+    class Subject(Behavior):
+        async def on_configure(self):
+            self.log.info("begin")
+            while not self.parameters.may_end:
+                await self.clock.sleep(0.01)
+    """
+    text = SUBJECT.replace("    behav", "    parameters: {may_end: false}\n    behav")
+    with running(text, tmp_path, subject=module) as system:
         client = peer.client(ChangeState, "/subject/change_state")
         request = ChangeState.Request(transition=Transition(label="configure"))
         under_way = client.call_async(request)
@@ -231,15 +230,23 @@ def test_requests_in_mid_transition_are_refused(tmp_path: Path, peer: Peer) -> N
         assert peer.state("/subject") == "configuring"
         assert not finished(client.call_async(request)).success
         assert not under_way.done(), "refused at once"
+        assert peer.set_parameter("/subject", "may_end", True) == ""
         assert finished(under_way).success
         assert peer.state("/subject") == "inactive"
     assert "'configure' is refused: the node is configuring; legal now: none" in system.log_text()
 
 
 def test_a_handler_that_awaits_for_ever_is_an_error(tmp_path: Path, peer: Peer) -> None:
-    module = SLOW.replace("SOMETHING", "Future()")
-    options = HostOptions(transition_timeout_s=0.2)
-    with running(SUBJECT, tmp_path, options=options, subject=module) as system:
+    module = """
+    from composer.behavior import Behavior
+    from composer.runtime.tasks import Future
+
+    class Subject(Behavior):
+        async def on_configure(self):
+            await Future()
+    """
+    text = SUBJECT.replace("unconfigured}", "unconfigured, timeout_ms: 200}")
+    with running(text, tmp_path, subject=module) as system:
         assert not peer.change("/subject", "configure")
         assert peer.state("/subject") == "unconfigured"
     assert "on_configure: TransitionTimeout: not through after 0.2 s" in system.log_text()

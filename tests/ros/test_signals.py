@@ -7,6 +7,7 @@ import random
 import re
 import signal
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -58,8 +59,11 @@ def check_order(lines: list[str], state: str, case: str) -> None:
 
 def children_of(pid: int) -> str:
     """Return the processes that a process has started and that could outlive it."""
-    tasks = Path("/proc", str(pid), "task").iterdir()
-    return "".join(task.joinpath("children").read_text() for task in tasks)
+    children = ""
+    for task in Path("/proc", str(pid), "task").iterdir():
+        with suppress(FileNotFoundError, ProcessLookupError):  # a thread that has ended meanwhile
+            children += task.joinpath("children").read_text()
+    return children
 
 
 @pytest.mark.parametrize(

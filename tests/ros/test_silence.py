@@ -82,17 +82,29 @@ class Outside:
         self._orders = peer.node.create_publisher(String, "/order", 10)
         self._ask = peer.node.create_client(Trigger, "/ask")
         self._drive = ActionClient(peer.node, Navigate, "/drive")
+        self._greetings = itertools.count()
 
     def order(self, text: str) -> None:
         self._orders.publish(String(data=text))
 
     def start_all(self) -> None:
         assert self.peer.set_parameter("/subject", "fault", "") == ""
+        is_made_anew = self.peer.state("/subject") == "finalized"
+        known = self.peer.servers("/subject/get_state")
         assert self.peer.call(Trigger, "/silence/manager/startup").success
-        wait_until(lambda: self.peer.state("/subject") == "active")
-        # Of two participants in one process, one may never notice that a subscription has gone.
-        wait_until(lambda: self._orders.get_subscription_count() >= 1)
+        if is_made_anew:
+            wait_until(lambda: self.peer.servers("/subject/get_state") - known, "the new node")
+        assert self.peer.state("/subject") == "active"
+        # Of two participants in one process, one may never notice that a subscription has gone, so
+        # that one is there says nothing: heard is heard.
+        greeting = f"greeting {next(self._greetings)}"
+        wait_until(lambda: self._is_heard(greeting), "an order is heard")
+        wait_until(self._ask.service_is_ready)
         wait_until(self._drive.server_is_ready)
+
+    def _is_heard(self, text: str) -> bool:
+        self.order(text)
+        return f"got {text}" in self.system.log_text()
 
     def goal(self) -> Any:
         return finished(self.peer.run(lambda: self._drive.send_goal_async(Navigate.Goal())))

@@ -53,10 +53,9 @@ class Sensor(Behavior):
         if fault == "raise":
             raise ValueError("bad data")
         if fault == "loop":
-            while True:
-                time.sleep(0.001)
+            while True: time.sleep(0.001)  # one line, wherever it is met
         if fault == "block":
-            time.sleep(2.5)
+            time.sleep(4.0)
         if "silent" not in fault:
             self.publishers.scan.publish(self.publishers.scan.message_type(data=str(self.life)))
 """
@@ -167,7 +166,8 @@ def test_a_node_that_fails_is_isolated_and_the_others_go_on(
             assert not peer.change("/sensor", "deactivate")
         wait_until(lambda: peer.state("/motor") == "inactive", "what needs it stands still")
         wait_until(lambda: peer.state("/sensor") == "unconfigured", "it is down")
-        assert peer.state("/planner") == "inactive"
+        # Where it has gone down by itself, that comes before what it needs.
+        wait_until(lambda: peer.state("/planner") == "inactive", "so does this")
         seen = len(images)
         wait_until(lambda: len(images) > seen, "the camera goes on")
         failed = system.told(NodeFailed)[0]

@@ -92,7 +92,7 @@ class RunningSystem:
         """Leave nothing running; what is killed would haunt the ROS graph until its lease ends."""
         self.process.send_signal(signal.SIGINT)
         try:
-            self.process.wait(timeout=5.0)
+            self.process.wait(timeout=PATIENCE_S)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
