@@ -172,11 +172,16 @@ class Crew:
         for node in self.nodes.values():
             node.keep_entities()
 
-    def stop_loops(self) -> None:
-        """End the threads of the nodes. What cannot be ended is in ``hung`` then."""
-        within_s = _LOOP_ENDS_WITHIN_S + _NODE_IS_LET_GO_WITHIN_S * len(self.nodes)
+    def stop_loops(self, end_s: float) -> None:
+        """End the threads of the nodes. What cannot be ended is in ``hung`` then.
+
+        They have until ``time.monotonic()`` says ``end_s``: a thread that a busy machine lets wait
+        does not hang. What is known to hang, and what is late, gets a moment.
+        """
+        moment_s = _LOOP_ENDS_WITHIN_S + _NODE_IS_LET_GO_WITHIN_S * len(self.nodes)
         for name, loop in self.loops.items():
-            if not loop.stop(within_s):
+            left_s = 0.0 if name in self.hung else end_s - time.monotonic()
+            if not loop.stop(max(moment_s, left_s)):
                 self.hung.add(name)
 
     def destroy(self, end_s: float) -> bool:

@@ -313,7 +313,7 @@ class Host:
         end_s = self._end_s
         if self._inbox.hurry:
             end_s = min(end_s, time.monotonic() + _HURRY_S)
-        self._crew.stop_loops()
+        self._crew.stop_loops(end_s)
         self._remains = not self._crew.destroy(end_s)
         self._failed = self._failed or bool(self._crew.hung)
         manager.retire(linger=bool(self._farewells))
