@@ -9,6 +9,7 @@ import time
 from contextlib import suppress
 
 _MILLISECONDS = 1000
+_LONGEST_MS = 2**31 - 1  # more cannot be slept at once: 24 days
 _MANY = 65536
 
 
@@ -33,11 +34,10 @@ class Doorbell:
 
     def wait(self, until_s: float | None) -> bool:
         """Sleep until it rings; false when ``time.monotonic()`` reached ``until_s`` before."""
-        left_ms = None
-        if until_s is not None and until_s < math.inf:
-            left_ms = math.ceil(max(0.0, until_s - time.monotonic()) * _MILLISECONDS)
-        if not self._poll.poll(left_ms):
-            return False
+        end_s = math.inf if until_s is None else until_s
+        while not self._poll.poll(_milliseconds_until(end_s)):
+            if time.monotonic() >= end_s:
+                return False
         os.read(self._ear, _MANY)
         return True
 
@@ -45,3 +45,8 @@ class Doorbell:
         # Not sooner: a late ring must not be written to what is somebody else's by now.
         os.close(self._ear)
         os.close(self.fd)
+
+
+def _milliseconds_until(end_s: float) -> int:
+    left_ms = max(0.0, end_s - time.monotonic()) * _MILLISECONDS
+    return math.ceil(min(left_ms, _LONGEST_MS))

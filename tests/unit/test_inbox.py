@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 
@@ -56,3 +57,11 @@ def test_a_request_to_stop_ends_what_may_be_stopped_and_a_second_one_hurries(
     began_s = time.monotonic()
     assert not inbox.wait(lambda: False, began_s + 60.0, stoppable=False)
     assert time.monotonic() - began_s < 10.0
+
+
+@pytest.mark.parametrize("left_s", [1e9, math.inf])
+def test_an_end_may_be_years_away(left_s: float) -> None:
+    inbox: Inbox[str] = Inbox()
+    inbox.wake()
+    assert inbox.bell.wait(time.monotonic() + left_s)
+    assert not inbox.bell.wait(time.monotonic() + 0.01)
