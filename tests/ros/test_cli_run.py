@@ -38,8 +38,11 @@ class Running:
 
     def wait_for(self, text: str) -> None:
         until_s = time.monotonic() + PATIENCE_S
-        while text not in self.log.read_text():
-            assert self.process.poll() is None, self.log.read_text()
+        while True:
+            has_ended = self.process.poll() is not None  # and has said all, if so
+            if text in self.log.read_text():
+                return
+            assert not has_ended, self.log.read_text()
             assert time.monotonic() < until_s, self.log.read_text()
             time.sleep(0.02)
 

@@ -33,8 +33,11 @@ class Running:
 
     def wait_for(self, part: str) -> None:
         until_s = time.monotonic() + PATIENCE_S
-        while part not in self.text():
-            assert self.process.poll() is None, f"ended: {self.text()}"
+        while True:
+            has_ended = self.process.poll() is not None  # and has said all, if so
+            if part in self.text():
+                return
+            assert not has_ended, f"ended: {self.text()}"
             assert time.monotonic() < until_s, f"no '{part}' in {self.text()}"
             time.sleep(0.002)
 

@@ -32,7 +32,7 @@ nodes:
 connections:
   - {topic: /burst, from: source.burst, to: sink.burst}
 chains:
-  through: {through: [source.burst, sink.last], latency_ms: 1000}
+  through: {through: [source.burst, sink.last], latency_ms: 10000}
 """
 BEHAVIORS = """
 import time
@@ -105,7 +105,7 @@ def test_compose_top_and_compose_ps(system: RunningSystem) -> None:
     )
     (chain,) = told["chains"]
     assert (chain["chain"], chain["late"]) == ("through", 0)
-    assert 0.0 < chain["mean_ms"] <= chain["longest_ms"] < 1000.0
+    assert 0.0 < chain["mean_ms"] <= chain["longest_ms"] < 10_000.0
 
 
 def test_diagnostics(system: RunningSystem, peer: Peer) -> None:
@@ -124,10 +124,11 @@ def test_diagnostics(system: RunningSystem, peer: Peer) -> None:
     work = told()["timed: /worker timer 'work'"]
     assert work.level == DiagnosticStatus.WARN
     assert work.message.endswith("over budget, 0 dropped")
-    assert float(values("timed: /worker")["busy"]) > 0.03
+    # Of the last second, in which the process may have had no processor for a while.
+    wait_until(lambda: float(values("timed: /worker")["busy"]) > 0.03, "the share")
     assert values("timed: /worker")["slowest"].startswith("timer 'work' ")
     assert int(values("timed: /sink")["queue_drops"]) > 0
-    assert re.match(r"\d+ times, mean .* 0 over 1000 ms", values("timed")["chain through"])
+    assert re.match(r"\d+ times, mean .* 0 over 10000 ms", values("timed")["chain through"])
 
 
 # The last one: it ends the system.
