@@ -32,7 +32,7 @@ NODE = """
     action_servers:
       drive: {type: composer_interfaces/action/Navigate, action: ~/drive, external: true}
     timers: {tick: {period_ms: 20}}
-    lifecycle: {timeout_ms: 1000, watch: {callback_ms: 300}}
+    lifecycle: {timeout_ms: 2500, watch: {callback_ms: 300}}
 """
 MODULE = '''
 import time

@@ -21,7 +21,7 @@ class Arm(LifecycleNode):
 
 class Slow(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        time.sleep(3.0)
+        time.sleep(6.0)
         return TransitionCallbackReturn.SUCCESS
 
 

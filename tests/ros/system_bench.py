@@ -51,6 +51,14 @@ def wait_until(condition: Callable[[], object], what: str = "") -> None:
         time.sleep(0.002)
 
 
+def end_limit_s() -> float:
+    """Return how long the end of a system may take: 2 s with a core for each who wants to run.
+
+    Where more want to, everything takes so much longer.
+    """
+    return 2.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+
+
 def system_of(text: str, folder: Path, **modules: str) -> System:
     """Return the system that ``text`` declares; ``modules`` become Python files beside it.
 

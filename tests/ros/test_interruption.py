@@ -124,7 +124,7 @@ OFTEN = "import sys; sys.setswitchinterval({interval_s}); from composer.cli impo
 def test_nodes_of_many_threads_come_up_whatever_comes_in_between(tmp_path: Path) -> None:
     path = write_faulty_system(tmp_path)
     text = path.read_text(encoding="utf-8")
-    patient = text.replace("_ms: 300", "_ms: 20000").replace("_ms: 1000", "_ms: 20000")
+    patient = text.replace("_ms: 300", "_ms: 20000").replace("_ms: 2500", "_ms: 20000")
     path.write_text(patient, encoding="utf-8")
     program = (sys.executable, "-c", OFTEN.format(interval_s=1e-5))
     with RunningSystem(str(path), "--autostart", "active", program=program) as system:

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.ros.system_bench import end_limit_s
 from tests.ros.systems.running import RunningSystem
 
-IN_TIME_S = 2.0
 #: What begins each part of the pipeline's life that a signal may meet.
 MOMENTS = ("inactive$", "sensor_simulator active$", "3 of 3 nodes active")
 #: What is torn down first.
@@ -36,9 +36,7 @@ def end_at(moment: str, delay_s: float, number: signal.Signals) -> float:
         took_s = time.monotonic() - sent_s
     case = f"{number.name} {1000.0 * delay_s:.0f} ms after '{moment}'\n{system.output}"
     assert code == 0, case
-    # Where more wants to run than there are cores, everything takes so much longer.
-    busy = max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
-    assert took_s < IN_TIME_S * busy, case
+    assert took_s < end_limit_s(), case
     assert "Traceback" not in system.output, case
     for state in ("inactive", "unconfigured", "finalized"):
         check_order(system.lines, state, case)
