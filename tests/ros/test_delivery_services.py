@@ -21,7 +21,7 @@ nodes:
     services: {ask: {type: std_srvs/srv/SetBool}}
   client:
     behavior: asking:Client
-    clients: {ask: {type: std_srvs/srv/SetBool, timeout_ms: 300}}
+    clients: {ask: {type: std_srvs/srv/SetBool, timeout_ms: 20000}}
 """
 MODULE = """
 from composer.behavior import Behavior, BehaviorError
@@ -47,10 +47,10 @@ class Client(Behavior):
         self.answers = []
         self.outcomes = []
 
-    async def ask(self, data):
+    async def ask(self, data, timeout_ms):
         self.requests.append(SetBool.Request(data=data))
         try:
-            response = await self.clients.ask.call(self.requests[-1])
+            response = await self.clients.ask.call(self.requests[-1], timeout_ms=timeout_ms)
         except BehaviorError as error:
             self.outcomes.append(type(error).__name__)
         else:
@@ -81,9 +81,9 @@ connections:
 REFUSED = (False, "/server is inactive, not active")
 
 
-def ask(system: RunningSystem, data: bool = True) -> None:
+def ask(system: RunningSystem, data: bool = True, timeout_ms: float | None = None) -> None:
     client = system.host._crew.nodes["client"]
-    client._core.spawn(client._behavior.ask(data))
+    client._core.spawn(client._behavior.ask(data, timeout_ms))
 
 
 def outcomes(system: RunningSystem, count: int) -> list[Any]:
@@ -105,14 +105,15 @@ def test_every_outcome_of_a_call_is_the_same_either_way(
         assert outcomes(system, 1)[-1] == (True, "request 1")
         assert (server.asked[0] is client.requests[0]) is (delivery == "auto")
 
-        ask(system, data=False)
+        ask(system, data=False, timeout_ms=300.0)
         assert outcomes(system, 2)[-1] == "CallTimeout"
+        wait_until(lambda: len(server.asked) == 2, "the request that is given up")
 
         system.change("server", "deactivate")
         ask(system)
         assert outcomes(system, 3)[-1] == REFUSED
         system.change("server", "cleanup")
-        ask(system)
+        ask(system, timeout_ms=300.0)
         assert outcomes(system, 4)[-1] == "ServerUnavailable"
 
         system.change("server", "configure")
@@ -130,7 +131,7 @@ def test_a_server_that_ends_with_a_request_open_says_so_and_outsiders_are_served
     tmp_path: Path,
 ) -> None:
     text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto")
-    with running(text.replace("300", "20000"), tmp_path, asking=MODULE) as system:
+    with running(text, tmp_path, asking=MODULE) as system:
         peer = Peer()
         try:
             answer = peer.call(SetBool, "/ask", SetBool.Request(data=True))
