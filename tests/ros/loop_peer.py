@@ -14,6 +14,7 @@ from typing import Any
 import rclpy
 from action_msgs.msg import GoalStatus
 from composer_interfaces.action import Navigate
+from lifecycle_msgs.srv import GetState
 from rclpy.action import ActionClient, ActionServer
 from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.node import Node
@@ -28,6 +29,23 @@ def finished(node: Node, future: Any) -> Any:
     rclpy.spin_until_future_complete(node, future, timeout_sec=PATIENCE_S)
     assert future.done(), "no answer"
     return future.result()
+
+
+def wait_until_known(node: Node) -> None:
+    """Wait until the other process has met everything that the node has by now.
+
+    Servers are found at once, but lose answers and feedback for whom they have not met. What a
+    participant has is announced in order, so who answers a client made last has met all before.
+    """
+    client = node.create_client(GetState, "bench/get_state")
+    assert client.wait_for_service(PATIENCE_S)
+    until = time.monotonic() + PATIENCE_S
+    answer = client.call_async(GetState.Request())
+    while not answer.done():
+        assert time.monotonic() < until, "never met"
+        rclpy.spin_until_future_complete(node, answer, timeout_sec=1.0)
+        if not answer.done():
+            answer = client.call_async(GetState.Request())
 
 
 def flood(node: Node, topic: str, count: str, depth: str) -> object:
@@ -45,7 +63,7 @@ def flood(node: Node, topic: str, count: str, depth: str) -> object:
 def collect(node: Node, topic: str, count: str) -> object:
     """Subscribe and return the first ``count`` texts."""
     seen: list[str] = []
-    node.create_subscription(String, topic, lambda message: seen.append(message.data), 10)
+    node.create_subscription(String, topic, lambda message: seen.append(message.data), 1000)
     until = time.monotonic() + PATIENCE_S
     while len(seen) < int(count) and time.monotonic() < until:
         rclpy.spin_once(node, timeout_sec=0.1)
@@ -65,6 +83,7 @@ def call(node: Node, name: str, times: str) -> object:
     """Call a Trigger service so many times at once."""
     client = node.create_client(Trigger, name)
     assert client.wait_for_service(PATIENCE_S)
+    wait_until_known(node)
     futures = [client.call_async(Trigger.Request()) for _ in range(int(times))]
     return [[(answer := finished(node, future)).success, answer.message] for future in futures]
 
@@ -87,6 +106,7 @@ def send_goal(node: Node, name: str, max_velocity: str, cancel: str) -> object:
     """Send a Navigate goal; with ``cancel``, cancel it after the first feedback."""
     client = ActionClient(node, Navigate, name)
     assert client.wait_for_server(PATIENCE_S)
+    wait_until_known(node)
     seen: list[float] = []
     handle = finished(
         node,
@@ -97,11 +117,12 @@ def send_goal(node: Node, name: str, max_velocity: str, cancel: str) -> object:
     )
     if not handle.accepted:
         return {"accepted": False}
+    # Once it has the result, rclpy drops the feedback that is still to be taken.
+    until = time.monotonic() + PATIENCE_S
+    while len(seen) < (1 if cancel else 3) and time.monotonic() < until:
+        rclpy.spin_once(node, timeout_sec=0.1)
     canceling = 0
     if cancel == "cancel":
-        until = time.monotonic() + PATIENCE_S
-        while not seen and time.monotonic() < until:
-            rclpy.spin_once(node, timeout_sec=0.1)
         canceling = len(finished(node, handle.cancel_goal_async()).goals_canceling)
     end = finished(node, handle.get_result_async())
     return {

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from action_msgs.msg import GoalStatus
 from composer_interfaces.action import Navigate
+from rcl_interfaces.srv import ListParameters
 from rclpy.action import ActionClient, ActionServer
 from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -75,7 +76,7 @@ class TestServer:
             seen = json.loads(last_line(process))
         assert seen["status"] == GoalStatus.STATUS_SUCCEEDED
         assert seen["message"] == "arrived"
-        assert seen["feedback"][-1] == 2.0
+        assert seen["feedback"] == [0.0, 1.0, 2.0]
 
     def test_a_goal_can_be_canceled(self) -> None:
         with peer("send_goal", "navigate", 0.1, "cancel") as process:
@@ -190,9 +191,9 @@ def test_results_nobody_fetched_expire(on: Bench) -> None:
     assert on.reports == []
 
 
-def answers(client: ActionClient) -> bool:
-    """Tell whether the server's answers get here: it may find the client later than that it."""
-    future = client.send_goal_async(Navigate.Goal(max_velocity=0.0))
+def answers(asking: Any) -> bool:
+    """Tell whether the answers of a server get here: it may find us later than we found it."""
+    future = asking.call_async(ListParameters.Request())
     until = time.monotonic() + 1.0
     while not future.done() and time.monotonic() < until:
         time.sleep(0.002)
@@ -207,7 +208,10 @@ class TestClient:
         with peer("navigate", "navigate") as process:
             wait_for_line(process, "serving")
             client = own_client(on)
-            wait_until(lambda: answers(client), "the server knows of the client")
+            # Announced in order: who knows of this one knows of all that the client is made of.
+            last = on.client(ListParameters, f"peer_{process.pid}/list_parameters")
+            wait_until(last.service_is_ready)
+            wait_until(lambda: answers(last), "the server knows of the client")
             yield client
             on.loop.remove(client)
             client.destroy()
@@ -225,7 +229,7 @@ class TestClient:
         end = wait_for(handle.get_result_async())
         assert end.status == GoalStatus.STATUS_SUCCEEDED
         assert end.result.message == "arrived"
-        wait_until(lambda: seen[-1:] == [2.0])
+        wait_until(lambda: seen == [0.0, 1.0, 2.0])
         wait_until(lambda: handle.status == GoalStatus.STATUS_SUCCEEDED)
 
     def test_cancels(self, client: ActionClient) -> None:

@@ -6,6 +6,8 @@ import json
 import threading
 import time
 from collections.abc import Iterator
+from itertools import pairwise
+from statistics import median
 
 import pytest
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -32,7 +34,7 @@ def test_messages_of_another_process_arrive_in_order(on: Bench) -> None:
 
 
 def test_messages_reach_another_process(on: Bench) -> None:
-    publisher = on.node.create_publisher(String, "texts", 10)
+    publisher = on.node.create_publisher(String, "texts", 1000)
     numbers = iter(range(1_000_000))
     with peer("collect", "texts", 5) as process:
         wait_until(publisher.get_subscription_count)
@@ -139,11 +141,12 @@ def test_a_slow_subscription_does_not_hold_up_a_timer(on: Bench) -> None:
     on.loop.call_every(0.01, lambda: ticks.append(time.monotonic()))
     with peer("flood", "flood", 1500, 5000) as process:
         wait_until(lambda: len(flood) > 10)
-        before = len(ticks), time.monotonic()
+        before = len(ticks)
         wait_until(lambda: len(flood) > 1000)
-        rate_hz = (len(ticks) - before[0]) / (time.monotonic() - before[1])
+        meanwhile = ticks[before:]
         last_line(process)
-    assert rate_hz > 50.0
+    # The median: all may stand still for a moment on a busy machine.
+    assert median(later - earlier for earlier, later in pairwise(meanwhile)) < 0.02
 
 
 def test_qos_events_reach_their_callback(on: Bench) -> None:
@@ -191,5 +194,5 @@ def test_entities_come_and_go_in_a_flood(on: Bench) -> None:
             for thread in threads:
                 thread.join()
     assert on.loop.run(lambda: "alive", 5.0) == "alive"
-    assert steady
+    wait_until(lambda: steady)
     assert on.reports == []
