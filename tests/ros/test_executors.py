@@ -5,6 +5,8 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
+from itertools import pairwise
+from statistics import median
 
 import pytest
 import rclpy
@@ -49,7 +51,11 @@ def test_calls_after_a_delay_and_not_before(on: Bench) -> None:
 
 def test_a_cancelled_call_does_not_come(on: Bench) -> None:
     seen: list[str] = []
+    release = threading.Event()
+    for _ in range(3):  # as many as there are threads: the call is cancelled before its time
+        on.loop.call_soon(release.wait)
     on.loop.call_later(0.01, lambda: seen.append("cancelled")).cancel()
+    release.set()
     on.loop.call_later(0.05, lambda: seen.append("after"))
     wait_until(lambda: seen)
     assert seen == ["after"]
@@ -70,7 +76,9 @@ def test_a_timer_keeps_its_rate(on: Bench) -> None:
     timer = on.loop.call_every(0.01, lambda: at.append(time.monotonic()))
     wait_until(lambda: len(at) >= 50)
     timer.cancel()
-    assert 0.4 < at[49] - at[0] < 2.0
+    assert at[49] - at[0] > 0.4
+    # The median: all may stand still for a moment on a busy machine.
+    assert median(later - earlier for earlier, later in pairwise(at)) < 0.02
 
 
 def test_a_late_timer_skips_and_keeps_its_beat(on: Bench) -> None:
@@ -84,22 +92,25 @@ def test_a_late_timer_skips_and_keeps_its_beat(on: Bench) -> None:
 
     begin = time.monotonic()
     timer = on.loop.call_every(period_s, tick)
-    wait_until(lambda: len(at) >= 4)
+    wait_until(lambda: len(at) >= 8)
     timer.cancel()
     assert at[1] - at[0] >= 3.2 * period_s
     assert at[3] - at[1] > period_s  # not bunched to make up for those missed
-    beats = (at[1] - begin) / period_s
-    assert beats - int(beats) < 0.5  # still a multiple of the period, give or take the machine
+    # Still at multiples of the period: one call at least is not late, however busy the machine.
+    assert min((time_s - begin) % period_s for time_s in at[1:]) < 0.15 * period_s
 
 
 def test_a_timer_cancels_itself(on: Bench) -> None:
     seen: list[int] = []
+    known = threading.Event()
 
     def once() -> None:
+        known.wait()
         seen.append(1)
         timer.cancel()
 
     timer = on.loop.call_every(0.02, once)
+    known.set()
     done: list[int] = []
     on.loop.call_later(0.1, lambda: done.append(1))
     wait_until(lambda: done)
@@ -186,9 +197,9 @@ class TestRun:
             release.wait()
 
         with pytest.raises(TimeoutError) as caught:
-            on.loop.run(take_too_long, 0.1)
+            on.loop.run(take_too_long, 1.0)  # so long it may take until it is begun
         release.set()
-        assert "take_too_long' is still running after 0.1 s" in str(caught.value)
+        assert "take_too_long' is still running after 1 s" in str(caught.value)
         assert "release.wait()" in str(caught.value)
 
     def test_what_was_not_begun_in_time_is_not_begun(self, on: Bench) -> None:
@@ -217,13 +228,20 @@ class TestWhere:
         wait_until(lambda: on.loop.where() == "")
 
 
+def used_s(on: Bench) -> float:
+    """Return the time of a processor that the threads of the loop have used, and no others.
+
+    In the process there may be what tests before have left. The clock of a thread is numbered as
+    Linux does: see clock_getcpuclockid(3).
+    """
+    return sum(time.clock_gettime(~thread_id << 3 | 6) for thread_id in on.loop.thread_ids())
+
+
 def test_idle_costs_nothing(on: Bench) -> None:
     on.loop.run(lambda: None, 5.0)
-    before = time.process_time()
-    begin = time.monotonic()
-    wait_until(lambda: time.monotonic() - begin > 1.0)
-    # DDS has threads of its own, and so has the wait above; a spinning loop would use it all.
-    assert time.process_time() - before < 0.3
+    before_s = used_s(on)
+    time.sleep(1.0)  # so long it is measured
+    assert used_s(on) - before_s < 0.3  # a spinning loop would use it all
 
 
 def test_waiting_for_a_busy_thread_costs_nothing(on: Bench) -> None:
@@ -231,21 +249,24 @@ def test_waiting_for_a_busy_thread_costs_nothing(on: Bench) -> None:
     for _ in range(6):  # more than there are threads
         on.loop.call_soon(release.wait)
     wait_until(on.loop.where)
-    before = time.process_time()
-    release.wait(0.5)  # so long it is measured; to look at a clock meanwhile would cost, too
-    used_s = time.process_time() - before
+    before_s = used_s(on)
+    time.sleep(0.5)  # so long it is measured
+    meanwhile_s = used_s(on) - before_s
     release.set()
-    assert used_s < 0.2
+    assert meanwhile_s < 0.2
     assert on.loop.run(lambda: "alive", 5.0) == "alive"
 
 
 def test_a_busy_loop_starves_no_other_thread(on: Bench) -> None:
     # Letting go of the interpreter's lock for a moment is not enough: nobody else is awake by then.
     on.loop.run_task(_never_idle(on))
-    began_s = time.monotonic()
-    for _ in range(50):
-        time.sleep(0.001)  # each time the thread needs the lock to go on
-    assert time.monotonic() - began_s < 2.0
+    took_s: list[float] = []
+    while len(took_s) < 3 and not (took_s and took_s[-1] < 2.0):  # slow by chance is not so thrice
+        began_s = time.monotonic()
+        for _ in range(50):
+            time.sleep(0.001)  # each time the thread needs the lock to go on
+        took_s.append(time.monotonic() - began_s)
+    assert min(took_s) < 2.0
 
 
 async def _never_idle(on: Bench) -> None:
@@ -275,7 +296,7 @@ class TestStopping:
             wait_until(loop.where)
             begin = time.monotonic()
             assert not loop.stop(0.2)
-            assert time.monotonic() - begin < 2.0
+            assert time.monotonic() - begin < 10.0  # it waits for ever
             assert "wait" in loop.where()
             release.set()
             wait_until(lambda: loop.stop(0.2))
