@@ -49,11 +49,13 @@ def test_data_is_followed_from_the_first_publisher_to_the_last(more: str, tmp_pa
     with running(BRAKE.format(more=more), tmp_path, detector=DETECTOR) as system:
         stop, see = chain(system, "stop"), chain(system, "see")
         wait_until(lambda: stop.times.count > 10)
-        sent = system.host._crew.nodes["lidar"].sent("scan")
+        counted = stop.times.count  # first: both grow
         # What is sent again without anything new having been heard does not count.
-        assert stop.times.count <= sent
+        assert counted <= system.host._crew.nodes["lidar"].sent("scan")
     assert stop.late == stop.times.count
     assert see.late == 0
-    assert stop.times.mean_s > see.times.mean_s > 0.003
+    assert see.times.mean_s > 0.003
+    # Not the mean: what comes late to the motor it may hear together with what comes next.
+    assert stop.times.percentile_s(0.5) > see.times.percentile_s(0.5)
     told = {item.chain: item for item in system.stop().chains}
     assert told["stop"].count == stop.times.count

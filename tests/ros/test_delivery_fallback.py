@@ -144,6 +144,8 @@ def test_every_message_comes_once_whatever_the_middleware_returns(
             Int64, "/stream", lambda message: outside.take(message.data), QoSProfile(depth=5000)
         )
         wait_until(lambda: peer.node.count_publishers("/stream"), "the publisher")
+        # What a participant has is announced in order: who answers this knows the subscription.
+        assert peer.state("/writer") == "inactive"
         assert peer.change("/writer", "activate")
         for reader in ("near", "far"):
             system.wait_for(rf"\[{reader}\] complete")

@@ -225,7 +225,7 @@ class Stress:
         stream, control = (
             {
                 writer: count
-                for writer, count in reader.seen[topic].missing.items()
+                for writer, count in reader.seen[topic].missing.copy().items()
                 if writer >= FIRST_TALKER
             }
             for topic in TOPICS

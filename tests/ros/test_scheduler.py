@@ -176,7 +176,8 @@ def test_a_message_is_taken_once_and_nothing_is_looked_for_after_it(on: Bench) -
     subscription = on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
     publisher = on.node.create_publisher(Int64, "numbers", 10)
     wait_until(publisher.get_subscription_count)
-    on.loop.run(lambda: None, 5.0)
+    for _ in range(2):  # once round, so that it has looked for what came before
+        on.loop.run(lambda: None, 5.0)
     takes = takes_of(slot_of(on, subscription))
     for number in range(20):
         publisher.publish(Int64(data=number))
@@ -262,7 +263,7 @@ def test_no_file_descriptor_is_left_behind() -> None:
         del on, kept
         gc.collect()
         counts.append(descriptors())
-    assert counts[-1] <= counts[1]
+    wait_until(lambda: descriptors() <= counts[1])
 
 
 def test_stopping_in_a_flood_ends_cleanly() -> None:

@@ -81,7 +81,9 @@ def test_every_kind_of_callback_is_timed_and_held_against_its_budget(tmp_path: P
         assert callback.overruns <= callback.times.count
         assert f"{callback} took " in text
     # What an async callback waits does not count, and what it does after waiting does.
-    assert 0.004 <= server["subscription"].times.longest_s < 0.4
+    times = server["subscription"].times
+    assert times.longest_s >= 0.004
+    assert times.percentile_s(0.5) < 0.36  # right within a tenth; the machine may stand still once
     assert client["timer"].lateness.count == client["timer"].times.count
     outcome = system.stop()
     told = {(item.node, item.kind): item for item in outcome.callbacks}

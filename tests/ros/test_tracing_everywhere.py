@@ -61,8 +61,8 @@ ENOUGH = 25
 
 def compose(*arguments: str) -> dict[str, Any]:
     """Return the last line that a command prints, which is JSON."""
-    command = [sys.executable, "-m", "composer", *arguments]
-    done = subprocess.run(command, capture_output=True, check=True, text=True, timeout=30.0)
+    command = [sys.executable, "-m", "composer", *arguments, "--timeout", "20"]
+    done = subprocess.run(command, capture_output=True, check=True, text=True, timeout=40.0)
     found: dict[str, Any] = json.loads(done.stdout)
     return found
 
