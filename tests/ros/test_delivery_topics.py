@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -294,6 +295,26 @@ def test_a_publisher_that_is_not_active_reaches_nobody_inside(tmp_path: Path) ->
         wait_until(lambda: 5 in numbers(near.heard))
         assert numbers(near.heard) == [0, 1, 5]
         assert system.host._crew.nodes["source"].statistics.sent == 3
+
+
+def test_a_look_that_is_overtaken_does_not_hide_who_has_come(tmp_path: Path) -> None:
+    """Two threads publish when somebody matches: the one looks before that, the other after it."""
+    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
+        port = system.host._crew.nodes["source"]._assembly.publishers["numbers"]
+        outlet = port._send.__self__
+        overtaking = threading.Thread(target=outlet._look_outside)
+
+        def count_matched() -> int:
+            if threading.current_thread() is overtaking:
+                return 3
+            overtaking.start()
+            overtaking.join(0.2)  # unless it has to wait
+            return 2
+
+        outlet._count_matched = count_matched
+        outlet._look_outside()
+        overtaking.join()
+        assert outlet._has_outsiders
 
 
 REMAPPED = """

@@ -67,6 +67,7 @@ class Outlet:
         "_isolated",
         "_latched",
         "_lock",
+        "_looking",
         "_mark",
         "_publish",
         "_targets",
@@ -85,6 +86,7 @@ class Outlet:
         self._mark = MatchMark(publisher)
         self._changed_at = self._mark.index
         self._has_outsiders = False
+        self._looking = threading.Lock()  # the last look is what counts, not the slowest
         self._inlets: tuple[Inlet, ...] = ()
         self._targets: tuple[Target, ...] = ()
         self._latched: deque[Any] | None = None
@@ -126,8 +128,9 @@ class Outlet:
         return Copies(inlet.queue) if self._isolated or inlet.isolated else inlet.queue
 
     def _look_outside(self) -> None:
-        self._mark.set()  # before the look: who matches in between is seen next time
-        self._has_outsiders = self._count_matched() > len(self._inlets)
+        with self._looking:
+            self._mark.set()  # before the look: who matches in between is seen next time
+            self._has_outsiders = self._count_matched() > len(self._inlets)
 
     def _send(self, message: Any) -> None:
         if message.__class__ is not self.message_type:
