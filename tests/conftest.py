@@ -15,6 +15,8 @@ from typing import TextIO
 import pytest
 from hypothesis import HealthCheck, settings
 
+from composer.runtime.participants import participants_here
+
 TESTS_WITH_ROS = Path(__file__).parent / "ros"
 NO_ROS = "rclpy cannot be imported"
 # Domain 0 is where people's robots are; above 101 the ports meet Linux' ephemeral ones.
@@ -82,9 +84,9 @@ def _leave_out(config: pytest.Config, items: list[pytest.Item], marker: str) -> 
 def _hold_domain_id() -> tuple[int, TextIO]:
     """Take the domain id that has been free longest, of those no other test process here has.
 
-    So what a killed process has left on the network, or nodes that hang in one of the test
-    processes, do not meet the next modules. The lock lasts as long as the returned file is open,
-    however the process ends.
+    So what a killed process has left on the network does not meet the next modules. Neither do
+    nodes that hang in one of the test processes: where anybody is, nobody is sent. The lock lasts
+    as long as the returned file is open, however the process ends.
     """
     locks = Path(tempfile.gettempdir()) / f"ros2-composer-domain-ids-{os.getuid()}"
     locks.mkdir(exist_ok=True)
@@ -99,10 +101,13 @@ def _hold_domain_id() -> tuple[int, TextIO]:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             lock.close()
-        else:
-            os.utime(lock.fileno())
-            return domain_id, lock
-    pytest.exit(f"all {len(DOMAIN_IDS)} domain ids are taken by other test processes", 3)
+            continue
+        if participants_here(domain_id):
+            lock.close()
+            continue
+        os.utime(lock.fileno())
+        return domain_id, lock
+    pytest.exit(f"all {len(DOMAIN_IDS)} domain ids are taken by other processes", 3)
 
 
 @pytest.fixture(scope="module", autouse=True)
