@@ -13,9 +13,10 @@ from std_msgs.msg import Empty
 from composer.runtime.participants import participants_here
 from tests.ros.system_bench import Peer, wait_until
 
-JOINS = 8
-#: Who is not met at once is met 1 to 3 s later; without the profile that is every second one.
-AT_ONCE_S = 0.7
+#: Who is not met at once is met 1 to 3 s later; without the profile that is every second one. So
+#: many joins and such a share tell that from a machine that stood still during some of them.
+JOINS, ENOUGH = 16, 12
+AT_ONCE_S = 0.9
 #: Their lease is 4 s, others have 20 s.
 FORGOTTEN_WITHIN_S = 10.0
 #: Enough to come in several packets.
@@ -64,8 +65,8 @@ def test_a_process_that_joins_is_met_at_once_with_all_its_topics(peer: Peer) -> 
     )
     assert "XML" not in done.stderr + done.stdout  # Fast DDS says so if it cannot read the profile
     took_s, missing = json.loads(done.stdout.splitlines()[-1])
-    assert sum(join_s < AT_ONCE_S for join_s in took_s) >= JOINS * 0.8, took_s
-    assert missing.count(0) >= JOINS * 0.8, missing
+    assert sum(join_s < AT_ONCE_S for join_s in took_s) >= ENOUGH, took_s
+    assert missing.count(0) >= ENOUGH, missing
 
 
 def test_each_participant_on_this_computer_is_counted(peer: Peer) -> None:

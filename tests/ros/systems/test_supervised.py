@@ -18,7 +18,7 @@ IN_ORDER = (
     r"/sensor active$",
     r"/planner active$",
     r"/sensor is up again, restart 1$",
-    r"\[planner\] plans by scan \d$",
+    r"\[planner\] plans by scan 1?\d$",
 )
 
 
