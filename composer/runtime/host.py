@@ -309,6 +309,8 @@ class Host:
         for item in (*self._farewells, *self._inbox.rest()):
             if isinstance(item, Command):
                 item.answer(item.what == "shutdown", f"the system has stopped: {self._reason}")
+            elif isinstance(item, Fault):
+                self._failed = True  # nobody has come to deal with it
         self._board.set_activity("stopped")
         end_s = self._end_s
         if self._inbox.hurry:

@@ -231,6 +231,32 @@ def test_a_node_that_fails_at_run_time_is_told_of(tmp_path: Path, peer: Peer) ->
         assert system.stop().exit_code == 1
 
 
+def test_a_failure_that_nobody_came_to_deal_with_counts(tmp_path: Path, peer: Peer) -> None:
+    """The end is asked for while a command is carried out in which a node has failed."""
+    text = """
+    system: both
+    nodes:
+      broken: {behavior: both:Broken, lifecycle: {depends_on: [slow]}}
+      slow: {behavior: both:Slow}
+    """
+    module = """
+    from composer.behavior import Behavior
+
+    class Broken(Behavior):
+        def on_deactivate(self):
+            raise ValueError("broken")
+
+    class Slow(Behavior):
+        async def on_deactivate(self):
+            self.log.info("slow")
+            await self.clock.sleep(0.5)
+    """
+    with running(text, tmp_path, both=module) as system:
+        peer.client(Trigger, "/both/manager/pause").call_async(Trigger.Request())
+        system.wait_for_log("slow")
+        assert system.stop().exit_code == 1
+
+
 def test_who_listens_badly_does_not_disturb(tmp_path: Path) -> None:
     system = RunningSystem(system_of(CHAIN, tmp_path, planner=WELL), HostOptions(), None)
     wait_until(lambda: system.told(BroughtUp))
