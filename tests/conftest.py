@@ -1,4 +1,4 @@
-"""What every module of tests gets: a DDS domain of its own, and honest skips without ROS."""
+"""What every test gets: a DDS domain of its own, and honest skips without ROS."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import signal
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
@@ -84,7 +85,7 @@ def _leave_out(config: pytest.Config, items: list[pytest.Item], marker: str) -> 
 def _hold_domain_id() -> tuple[int, TextIO]:
     """Take the domain id that has been free longest, of those no other test process here has.
 
-    So what a killed process has left on the network does not meet the next modules. Neither do
+    So what a killed process has left on the network does not meet the next tests. Neither do
     nodes that hang in one of the test processes: where anybody is, nobody is sent. The lock lasts
     as long as the returned file is open, however the process ends.
     """
@@ -110,9 +111,9 @@ def _hold_domain_id() -> tuple[int, TextIO]:
     pytest.exit(f"all {len(DOMAIN_IDS)} domain ids are taken by other processes", 3)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def ros_domain_id() -> Iterator[int]:
-    """The domain id of this module, set for it and for every process it starts."""
+@contextmanager
+def _domain() -> Iterator[int]:
+    """Have a domain id, set for this process and for every process it starts."""
     domain_id, lock = _hold_domain_id()
     with pytest.MonkeyPatch.context() as environment, lock:
         environment.setenv("ROS_DOMAIN_ID", str(domain_id))
@@ -123,3 +124,24 @@ def ros_domain_id() -> Iterator[int]:
             environment.setenv("AMENT_PREFIX_PATH", sys.prefix)
         yield domain_id
         os.utime(lock.fileno())  # free from now on
+
+
+@pytest.fixture(scope="module")
+def shared_domain_id() -> Iterator[int]:
+    """The domain id of all tests of a module, for what they share."""
+    with _domain() as domain_id:
+        yield domain_id
+
+
+@pytest.fixture(autouse=True)
+def ros_domain_id(request: pytest.FixtureRequest) -> Iterator[int]:
+    """The domain id of this test.
+
+    Its own: an endpoint of the test before that is still known would be counted, and a service of
+    which half is known is not ready. Where tests share what runs, it is that of their module.
+    """
+    if "shared_domain_id" in request.fixturenames:
+        yield request.getfixturevalue("shared_domain_id")
+        return
+    with _domain() as domain_id:
+        yield domain_id

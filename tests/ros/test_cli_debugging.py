@@ -26,7 +26,7 @@ PATIENCE_S = 30.0
 
 
 @pytest.fixture(scope="module", autouse=True)
-def peer() -> Iterator[None]:
+def peer(shared_domain_id: int) -> Iterator[None]:
     process = subprocess.Popen([sys.executable, str(PEER)], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     # Fast DDS may print there first, about what a killed process left behind.

@@ -18,7 +18,7 @@ PATIENCE_S = 30.0
 
 
 @pytest.fixture(scope="module", autouse=True)
-def pipeline(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+def pipeline(tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int) -> Iterator[None]:
     log: Path = tmp_path_factory.mktemp("pipeline") / "stderr.txt"
     with log.open("w") as file:
         process = subprocess.Popen([*COMPOSE, "run", "pipeline"], stderr=file)

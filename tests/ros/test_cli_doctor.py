@@ -22,7 +22,7 @@ PATIENCE_S = 30.0
 
 
 @pytest.fixture(scope="module")
-def misfits() -> Iterator[subprocess.Popen[str]]:
+def misfits(shared_domain_id: int) -> Iterator[subprocess.Popen[str]]:
     process = subprocess.Popen([sys.executable, str(PEER)], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     assert "ready\n" in process.stdout

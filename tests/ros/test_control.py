@@ -18,7 +18,7 @@ PEER = Path(__file__).with_name("hand_written.py")
 
 
 @pytest.fixture(scope="module", autouse=True)
-def peer() -> Iterator[subprocess.Popen[str]]:
+def peer(shared_domain_id: int) -> Iterator[subprocess.Popen[str]]:
     process = subprocess.Popen([sys.executable, str(PEER)], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     # Fast DDS may print there first, about what a killed process left behind.

@@ -21,7 +21,7 @@ PLANNER = "/planning/planner"
 
 
 @pytest.fixture(scope="module")
-def pipeline(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+def pipeline(tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int) -> Iterator[Running]:
     with running(tmp_path_factory.mktemp("pipeline") / "log.txt", "pipeline") as run:
         run.wait_for("3 of 3 nodes active")
         yield run

@@ -25,7 +25,9 @@ EXPECTED = (
 
 
 @pytest.fixture(scope="module")
-def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
+def live(
+    tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int
+) -> Iterator[dict[str, Any]]:
     """The diagram of the pipeline and of nodes that somebody else wrote."""
     process = subprocess.Popen(
         [sys.executable, str(HAND_WRITTEN)], stdout=subprocess.PIPE, text=True

@@ -52,7 +52,9 @@ OWN = {f"{TALKER}.speed", f"{TALKER}.label"}
 
 
 @pytest.fixture(scope="module")
-def system(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningSystem]:
+def system(
+    tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int
+) -> Iterator[RunningSystem]:
     with running(LEAN, tmp_path_factory.mktemp("lean")) as system:
         yield system
 

@@ -68,7 +68,9 @@ def compose(*arguments: str) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def system(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningSystem]:
+def system(
+    tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int
+) -> Iterator[RunningSystem]:
     path = tmp_path_factory.mktemp("timed") / "timed.yaml"
     path.write_text(SYSTEM, encoding="utf-8")
     path.with_name("timed.py").write_text(BEHAVIORS, encoding="utf-8")

@@ -12,7 +12,7 @@ from tests.ros.systems.running import Outsider
 
 
 @pytest.fixture(scope="module")
-def outside(ros_domain_id: int) -> Iterator[Context]:
+def outside(shared_domain_id: int) -> Iterator[Context]:
     """One DDS participant for many tests: Fast DDS has crashed on deleting many in a row."""
     context = Context()
     rclpy.init(context=context)
