@@ -9,10 +9,11 @@ import os
 import signal
 import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TextIO
+from unittest import mock
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -130,9 +131,12 @@ def _hold_domain_id() -> tuple[int, TextIO]:
 
 @contextmanager
 def _domain() -> Iterator[int]:
-    """Have a domain id, set for this process and for every process it starts."""
+    """Have a domain id, set for this process and for every process it starts.
+
+    What a host of this process chooses meanwhile, such as a profile of Fast DDS, goes with it.
+    """
     domain_id, lock = _hold_domain_id()
-    with pytest.MonkeyPatch.context() as environment, lock:
+    with mock.patch.dict(os.environ), pytest.MonkeyPatch.context() as environment, lock:
         environment.setenv("ROS_DOMAIN_ID", str(domain_id))
         environment.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         # Shared memory outlives killed processes: the next ones stumble over it, and say so.
@@ -141,6 +145,12 @@ def _domain() -> Iterator[int]:
             environment.setenv("AMENT_PREFIX_PATH", sys.prefix)
         yield domain_id
         os.utime(lock.fileno())  # free from now on
+
+
+@pytest.fixture(scope="session")
+def in_a_domain() -> Callable[[], AbstractContextManager[int]]:
+    """What holds a domain id for the length of a block."""
+    return _domain
 
 
 @pytest.fixture(scope="module")
