@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TextIO
-from unittest import mock
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -130,13 +129,25 @@ def _hold_domain_id() -> tuple[int, TextIO]:
 
 
 @contextmanager
+def _environment_given_back() -> Iterator[None]:
+    """Undo what changes; never all of it, for what still runs in this process may look."""
+    before = dict(os.environ)
+    yield
+    for name in os.environ.keys() - before.keys():
+        del os.environ[name]
+    for name, value in before.items():
+        if os.environ.get(name) != value:
+            os.environ[name] = value
+
+
+@contextmanager
 def _domain() -> Iterator[int]:
     """Have a domain id, set for this process and for every process it starts.
 
     What a host of this process chooses meanwhile, such as a profile of Fast DDS, goes with it.
     """
     domain_id, lock = _hold_domain_id()
-    with mock.patch.dict(os.environ), pytest.MonkeyPatch.context() as environment, lock:
+    with _environment_given_back(), pytest.MonkeyPatch.context() as environment, lock:
         environment.setenv("ROS_DOMAIN_ID", str(domain_id))
         environment.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         # Shared memory outlives killed processes: the next ones stumble over it, and say so.
