@@ -6,8 +6,13 @@ bench`` measures properly.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack
+
 import pytest
 
+from benchmarks import processes
 from benchmarks.figures import ratios
 from benchmarks.systems import cpu_us
 from benchmarks.turns import COMPOSED, SINGLE, Case, rows, take_turns
@@ -15,6 +20,17 @@ from benchmarks.turns import COMPOSED, SINGLE, Case, rows, take_turns
 ROUNDS = 3
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(180)]
+
+
+@pytest.fixture(autouse=True)
+def apart_from_other_tests(
+    monkeypatch: pytest.MonkeyPatch, in_a_domain: Callable[[], AbstractContextManager[int]]
+) -> Iterator[None]:
+    """Measure in domains that nobody else is in; benchmarks choose theirs by their process id."""
+    with ExitStack() as domains:
+        ids = (domains.enter_context(in_a_domain()) for _ in itertools.count())
+        monkeypatch.setattr(processes, "_domain_ids", ids)
+        yield
 
 
 @pytest.mark.parametrize(
