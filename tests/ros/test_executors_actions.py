@@ -165,13 +165,22 @@ def test_a_goal_that_is_taken_but_not_started_is_aborted_when_that_raises(on: Be
 
 
 def test_a_cancellation_whose_callback_raises_is_refused(on: Bench) -> None:
+    refused: list[bool] = []
+
     def fall_over(goal: Any) -> CancelResponse:
         raise ValueError("broken")
 
-    with serving(on, cancel_callback=fall_over):
+    async def execute(goal: Any) -> Navigate.Result:
+        while not refused:
+            await sleep(on.loop, 0.01)
+        goal.succeed()
+        return Navigate.Result()
+
+    with serving(on, cancel_callback=fall_over, execute_callback=execute):
         client = own_client(on)
         handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=1.0)))
         assert wait_for(handle.cancel_goal_async()).goals_canceling == []
+        refused.append(True)
         assert wait_for(handle.get_result_async()).status == GoalStatus.STATUS_SUCCEEDED
         on.loop.remove(client)
         client.destroy()
