@@ -98,7 +98,7 @@ def test_timers_are_as_quick_as_the_clock(
     assert found[10] - found[0] >= 0.899
     gaps_s = [late - early for early, late in itertools.pairwise(found)]
     assert min(gaps_s) > 0.0
-    assert median(gaps_s) <= 0.1 + 0.08 * factor  # 80 ms for a busy machine, half of the time
+    assert median(gaps_s) < 0.9  # by real time it would be 1 s with the factor 10
 
 
 SLEEPER = """
