@@ -34,6 +34,7 @@ from composer.runtime.host import Host, HostOptions
 from composer.runtime.shared_memory import remove_half_made_ports
 
 PATIENCE_S = 20.0
+_ENDS_WITHIN_S = 6.0
 _GOALS = {
     "configure": "inactive",
     "activate": "active",
@@ -154,8 +155,13 @@ def running(
     autostart: PrimaryState | None = None,
     **modules: str,
 ) -> Iterator[RunningSystem]:
-    """Run a system for the length of the block, which begins when it is up."""
-    system = RunningSystem(system_of(text, folder, **modules), options or HostOptions(), autostart)
+    """Run a system for the length of the block, which begins when it is up.
+
+    By default it gets more time for its end than people give it: what is not given back in time
+    stays in this process, and the next test would ask it instead of a node of its own.
+    """
+    options = options or HostOptions(stop_within_s=_ENDS_WITHIN_S)
+    system = RunningSystem(system_of(text, folder, **modules), options, autostart)
     try:
         wait_until(lambda: system.told(BroughtUp) or not system._thread.is_alive(), "bring-up")
         yield system

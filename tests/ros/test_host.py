@@ -145,7 +145,8 @@ def test_a_callback_that_hangs_does_not_hold_up_the_end(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:
     text = HANGING.replace("KIND", kind)
-    with running(text, tmp_path, planner=HANG.format(handler="on_tick")) as system:
+    module = HANG.format(handler="on_tick")
+    with running(text, tmp_path, options=HostOptions(), planner=module) as system:
         system.wait_for_log("hanging")
         peer.call(Trigger, "/trigger")  # the other executor goes on
         began_s = time.monotonic()
@@ -183,7 +184,7 @@ def test_a_handler_that_awaits_for_long_is_given_up(tmp_path: Path, hurry: bool)
             await self.clock.sleep(60.0)
     """
     # Without the hurry it would be waited for more than half of that.
-    options = HostOptions(stop_within_s=10.0) if hurry else None
+    options = HostOptions(stop_within_s=10.0) if hurry else HostOptions()
     with running(CHAIN, tmp_path, options=options, planner=module) as system:
         began_s = time.monotonic()
         system.host.stop("first")
