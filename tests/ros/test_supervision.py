@@ -24,7 +24,7 @@ nodes:
     parameters: {fault: ""}
     publishers: {scan: {type: std_msgs/msg/String, external: true}}
     timers: {tick: {period_ms: 10}}
-    lifecycle: {watch: {topic_silence_ms: 150, callback_ms: 100, max_errors: 2}, timeout_ms: 500}
+    lifecycle: {watch: {topic_silence_ms: 150, callback_ms: 100, max_errors: 2}, timeout_ms: 2500}
   camera:
     publishers: {image: {type: std_msgs/msg/String, external: true}}
     timers: {tick: {period_ms: 10, publish: {image: {data: picture}}}}
