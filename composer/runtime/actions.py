@@ -73,7 +73,7 @@ _CLIENT = _Side(
 )
 #: Where an action client keeps the requests that wait for each kind of response.
 _PENDING = {
-    "goal": "_goal_sequence_number_to_goal_id",
+    "goal": "_pending_goal_requests",
     "cancel": "_pending_cancel_requests",
     "result": "_pending_result_requests",
 }
@@ -134,10 +134,12 @@ class ActionSource:
     def _is_early(self, taken: dict[str, Any]) -> bool:
         """Tell whether a response came before its request was noted down.
 
-        rclpy does that after sending, without a lock: another thread may be in between.
+        rclpy does that after sending, without a lock, and adds the future last: another thread may
+        be in between.
         """
         return self._side is _CLIENT and any(
-            kind in _PENDING and item[0] not in getattr(self._waitable, _PENDING[kind])
+            kind in _PENDING
+            and getattr(self._waitable, _PENDING[kind]).get(item[0]) not in self._waitable._futures
             for kind, item in taken.items()
         )
 

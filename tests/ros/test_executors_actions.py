@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -15,6 +16,7 @@ from rclpy.action import ActionClient, ActionServer
 from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 
+from composer.runtime import actions
 from composer.runtime.tasks import sleep
 from tests.ros.loop_support import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
 
@@ -112,6 +114,35 @@ def test_a_client_that_is_destroyed_while_the_loop_looks_at_it_is_no_error(on: B
     on.loop.remove(client)
     client.destroy()
     assert on.errors() == []
+
+
+def test_an_answer_waits_until_its_request_is_noted_down(
+    on: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """rclpy does that after sending, in several steps: what is done in between never goes."""
+    monkeypatch.setattr(actions, "_RETRIES", 5000)
+    has_come = threading.Event()
+    is_early = actions.ActionSource._is_early
+
+    def watched(source: actions.ActionSource, taken: Any) -> bool:
+        early = is_early(source, taken)
+        has_come.set()
+        return early
+
+    monkeypatch.setattr(actions.ActionSource, "_is_early", watched)
+    with serving(on):
+        client = own_client(on)
+
+        def add_late(future: Any) -> None:
+            has_come.wait(10.0)
+            ActionClient.add_future(client, future)
+
+        monkeypatch.setattr(client, "add_future", add_late)
+        assert not wait_for(client.send_goal_async(Navigate.Goal(max_velocity=0.0))).accepted
+        wait_until(lambda: not client._futures, "nothing is left")
+        on.loop.remove(client)
+        client.destroy()
+    assert on.reports == []
 
 
 @pytest.mark.parametrize("error", ERRORS)
