@@ -38,7 +38,11 @@ def stacks_of(threads: Iterable[int]) -> dict[int, list[FrameType]]:
         return {}
     with undisturbed():
         current = sys._current_frames()
-        return {ident: list(_outward(current[ident])) for ident in wanted if ident in current}
+        stacks = {ident: list(_outward(current[ident])) for ident in wanted if ident in current}
+        # This very frame is among them: a cycle, which would keep what callbacks hold, large
+        # messages above all, until garbage is collected.
+        current.clear()
+        return stacks
 
 
 def shown(stack: Sequence[FrameType]) -> str:

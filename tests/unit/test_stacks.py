@@ -6,6 +6,7 @@ import gc
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Iterator
 
 import pytest
@@ -74,3 +75,24 @@ def test_who_looks_at_the_same_time_waits_so_that_nobody_turns_it_on_too_early()
         thread.join()
     assert not any(seen)
     assert gc.isenabled()
+
+
+def test_a_look_keeps_nothing_of_what_it_has_seen() -> None:
+    """Else what a callback holds, an image of some megabytes, waits for the garbage collector."""
+    is_there, may_go = threading.Event(), threading.Event()
+    held: list[weakref.ref[set[int]]] = []
+
+    def hold() -> None:
+        large = {1, 2, 3}
+        held.append(weakref.ref(large))
+        is_there.set()
+        may_go.wait()
+
+    thread = threading.Thread(target=hold)
+    with undisturbed():
+        thread.start()
+        is_there.wait()
+        assert stacks_of((thread.ident or 0,))
+        may_go.set()
+        thread.join()
+        assert held[0]() is None
