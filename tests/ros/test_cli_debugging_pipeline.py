@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -13,8 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-COMPOSE = [sys.executable, "-m", "composer"]
-PATIENCE_S = 30.0
+from tests.ros.commands import COMPOSE, PATIENCE_S, out
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -30,14 +28,6 @@ def pipeline(tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int) ->
     yield
     process.terminate()
     process.wait()
-
-
-def out(*arguments: str) -> str:
-    done = subprocess.run(
-        [*COMPOSE, *arguments], check=False, capture_output=True, text=True, timeout=PATIENCE_S
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 #: What a command line prints; they look only, so several may run side by side.
