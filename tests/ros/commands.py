@@ -1,8 +1,9 @@
-"""Commands in processes of their own, and a hand-written node for them to look at."""
+"""Commands in processes of their own, systems that they run, and nodes for them to look at."""
 
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -12,42 +13,88 @@ from pathlib import Path
 from typing import Any
 
 COMPOSE = [sys.executable, "-m", "composer"]
-TALKER = Path(__file__).with_name("hand_written_talker.py")
 PATIENCE_S = 30.0
 
 
 @contextmanager
-def hand_written_talker() -> Iterator[None]:
-    """Run the node ``/lab/talker`` for the length of the block."""
-    process = subprocess.Popen([sys.executable, str(TALKER)], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    # Fast DDS may print there first, about what a killed process left behind.
-    assert "ready\n" in process.stdout
-    yield
-    process.kill()
-    process.wait()
+def hand_written(program: str) -> Iterator[subprocess.Popen[str]]:
+    """Run a file of this folder, nodes as anybody would write them, for the length of the block."""
+    command = [sys.executable, str(Path(__file__).with_name(program))]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        # Fast DDS may print there first, about what a killed process left behind.
+        assert "ready\n" in process.stdout
+        yield process
+    finally:
+        process.kill()
+        process.wait()
 
 
-def compose(*arguments: str, code: int = 0) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run(
-        [*COMPOSE, *arguments], check=False, capture_output=True, text=True, timeout=PATIENCE_S
+class Running:
+    """A ``compose run`` in another terminal."""
+
+    def __init__(self, log: Path, *arguments: str) -> None:
+        self.log = log
+        with log.open("w") as file:
+            self.process = subprocess.Popen(
+                [*COMPOSE, "run", *arguments], stderr=file, stdout=subprocess.PIPE, text=True
+            )
+
+    def wait_for(self, text: str) -> None:
+        until_s = time.monotonic() + PATIENCE_S
+        while True:
+            has_ended = self.process.poll() is not None  # and has said all, if so
+            if text in self.log.read_text():
+                return
+            assert not has_ended, self.log.read_text()
+            assert time.monotonic() < until_s, self.log.read_text()
+            time.sleep(0.02)
+
+    def stop(self, number: int = signal.SIGINT) -> tuple[int, str, str]:
+        """Send the signal; return exit code, stdout and stderr."""
+        self.process.send_signal(number)
+        out, _ = self.process.communicate(timeout=PATIENCE_S)
+        return self.process.returncode, out, self.log.read_text()
+
+
+@contextmanager
+def running(log: Path, *arguments: str) -> Iterator[Running]:
+    run = Running(log, *arguments)
+    try:
+        yield run
+    finally:
+        run.process.kill()
+        run.process.wait()
+
+
+def compose(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end, however it ends."""
+    return subprocess.run(
+        [*COMPOSE, *map(str, arguments)],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
     )
-    assert done.returncode == code, done.stderr
-    return done
 
 
-def out(*arguments: str) -> str:
-    return compose(*arguments).stdout
+def said(*arguments: object) -> str:
+    """Run a command that has to succeed and return what it prints."""
+    done = compose(*arguments)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:
+    """Begin a command."""
     return subprocess.Popen(
         [*COMPOSE, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
 
 
 def finished(process: subprocess.Popen[str]) -> str:
-    """Return what a process that was started has printed, once it has ended well."""
+    """Return what a command that was begun has printed, once it has ended well."""
     output, error = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, error
     return output
@@ -69,12 +116,14 @@ def asked_until(fits: Callable[[str], bool], *arguments: str) -> str:
     """Return the first answer that fits, or the last one there is patience for."""
     until_s = time.monotonic() + PATIENCE_S
     while True:
-        text = out(*arguments)
+        text = said(*arguments)
         if fits(text) or time.monotonic() > until_s:
             return text
 
 
 def error(*arguments: str) -> str:
-    done = compose(*arguments, code=1)
+    """Run a command that has to fail and return what it says, having printed nothing."""
+    done = compose(*arguments)
+    assert done.returncode == 1, done.stderr
     assert done.stdout == ""
     return done.stderr

@@ -9,6 +9,7 @@ import pytest
 from rclpy.context import Context
 from rclpy.node import Node
 
+from tests.ros.commands import hand_written
 from tests.ros.system_bench import Peer
 
 
@@ -35,3 +36,10 @@ def peer() -> Iterator[Peer]:
         yield node
     finally:
         node.close()
+
+
+@pytest.fixture(scope="module")
+def talker(shared_domain_id: int) -> Iterator[None]:
+    """The node ``/lab/talker``, hand-written, in a process of its own."""
+    with hand_written("hand_written_talker.py"):
+        yield

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import signal
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,27 +15,22 @@ from tests.ros.commands import (
     compose,
     error,
     finished,
-    hand_written_talker,
     listed,
-    out,
+    said,
     start,
 )
 
-
-@pytest.fixture(scope="module", autouse=True)
-def talker(shared_domain_id: int) -> Iterator[None]:
-    with hand_written_talker():
-        yield
+pytestmark = pytest.mark.usefixtures("talker")
 
 
 def test_services() -> None:
     assert "/lab/add" in listed(("/lab/add\n",), "service", "list").split()
-    assert out("service", "type", "/lab/add") == "std_srvs/srv/SetBool\n"
-    assert json.loads(out("service", "type", "/lab/add", "--json")) == ["std_srvs/srv/SetBool"]
+    assert said("service", "type", "/lab/add") == "std_srvs/srv/SetBool\n"
+    assert json.loads(said("service", "type", "/lab/add", "--json")) == ["std_srvs/srv/SetBool"]
     answer = {"success": True, "message": "switched"}
-    assert yaml.safe_load(out("service", "call", "/lab/add", "{data: true}")) == answer
+    assert yaml.safe_load(said("service", "call", "/lab/add", "{data: true}")) == answer
     typed = ("service", "call", "/lab/add", "std_srvs/srv/SetBool", "{data: true}", "--json")
-    assert json.loads(out(*typed)) == answer
+    assert json.loads(said(*typed)) == answer
     assert "SetBool_Request has no field 'dta'" in error("service", "call", "/lab/add", "{dta: 1}")
     assert "did you mean '/lab/add'?" in error("service", "call", "/lab/ad", "{data: true}")
     gone = ("service", "call", "/lab/gone", "std_srvs/srv/SetBool", "{}", "--timeout", "0.5")
@@ -54,7 +48,7 @@ def test_actions() -> None:
 
 def test_a_goal_gives_feedback_and_a_result() -> None:
     goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: 1.0}", "--feedback", "--json")
-    told = [json.loads(line) for line in out(*goal).splitlines()]
+    told = [json.loads(line) for line in said(*goal).splitlines()]
     assert [item["feedback"]["progress_percent"] for item in told[:-1]] == [0.0, 1.0, 2.0]
     assert told[-1]["status"] == "succeeded"
     assert told[-1]["result"]["distance_traveled"] == 2.5
@@ -82,7 +76,8 @@ def test_a_rejected_goal_is_told() -> None:
 
 def test_a_goal_that_takes_too_long_is_canceled() -> None:
     goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: -1}", "--json")
-    done = compose(*goal, "--result-timeout", "0.3", code=1)
+    done = compose(*goal, "--result-timeout", "0.3")
+    assert done.returncode == 1, done.stderr
     assert json.loads(done.stdout)["status"] == "canceled"
 
 
@@ -101,16 +96,16 @@ def test_ctrl_c_cancels_a_goal() -> None:
 
 
 def test_parameters_are_read_and_set() -> None:
-    assert {"speed", "name", "gains"} <= set(out("param", "list", "talker").split())
-    assert out("param", "get", "talker", "speed") == "1.5\n"
-    assert out("param", "set", "talker", "speed", "2") == "/lab/talker speed: 2.0\n"
-    assert json.loads(out("param", "get", "/lab/talker", "speed", "--json")) == 2.0
-    assert json.loads(out("param", "set", "talker", "name", "123", "--json")) == {
+    assert {"speed", "name", "gains"} <= set(said("param", "list", "talker").split())
+    assert said("param", "get", "talker", "speed") == "1.5\n"
+    assert said("param", "set", "talker", "speed", "2") == "/lab/talker speed: 2.0\n"
+    assert json.loads(said("param", "get", "/lab/talker", "speed", "--json")) == 2.0
+    assert json.loads(said("param", "set", "talker", "name", "123", "--json")) == {
         "/lab/talker": {"ros__parameters": {"name": "123"}}
     }
-    assert json.loads(out("param", "get", "talker", "name", "--json")) == "123"
-    out("param", "set", "talker", "gains", "[3, 4.5]")
-    assert json.loads(out("param", "get", "talker", "gains", "--json")) == [3.0, 4.5]
+    assert json.loads(said("param", "get", "talker", "name", "--json")) == "123"
+    said("param", "set", "talker", "gains", "[3, 4.5]")
+    assert json.loads(said("param", "get", "talker", "gains", "--json")) == [3.0, 4.5]
 
 
 def test_a_parameter_that_is_not_taken_is_told_with_the_reason() -> None:
@@ -123,7 +118,7 @@ def test_a_parameter_that_is_not_taken_is_told_with_the_reason() -> None:
 
 
 def test_a_parameter_is_described() -> None:
-    assert json.loads(out("param", "describe", "talker", "speed", "--json")) == {
+    assert json.loads(said("param", "describe", "talker", "speed", "--json")) == {
         "name": "speed",
         "type": "double",
         "description": "How fast.",
@@ -137,21 +132,21 @@ def test_parameters_of_all_nodes_are_listed_and_several_described() -> None:
     assert {"speed", "name", "gains"} <= set(everything["/lab/talker"])
     head = "/lab/talker:\n"
     assert head in listed((head,), "param", "list")
-    several = json.loads(out("param", "describe", "talker", "speed", "name", "--json"))
+    several = json.loads(said("param", "describe", "talker", "speed", "name", "--json"))
     assert [item["name"] for item in several] == ["speed", "name"]
 
 
 def test_what_is_dumped_can_be_loaded(tmp_path: Path) -> None:
     file = tmp_path / "talker.yaml"
-    dumped = yaml.safe_load(out("param", "dump", "talker"))
+    dumped = yaml.safe_load(said("param", "dump", "talker"))
     values = dumped["/lab/talker"]["ros__parameters"]
     assert values["start_type_description_service"] is True  # read-only, as in every ROS node
     values.update(speed=0.25, name="loaded")
     file.write_text(yaml.safe_dump(dumped))
-    taken = json.loads(out("param", "load", "talker", str(file), "--json"))
+    taken = json.loads(said("param", "load", "talker", str(file), "--json"))
     del values["start_type_description_service"]
     assert taken == dumped
-    assert out("param", "get", "talker", "speed") == "0.25\n"
+    assert said("param", "get", "talker", "speed") == "0.25\n"
 
 
 def test_a_parameter_file_may_nest_names_and_use_wildcards(tmp_path: Path) -> None:
@@ -160,7 +155,7 @@ def test_a_parameter_file_may_nest_names_and_use_wildcards(tmp_path: Path) -> No
         "/**: {ros__parameters: {speed: 1, for_others: 5}}\n"
         "lab: {talker: {ros__parameters: {limits: {reach: 2}}}}\n"
     )
-    assert out("param", "load", "talker", str(file)) == (
+    assert said("param", "load", "talker", str(file)) == (
         "/lab/talker speed: 1.0\n/lab/talker limits.reach: 2.0\n"
     )
     file.write_text("/other: {ros__parameters: {speed: 1.0}}\n")

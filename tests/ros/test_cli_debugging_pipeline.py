@@ -3,31 +3,23 @@
 from __future__ import annotations
 
 import json
-import subprocess
+import signal
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 import yaml
 
-from tests.ros.commands import COMPOSE, PATIENCE_S, out
+from tests.ros.commands import PATIENCE_S, running, said
 
 
 @pytest.fixture(scope="module", autouse=True)
 def pipeline(tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int) -> Iterator[None]:
-    log: Path = tmp_path_factory.mktemp("pipeline") / "stderr.txt"
-    with log.open("w") as file:
-        process = subprocess.Popen([*COMPOSE, "run", "pipeline"], stderr=file)
-    until_s = time.monotonic() + PATIENCE_S
-    while "3 of 3 nodes active" not in log.read_text():
-        assert process.poll() is None, log.read_text()
-        assert time.monotonic() < until_s, log.read_text()
-        time.sleep(0.02)
-    yield
-    process.terminate()
-    process.wait()
+    with running(tmp_path_factory.mktemp("pipeline") / "log.txt", "pipeline") as run:
+        run.wait_for("3 of 3 nodes active")
+        yield
+        run.stop(signal.SIGTERM)
 
 
 #: What a command line prints; they look only, so several may run side by side.
@@ -61,27 +53,27 @@ def answer(arguments: tuple[str, ...]) -> str:
     until_s = time.monotonic() + PATIENCE_S
     lists = "list" in arguments or "info" in arguments
     while True:
-        text = out(*arguments)
+        text = said(*arguments)
         if not lists or ANSWERS[arguments] in text or time.monotonic() > until_s:
             return text
 
 
 def test_a_goal_is_reached() -> None:
     goal = ("action", "send-goal", "/navigate", "{target: {x: 0.3}, max_velocity: 2.0}")
-    told = [json.loads(line) for line in out(*goal, "--feedback", "--json").splitlines()]
+    told = [json.loads(line) for line in said(*goal, "--feedback", "--json").splitlines()]
     assert told[-1]["status"] == "succeeded"
     assert all(0.0 <= item["feedback"]["progress_percent"] <= 100.0 for item in told[:-1])
 
 
 def test_a_parameter_is_set_and_a_message_published() -> None:
     command = ("param", "set", "motor_controller", "max_velocity", "0.5")
-    assert out(*command) == "/control/motor_controller max_velocity: 0.5\n"
+    assert said(*command) == "/control/motor_controller max_velocity: 0.5\n"
     once = ("topic", "pub", "--once", "--json", "/motor_commands", "geometry_msgs/msg/Twist")
-    assert json.loads(out(*once, "{linear: {x: 0.1}}"))["linear"]["x"] == 0.1
+    assert json.loads(said(*once, "{linear: {x: 0.1}}"))["linear"]["x"] == 0.1
 
 
 def test_the_doctor_finds_no_fault() -> None:
-    found = json.loads(out("doctor", "--json"))
+    found = json.loads(said("doctor", "--json"))
     assert [item for item in found if item["level"] in ("warning", "error")] == []
     (graph,) = (item["message"] for item in found if item["area"] == "graph")
     assert graph.startswith("all ends fit: ")
@@ -91,7 +83,7 @@ def test_messages_are_fresh() -> None:
     until_s = time.monotonic() + PATIENCE_S
     while True:
         # It reports each second, too, which twenty messages may take longer than.
-        told = out("topic", "delay", "/sensor_data", "--count", "20", "--json").splitlines()
+        told = said("topic", "delay", "/sensor_data", "--count", "20", "--json").splitlines()
         delay = json.loads(told[-1])
         # A command that gets no processor for a moment finds old messages afterwards.
         if delay["average_s"] < 0.1 or time.monotonic() > until_s:
@@ -100,11 +92,11 @@ def test_messages_are_fresh() -> None:
 
 
 def test_who_is_at_the_ends_and_what_is_offered() -> None:
-    found = json.loads(out("topic", "info", "-v", "/sensor_data", "--json"))
+    found = json.loads(said("topic", "info", "-v", "/sensor_data", "--json"))
     assert [end["node"] for end in found["publishers"]] == ["/perception/sensor_simulator"]
     assert [end["qos"]["reliability"] for end in found["subscriptions"]] == ["best_effort"] * 2
 
 
 def test_a_service_answers_in_yaml() -> None:
-    answer = yaml.safe_load(out("service", "call", "/plan_trajectory", "{max_velocity: 0.5}"))
+    answer = yaml.safe_load(said("service", "call", "/plan_trajectory", "{max_velocity: 0.5}"))
     assert "success" in answer

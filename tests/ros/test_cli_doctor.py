@@ -6,35 +6,20 @@ import json
 import re
 import signal
 import subprocess
-import sys
-import time
 from collections.abc import Iterator
-from pathlib import Path
+from typing import Any
 
 import pytest
 
 from composer.runtime.doctor.finding import Level
 from composer.runtime.doctor.graph import unbuilt_types
-
-COMPOSE = [sys.executable, "-m", "composer"]
-PEER = Path(__file__).with_name("hand_written_misfits.py")
-PATIENCE_S = 30.0
+from tests.ros.commands import PATIENCE_S, compose, hand_written, measured, start
 
 
 @pytest.fixture(scope="module")
 def misfits(shared_domain_id: int) -> Iterator[subprocess.Popen[str]]:
-    process = subprocess.Popen([sys.executable, str(PEER)], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    assert "ready\n" in process.stdout
-    yield process
-    process.kill()
-    process.wait()
-
-
-def compose(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*COMPOSE, *arguments], check=False, capture_output=True, text=True, timeout=PATIENCE_S
-    )
+    with hand_written("hand_written_misfits.py") as process:
+        yield process
 
 
 @pytest.fixture(scope="module")
@@ -88,16 +73,13 @@ def test_a_type_that_is_not_built_here_is_told_once() -> None:
 
 @pytest.mark.usefixtures("misfits")
 def test_delay_is_the_age_of_the_stamp() -> None:
-    until_s = time.monotonic() + PATIENCE_S
-    while True:
-        done = compose("topic", "delay", "/lab/scan", "--count", "20", "--json")
-        delay = json.loads(done.stdout.splitlines()[-1])
+    def is_prompt(delay: dict[str, Any]) -> bool:
+        """A command that gets no processor for a moment finds older messages afterwards."""
         assert delay["window"] == 20
         assert 0.25 <= delay["shortest_s"] <= delay["average_s"]
-        # A command that gets no processor for a moment finds older messages afterwards.
-        if delay["average_s"] < 0.35 or time.monotonic() > until_s:
-            break
-    assert delay["average_s"] < 0.35
+        return bool(delay["average_s"] < 0.35)
+
+    assert is_prompt(measured(is_prompt, "topic", "delay", "/lab/scan", "--count", "20", "--json"))
     text = compose("topic", "delay", "/lab/scan", "--count", "2").stdout
     told = re.match(r"average delay: (\d+\.\d{4}) s  min: ", text)
     assert told is not None
@@ -122,12 +104,7 @@ def test_delay_needs_a_stamp() -> None:
 
 # The last one: it ends the process of the others.
 def test_a_goal_whose_server_goes_away_ends(misfits: subprocess.Popen[str]) -> None:
-    process = subprocess.Popen(
-        [*COMPOSE, "action", "send-goal", "/lab/endless", "{}"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = start("action", "send-goal", "/lab/endless", "{}")
     assert process.stderr is not None
     assert any("goal accepted" in line for line in process.stderr)
     misfits.send_signal(signal.SIGINT)

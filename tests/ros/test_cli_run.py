@@ -6,61 +6,13 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from tests.ros.commands import COMPOSE, PATIENCE_S, compose, running
 from tests.ros.system_bench import Peer, wait_until
-
-COMPOSE = [sys.executable, "-m", "composer"]
-PATIENCE_S = 30.0
-
-
-def compose(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*COMPOSE, *arguments], check=False, capture_output=True, text=True, timeout=PATIENCE_S
-    )
-
-
-class Running:
-    """A ``compose run`` in another terminal."""
-
-    def __init__(self, log: Path, *arguments: str) -> None:
-        self.log = log
-        with log.open("w") as file:
-            self.process = subprocess.Popen(
-                [*COMPOSE, "run", *arguments], stderr=file, stdout=subprocess.PIPE, text=True
-            )
-
-    def wait_for(self, text: str) -> None:
-        until_s = time.monotonic() + PATIENCE_S
-        while True:
-            has_ended = self.process.poll() is not None  # and has said all, if so
-            if text in self.log.read_text():
-                return
-            assert not has_ended, self.log.read_text()
-            assert time.monotonic() < until_s, self.log.read_text()
-            time.sleep(0.02)
-
-    def stop(self, number: int = signal.SIGINT) -> tuple[int, str, str]:
-        """Send the signal; return exit code, stdout and stderr."""
-        self.process.send_signal(number)
-        out, _ = self.process.communicate(timeout=PATIENCE_S)
-        return self.process.returncode, out, self.log.read_text()
-
-
-@contextmanager
-def running(log: Path, *arguments: str) -> Iterator[Running]:
-    run = Running(log, *arguments)
-    try:
-        yield run
-    finally:
-        run.process.kill()
-        run.process.wait()
 
 
 @pytest.fixture

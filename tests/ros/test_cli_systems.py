@@ -7,19 +7,18 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from composer.runtime.claim import claims
+from tests.ros.commands import COMPOSE, PATIENCE_S, asked_until, compose, said
 from tests.ros.system_bench import wait_until
 
-COMPOSE = [sys.executable, "-m", "composer"]
-PATIENCE_S = 30.0
 ROBOT = """
 system: robot
 namespace: fleet
@@ -45,23 +44,6 @@ class Planner(Behavior):
         if self.parameters.fault == "hang":
             time.sleep(60.0)
 """
-
-
-def compose(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*COMPOSE, *map(str, arguments)],
-        check=False,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-    )
-
-
-def said(*arguments: object) -> str:
-    """Run a command that has to succeed and return what it prints."""
-    done = compose(*arguments)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 def refused(*arguments: object) -> str:
@@ -124,6 +106,21 @@ def robot(path: Path) -> Iterator[Robot]:
     running.kill()
 
 
+def planner_in(text: str) -> dict[str, Any]:
+    """Return what ``ps --json`` tells of the planner."""
+    (system,) = json.loads(text)["systems"]
+    found: dict[str, Any] = system["nodes"][0]
+    return found
+
+
+def callback_in(text: str) -> dict[str, Any]:
+    """Return the one callback that ``top --once --json`` tells of."""
+    (line,) = text.splitlines()
+    found: dict[str, Any]
+    (found,) = json.loads(line)["callbacks"]
+    return found
+
+
 def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None:
     assert robot.told.startswith("2 of 3 nodes active after")
     text = said("ps")
@@ -137,12 +134,10 @@ def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None
         ["/fleet/camera", "inactive"],
     ]
     # A system that gets no processor for a moment sends less in that second.
-    until_s = time.monotonic() + PATIENCE_S / 2
-    while True:
-        (system,) = json.loads(said("ps", "--json"))["systems"]
-        planner = system["nodes"][0]
-        if planner["sent_hz"] == pytest.approx(20.0, abs=3.0) or time.monotonic() > until_s:
-            break
+    text = asked_until(
+        lambda text: planner_in(text)["sent_hz"] == pytest.approx(20.0, abs=3.0), "ps", "--json"
+    )
+    planner = planner_in(text)
     assert planner["sent_hz"] == pytest.approx(20.0, abs=3.0)
     assert planner["slowest"].startswith("timer 'tick' ")
     (tick,) = planner["callbacks"]
@@ -150,12 +145,11 @@ def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None
     assert 0.0 < tick["mean_ms"] <= tick["longest_ms"]
     assert tick["late_longest_ms"] > 0.0
 
-    until_s = time.monotonic() + PATIENCE_S / 2
-    while True:
-        (shown,) = said("top", "--once", "--json").splitlines()
-        (callback,) = json.loads(shown)["callbacks"]
-        if callback["calls_hz"] == pytest.approx(20.0, abs=5.0) or time.monotonic() > until_s:
-            break
+    text = asked_until(
+        lambda text: callback_in(text)["calls_hz"] == pytest.approx(20.0, abs=5.0),
+        *("top", "--once", "--json"),
+    )
+    callback = callback_in(text)
     assert callback["node"] == "/fleet/planner"
     assert callback["calls_hz"] == pytest.approx(20.0, abs=5.0)
     assert 0.0 < callback["busy"] < 1.0

@@ -3,29 +3,21 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from composer.runtime.control import Control, TransitionRefused
 from composer.runtime.finding import NotThere
 from composer.runtime.session import Deadline, NoAnswer, Session
-
-PEER = Path(__file__).with_name("hand_written.py")
+from tests.ros.commands import hand_written
 
 
 @pytest.fixture(scope="module", autouse=True)
 def peer(shared_domain_id: int) -> Iterator[subprocess.Popen[str]]:
-    process = subprocess.Popen([sys.executable, str(PEER)], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    # Fast DDS may print there first, about what a killed process left behind.
-    assert "ready\n" in process.stdout
-    yield process
-    process.kill()
-    process.wait()
+    with hand_written("hand_written.py") as process:
+        yield process
 
 
 @pytest.fixture(scope="module")

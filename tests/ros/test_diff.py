@@ -5,18 +5,16 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
 import pytest
 
-from tests.ros.test_cli_run import COMPOSE, PATIENCE_S, Running, compose, running
+from tests.ros.commands import COMPOSE, PATIENCE_S, Running, compose, hand_written, running
 
-INTRUDER = Path(__file__).with_name("hand_written_intruder.py")
+INTRUDER = "hand_written_intruder.py"
 PLANNER = "/planning/planner"
 
 
@@ -26,18 +24,6 @@ def pipeline(tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int) ->
         run.wait_for("3 of 3 nodes active")
         yield run
         assert run.stop()[0] == 0
-
-
-@contextmanager
-def intruder() -> Iterator[None]:
-    process = subprocess.Popen([sys.executable, str(INTRUDER)], stdout=subprocess.PIPE, text=True)
-    try:
-        assert process.stdout is not None
-        assert "ready\n" in process.stdout  # Fast DDS may print there first
-        yield
-    finally:
-        process.kill()
-        process.wait()
 
 
 def told(done: subprocess.CompletedProcess[str]) -> list[str]:
@@ -82,7 +68,7 @@ def test_a_second_publisher_of_another_type_from_outside_is_named(pipeline: Runn
         "/intruder: type of its publisher /sensor_data is std_msgs/msg/String,"
         " declared nav_msgs/msg/Odometry"
     )
-    with intruder():
+    with hand_written(INTRUDER):
         done = compose("diff", "pipeline", "--json")
         assert done.returncode == 1
         data = json.loads(done.stdout)

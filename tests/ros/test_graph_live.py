@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.ros.test_cli_run import PATIENCE_S, compose, running
+from tests.ros.commands import PATIENCE_S, compose, hand_written, running
 
-HAND_WRITTEN = Path(__file__).with_name("hand_written.py")
 EXPECTED = (
     "node:/other/arm",
     "2 nodes have this name",
@@ -29,18 +25,10 @@ def live(
     tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int
 ) -> Iterator[dict[str, Any]]:
     """The diagram of the pipeline and of nodes that somebody else wrote."""
-    process = subprocess.Popen(
-        [sys.executable, str(HAND_WRITTEN)], stdout=subprocess.PIPE, text=True
-    )
-    try:
-        assert process.stdout is not None
-        assert "ready\n" in process.stdout  # Fast DDS may print there first
-        with running(tmp_path_factory.mktemp("live") / "log.txt", "pipeline") as run:
-            run.wait_for("3 of 3 nodes active")
-            yield all_drawn()
-    finally:
-        process.kill()
-        process.wait()
+    log = tmp_path_factory.mktemp("live") / "log.txt"
+    with hand_written("hand_written.py"), running(log, "pipeline") as run:
+        run.wait_for("3 of 3 nodes active")
+        yield all_drawn()
 
 
 def all_drawn() -> dict[str, Any]:
