@@ -17,6 +17,7 @@ from lifecycle_msgs.msg import Transition as TransitionMessage
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 from rclpy.type_support import check_is_valid_srv_type
 
+from composer.runtime.asking import Send, ask, ask_each, call_once
 from composer.runtime.deputies import LIFECYCLE, Deputies
 from composer.runtime.finding import check_all_answer, find_node, not_there
 from composer.runtime.session import Deadline, NoAnswer, RosError, Session
@@ -122,7 +123,7 @@ class Control:
         """Return the label of the node's state. Raises NoAnswer."""
         if self._manager(node):
             return self._deputies.state(node)
-        response = self._call(node, GetState, "get_state", GetState.Request())
+        response = self._response(ask, node, GetState, "get_state", GetState.Request())
         return str(response.current_state.label)
 
     def states(self, nodes: Iterable[str]) -> dict[str, str | None]:
@@ -132,7 +133,7 @@ class Control:
             node: self._deputies.state(node) for node in wanted if self._manager(node)
         }
         services = {f"{node}/get_state": node for node in wanted if node not in told}
-        responses = self._session.call_each(GetState, services, GetState.Request(), self._deadline)
+        responses = ask_each(self._session, GetState, services, GetState.Request(), self._deadline)
         return told | {
             node: None if response is None else str(response.current_state.label)
             for node, response in zip(services.values(), responses.values(), strict=True)
@@ -143,7 +144,9 @@ class Control:
         if self._manager(node):
             return _LEGAL.get(self._deputies.state(node), ())
         request = GetAvailableTransitions.Request()
-        response = self._call(node, GetAvailableTransitions, "get_available_transitions", request)
+        response = self._response(
+            ask, node, GetAvailableTransitions, "get_available_transitions", request
+        )
         return tuple(
             Transition(item.transition.id, item.transition.label, item.goal_state.label)
             for item in response.available_transitions
@@ -194,7 +197,7 @@ class Control:
         label = f"{node} {wanted.label}" if manager else wanted.label
         message = TransitionMessage(id=wanted.id, label=label)
         request = ChangeState.Request(transition=message)
-        response = self._call(manager or node, ChangeState, "change_state", request)
+        response = self._response(call_once, manager or node, ChangeState, "change_state", request)
         success = bool(response.success)
         if not manager:
             return success, self.state(node)
@@ -216,9 +219,9 @@ class Control:
         }
         return tuple(sorted(own | self._deputies.nodes(LIFECYCLE).keys()))
 
-    def _call(self, node: str, service: Any, name: str, request: Any) -> Any:
+    def _response(self, send: Send, node: str, service: Any, name: str, request: Any) -> Any:
         try:
-            return self._session.call(service, f"{node}/{name}", request, self._deadline)
+            return send(self._session, service, f"{node}/{name}", request, self._deadline)
         except NoAnswer as error:
             raise NoAnswer(
                 f"{node} did not answer within {self._deadline.timeout_s:g} s",

@@ -11,6 +11,7 @@ from action_msgs.msg import GoalStatus
 from rclpy.action.client import ActionClient, ClientGoalHandle
 from rclpy.task import Future
 
+from composer.runtime.asking import call_once
 from composer.runtime.inspect_values import class_of, compile_content
 from composer.runtime.session import Deadline, NoAnswer, RosError, Session
 
@@ -44,7 +45,7 @@ def call_service(
     """Return the response to ``request``, which is YAML. Raises BadValue, NoAnswer."""
     service = class_of(type_name)
     message = compile_content(request, service.Request, "the request")({})
-    return session.call(service, name, message, deadline)
+    return call_once(session, service, name, message, deadline)
 
 
 class _Client(ActionClient):

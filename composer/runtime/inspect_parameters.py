@@ -17,6 +17,7 @@ from rcl_interfaces.srv import (
 from rclpy.parameter import Parameter, parameter_value_to_python
 
 from composer.diagnostics import suggestion
+from composer.runtime.asking import Send, ask, ask_each, call_once
 from composer.runtime.deputies import PARAMETERS, Deputies
 from composer.runtime.inspect_names import Names
 from composer.runtime.manager_interface import full_parameter_name
@@ -76,7 +77,7 @@ class Parameters:
     def names(self) -> tuple[str, ...]:
         """Return the names of all parameters, sorted. Raises NoAnswer."""
         request = ListParameters.Request(prefixes=[self.node] if self._prefix else [])
-        response = self._call(ListParameters, "list_parameters", request)
+        response = self._response(ask, ListParameters, "list_parameters", request)
         return tuple(sorted(name.removeprefix(self._prefix) for name in response.result.names))
 
     def values(self, names: Iterable[str]) -> dict[str, Any]:
@@ -84,7 +85,7 @@ class Parameters:
         wanted = list(names)
         self._check_known(wanted)
         request = GetParameters.Request(names=self._there(wanted))
-        response = self._call(GetParameters, "get_parameters", request)
+        response = self._response(ask, GetParameters, "get_parameters", request)
         return {
             name: plain_value(value) for name, value in zip(wanted, response.values, strict=True)
         }
@@ -94,7 +95,7 @@ class Parameters:
         wanted = list(names)
         self._check_known(wanted)
         request = DescribeParameters.Request(names=self._there(wanted))
-        response = self._call(DescribeParameters, "describe_parameters", request)
+        response = self._response(ask, DescribeParameters, "describe_parameters", request)
         return tuple(
             _description(name, found)
             for name, found in zip(wanted, response.descriptors, strict=True)
@@ -114,7 +115,7 @@ class Parameters:
                 for item in wanted
             ]
         )
-        response = self._call(SetParameters, "set_parameters", request)
+        response = self._response(call_once, SetParameters, "set_parameters", request)
         refused = [
             f"{name}: {result.reason or 'no reason given'}"
             for name, result in zip(values, response.results, strict=True)
@@ -151,9 +152,9 @@ class Parameters:
         """Return what parameters are called where they are asked for."""
         return [f"{self._prefix}{name}" for name in names]
 
-    def _call(self, service: Any, name: str, request: Any) -> Any:
+    def _response(self, send: Send, service: Any, name: str, request: Any) -> Any:
         try:
-            return self._session.call(service, f"{self._asked}/{name}", request, self._deadline)
+            return send(self._session, service, f"{self._asked}/{name}", request, self._deadline)
         except NoAnswer as error:
             raise NoAnswer(
                 f"{self.node} did not answer within {self._deadline.timeout_s:g} s",
@@ -171,7 +172,7 @@ def names_by_node(session: Session, deadline: Deadline) -> dict[str, list[str] |
     }
     deputies = Deputies(session)
     deputies.meet(deadline)
-    responses = session.call_each(ListParameters, services, ListParameters.Request(), deadline)
+    responses = ask_each(session, ListParameters, services, ListParameters.Request(), deadline)
     listed = {
         node: None if responses[name] is None else sorted(responses[name].result.names)
         for name, node in services.items()

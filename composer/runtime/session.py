@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable
 from typing import Any, Self, TypeVar
 
-from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.task import Future
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.utilities import get_rmw_implementation_identifier
 
@@ -218,28 +216,6 @@ class Session:
         subscriptions = node.get_subscriptions_info_by_topic(topic, no_mangle=True)
         return min(len(publishers), len(subscriptions)), self.others()
 
-    def call(self, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
-        """Call a service and return its response. Raises NoAnswer at the deadline."""
-        response = self.call_each(service, [name], request, deadline)[name]
-        if response is None:
-            raise NoAnswer(f"service '{name}' did not answer within {deadline.timeout_s:g} s")
-        return response
-
-    def call_each(
-        self, service: Any, names: Iterable[str], request: Any, deadline: Deadline
-    ) -> dict[str, Any]:
-        """Call services of one type at once; None for those without an answer at the deadline."""
-        calls = {name: _Call(self.node.create_client(service, name)) for name in names}
-        try:
-            open_calls = list(calls.values())
-            while open_calls and not deadline.passed:
-                open_calls = [call for call in open_calls if not call.advance(request)]
-                self.spin_once(deadline)
-            return {name: call.response for name, call in calls.items()}
-        finally:
-            for call in calls.values():
-                self.node.destroy_client(call.client)
-
 
 def _participant(end: TopicEndpointInfo) -> bytes:
     return bytes(end.endpoint_gid[:_PARTICIPANT_BYTES])
@@ -257,20 +233,3 @@ class _Quiet:
         if seen != self._seen:
             self._seen, self._since_s = seen, time.monotonic()
         return self._since_s
-
-
-class _Call:
-    """A service call that is sent as soon as the server is there."""
-
-    def __init__(self, client: Client) -> None:
-        self.client = client
-        self.response: Any = None
-        self._future: Future | None = None
-
-    def advance(self, request: Any) -> bool:
-        """Do what can be done now; true once the response is there."""
-        if self._future is None and self.client.service_is_ready():
-            self._future = self.client.call_async(request)
-        if self._future is not None and self._future.done():
-            self.response = self._future.result()
-        return self.response is not None

@@ -10,6 +10,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
+from composer.runtime.asking import call_once
 from composer.runtime.callback_messages import from_message
 from composer.runtime.claim import claims
 from composer.runtime.figures import CallbackFigures, ChainFigures
@@ -156,7 +157,7 @@ class Systems:
             raise self._silent(name)
         service = f"{name}/{NAME}/{what}"
         try:
-            answer = self._session.call(Trigger, service, Trigger.Request(), life)
+            answer = call_once(self._session, Trigger, service, Trigger.Request(), life)
         except NoAnswer as error:
             if life.is_over:
                 raise NoAnswer(f"{name} did not {what}: its process has ended") from error
