@@ -61,14 +61,15 @@ def pub(
 ) -> None:
     """Publish messages on a topic.
 
-    The time limit is for the subscriptions that are waited for. With --json each message is
-    printed, as it was published, as one JSON object a line.
+    The time limit is for the subscriptions that are waited for. A warning says at the end if a
+    reliable one has not acknowledged within a second what was published. With --json each message
+    is printed, as it was published, as one JSON object a line.
     """
     from composer.qos import PRESETS
 
     limit = 1 if once else times
     with ros_session("compose topic", timeout, carries_messages=True) as (session, deadline):
-        from composer.runtime.inspect_publish import Publishing, publish
+        from composer.runtime.inspect_publish import NotAcknowledged, Publishing, publish
         from composer.runtime.inspect_values import class_of, compile_content, to_plain
 
         publishing = Publishing(
@@ -80,10 +81,13 @@ def pub(
             times=limit,
             wait_for=wait_for if wait_for is not None else int(limit is not None),
         )
-        for number, message in enumerate(publish(session, deadline, publishing), 1):
-            if number % every:
-                continue
-            if json:
-                write(as_json(to_plain(message)))
-            else:
-                say(f"published #{number}: {message}")
+        try:
+            for number, message in enumerate(publish(session, deadline, publishing), 1):
+                if number % every:
+                    continue
+                if json:
+                    write(as_json(to_plain(message)))
+                else:
+                    say(f"published #{number}: {message}")
+        except NotAcknowledged as error:  # it is published, and may have arrived
+            say(f"warning: {error}\n  {error.hint}")

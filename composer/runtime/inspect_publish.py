@@ -12,7 +12,13 @@ from rclpy.duration import Duration
 from composer.qos import QosProfile
 from composer.runtime.inspect_values import Build, class_of
 from composer.runtime.ports.profiles import rclpy_profile
-from composer.runtime.session import Deadline, NoAnswer, Session
+from composer.runtime.session import Deadline, NoAnswer, RosError, Session
+
+_ACKNOWLEDGED_WITHIN_S = 1
+
+
+class NotAcknowledged(RosError):
+    """A reliable subscription has not said in time that it has all that was published."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +40,8 @@ class Publishing:
 def publish(session: Session, deadline: Deadline, what: Publishing) -> Iterator[Any]:
     """Publish and yield each message, then see that reliable subscriptions have got them.
 
-    The deadline is for the matching; raises NoAnswer. Messages see ``count`` (from 0) and ``now``
-    (seconds).
+    The deadline is for the matching; raises NoAnswer. After the last message, raises
+    NotAcknowledged. Messages see ``count`` (from 0) and ``now`` (seconds).
     """
     publisher = session.node.create_publisher(
         class_of(what.type_name), what.topic, rclpy_profile(what.qos)
@@ -52,7 +58,8 @@ def publish(session: Session, deadline: Deadline, what: Publishing) -> Iterator[
             next_s += 1.0 / what.rate_hz
             if what.times is None or count < what.times:
                 _spin_until(session, next_s)
-        publisher.wait_for_all_acked(Duration(seconds=1))
+        if not publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGED_WITHIN_S)):
+            raise _not_acknowledged(what.topic)
     finally:
         session.node.destroy_publisher(publisher)
 
@@ -66,6 +73,15 @@ def _wait_for_match(
             f" {deadline.timeout_s:g} s",
             "--wait-matching-subscriptions 0 publishes at once; compose topic info -v shows QoS",
         )
+
+
+def _not_acknowledged(topic: str) -> NotAcknowledged:
+    return NotAcknowledged(
+        f"not every reliable subscription to '{topic}' has acknowledged what was published within"
+        f" {_ACKNOWLEDGED_WITHIN_S} s",
+        "it may not have arrived: a subscriber may be stopped, busy or just gone, or the network"
+        f" loses much; 'compose topic info -v {topic}' shows who is there",
+    )
 
 
 def _spin_until(session: Session, at_s: float) -> None:

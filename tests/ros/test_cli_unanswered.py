@@ -6,13 +6,14 @@ loses an answer for a client that the server has not met yet. A second request i
 
 from __future__ import annotations
 
+import signal
 import subprocess
 from collections import Counter
 from collections.abc import Iterator
 
 import pytest
 
-from tests.ros.commands import error, hand_written, said
+from tests.ros.commands import PATIENCE_S, error, hand_written, said, start
 
 
 @pytest.fixture
@@ -65,3 +66,22 @@ def test_what_changes_something_is_sent_once(
     # A second request would be answered, and the command would succeed.
     assert "did not answer within 8 s" in error(*command.split(), "--timeout", "8")
     assert requests(forgetful)[service] == 1
+
+
+def test_a_subscription_that_acknowledges_nothing_is_told(
+    forgetful: subprocess.Popen[str],
+) -> None:
+    arguments = ("--times", "2", "--rate", "0.5", "/lab/in", "std_msgs/msg/String")
+    process = start("topic", "pub", *arguments)
+    assert process.stderr is not None
+    assert any("published #1" in line for line in process.stderr)
+    forgetful.send_signal(signal.SIGSTOP)
+    _, rest = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0, rest
+    published, warning, hint = rest.splitlines()
+    assert published.startswith("published #2: ")
+    assert warning == (
+        "warning: not every reliable subscription to '/lab/in' has acknowledged what was"
+        " published within 1 s"
+    )
+    assert "may be stopped" in hint
