@@ -9,6 +9,7 @@ from typing import Any
 from composer.model import Event, Node, Port, PortKind, Reaction, Timer
 from composer.runtime.behaviors import method
 from composer.runtime.core import Core
+from composer.runtime.delivery.sender import Sender
 from composer.runtime.messages import interface_class
 from composer.runtime.ports.action_client import ActionClientPort
 from composer.runtime.ports.action_server import ActionServerPort, Handlers
@@ -39,6 +40,11 @@ class Assembly:
     timers: dict[str, TimerPort] = field(default_factory=dict)
     transitions: dict[Event, RunningReaction] = field(default_factory=dict)
     always_on: list[RunningPort] = field(default_factory=list)
+
+    @property
+    def senders(self) -> dict[str, Sender]:
+        """What the node publishes with, by the name of the publisher."""
+        return {name: port.sender for name, port in self.publishers.items()}
 
     @property
     def ports(self) -> Iterator[RunningPort]:
@@ -137,4 +143,4 @@ class Assembly:
 
     def _compile(self, declared: Reaction, response_type: Any = None) -> RunningReaction:
         callers: dict[str, Caller] = {**self.clients, **self.action_clients}
-        return RunningReaction(self.core, declared, self.publishers, callers, response_type)
+        return RunningReaction(self.core, declared, self.senders, callers, response_type)

@@ -116,7 +116,8 @@ class NamedPorts(Named):
 
     def __init__(self, kind: str, entries: Mapping[str, Any]) -> None:
         super().__init__(kind, entries)
-        vars(self).update(entries)
+        for name, entry in entries.items():
+            setattr(self, name, entry)  # not by vars(): a dict of its own is further away
 
 
 class NodeClock:

@@ -10,7 +10,7 @@ message is lost and nobody else publishes to the topic.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from dataclasses import dataclass
 from itertools import pairwise
 from time import monotonic
@@ -20,7 +20,6 @@ from composer.model import Node, Port, System
 from composer.runtime.statistics import ChainStatistics
 from composer.runtime.strand import Work
 
-Send = Callable[[Any], None]
 _ON_THE_WAY = 256  # messages from one node to the next; of more, the oldest are forgotten
 
 
@@ -35,19 +34,14 @@ class Hop:
         self._coming: deque[tuple[int, float | None]] = deque(maxlen=_ON_THE_WAY)
         self._knows_again = False
 
-    def around(self, send: Send) -> Send:
-        """Return ``send`` of the publisher, watched."""
-
-        def watched(message: Any) -> None:
-            now_s = monotonic()
-            since_s, self._since_s = now_s if self._is_first else self._since_s, None
-            if self._following is not None:
-                self._following._coming.append((id(message), since_s))
-            elif since_s is not None:
-                self._chain.take(now_s - since_s)
-            send(message)
-
-        return watched
+    def put(self, message: Any) -> None:
+        """Take a message that is being published."""
+        now_s = monotonic()
+        since_s, self._since_s = now_s if self._is_first else self._since_s, None
+        if self._following is not None:
+            self._following._coming.append((id(message), since_s))
+        elif since_s is not None:
+            self._chain.take(now_s - since_s)
 
     def hear(self, message: Any) -> None:
         """Take a message that comes from the publisher before, or from any other of its topic."""
@@ -72,12 +66,9 @@ class NodeChains:
     node: str
     hops: tuple[tuple[str, str, Hop], ...] = ()
 
-    def sending(self, port: Port, send: Send) -> Send:
-        """Return ``send`` of a publisher; where chains lead through it, watched."""
-        for name, _, hop in self.hops:
-            if name == port.name.value:
-                send = hop.around(send)
-        return send
+    def watching(self, port: Port) -> tuple[Hop, ...]:
+        """Return those that are to get what a publisher sends."""
+        return tuple(hop for name, _, hop in self.hops if name == port.name.value)
 
     def hearing(self, port: Port, work: Work[Any]) -> Work[Any]:
         """Return the work of a subscription; where chains lead through its topic, watched."""

@@ -17,6 +17,7 @@ from types import FrameType
 from composer.runtime.line import Line
 from composer.runtime.loop import Loop
 from composer.runtime.node import RunningNode
+from composer.runtime.ports.mailbox import Mailbox
 from composer.runtime.reactions import RunningReaction
 from composer.runtime.stacks import shown, stacks_of, undisturbed
 from composer.runtime.user_code import CALLERS, HARMLESS
@@ -63,7 +64,7 @@ class RunningCallback:
             for frame in self._callers:
                 subject = frame.f_locals.get("self")
                 owner = owners.get(id(subject)) or owners.get(id(getattr(subject, "_core", None)))
-                if owner is not None or isinstance(subject, Line):
+                if owner is not None or isinstance(subject, (Line, Mailbox)):
                     return owner
         return None
 

@@ -26,7 +26,10 @@ _ADDRESS = ctypes.addressof(ctypes.c_char.from_buffer(MARKS))
 _ZERO = ctypes.cast(ctypes.CDLL(None).bzero, ctypes.c_void_p)
 #: The byte at 0 is for those who have none of their own: always zero.
 _NONE = 0
-_free = list(range(_MARKS - 1, _NONE, -1))
+#: The byte that is never zero, of those who need not look: no mark is before it.
+STEADY = 1
+MARKS[STEADY] = 1
+_free = list(range(_MARKS - 1, STEADY, -1))
 
 
 class MatchMark:

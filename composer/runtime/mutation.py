@@ -58,7 +58,7 @@ class MutationCheck:
         self._lately: deque[tuple[_Seen, str]] = deque(maxlen=_REMEMBERED)
 
     def remember(self, message: Any, what: str) -> None:
-        """Look at the message from now on; ``what`` is told of it: ``published on '/odometry'``."""
+        """Look at the message from now on; ``what`` is told of it: ``published by 'odometry'``."""
         self._lately.append((self._messages.of(message), what))
 
     def around(self, callback: str, work: Work[T]) -> Work[T]:
@@ -85,6 +85,20 @@ class MutationCheck:
                 seen.form = form
                 kind = type(seen.message).__name__
                 self._tell(callback, f"has changed a message ({kind}) after it was {what}")
+
+
+class Remembered:
+    """Has each message that is put there looked at from now on."""
+
+    __slots__ = ("_check", "_what")
+
+    def __init__(self, check: MutationCheck, what: str) -> None:
+        self._check = check
+        self._what = what
+
+    def put(self, message: Any) -> None:
+        """Look at the message from now on."""
+        self._check.remember(message, self._what)
 
 
 class _Look:

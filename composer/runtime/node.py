@@ -180,7 +180,7 @@ class RunningNode:
     def sent(self, publisher: str) -> int:
         """Return how many messages went through a publisher since the node was configured."""
         port = self._assembly.publishers.get(publisher)
-        return 0 if port is None else port.sent
+        return 0 if port is None else port.sender.sent
 
     @property
     def cores(self) -> tuple[Core, Core]:
@@ -287,7 +287,7 @@ class RunningNode:
         behavior.log = self._core.log
         behavior.clock = NodeClock(self._core, self._standby)
         behavior.parameters = Named("parameter", self._core.names["parameters"])
-        behavior.publishers = NamedPorts("publisher", assembly.publishers)
+        behavior.publishers = NamedPorts("publisher", assembly.senders)
         behavior.clients = NamedPorts("client", assembly.clients)
         behavior.action_clients = NamedPorts("action client", assembly.action_clients)
 

@@ -125,7 +125,7 @@ def test_a_connection_may_ask_for_copies_or_for_dds(tmp_path: Path) -> None:
     options = HostOptions(log_level=LogLevel.DEBUG)
     with running(COPIED, tmp_path, options=options, table=MODULE) as system:
         source = system.host._crew.nodes["source"]
-        publishers = source._assembly.publishers
+        publishers = source._assembly.senders
         sinks = {name: behavior(system, name) for name in ("shared", "copied", "by_dds")}
 
         def publish_and_change() -> None:

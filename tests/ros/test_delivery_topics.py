@@ -97,12 +97,12 @@ def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -
     The middleware counts first, and tells then.
     """
     port = system.host._crew.nodes["source"]._assembly.publishers["numbers"]
-    outlet = port._send.__self__
+    outlet = port.sender
 
     def knows() -> bool:
         matched = port._publisher.get_subscription_count()
         has_outsiders = matched > len(outlet._inlets)
-        looked = outlet._has_outsiders is has_outsiders or not marks.MARKS[outlet._changed_at]
+        looked = outlet._has_outsiders is has_outsiders or not marks.MARKS[outlet._mark]
         return is_matched(matched) and looked
 
     wait_until(knows, "so many subscriptions")
@@ -301,7 +301,7 @@ def test_a_look_that_is_overtaken_does_not_hide_who_has_come(tmp_path: Path) -> 
     """Two threads publish when somebody matches: the one looks before that, the other after it."""
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
         port = system.host._crew.nodes["source"]._assembly.publishers["numbers"]
-        outlet = port._send.__self__
+        outlet = port.sender
         overtaking = threading.Thread(target=outlet._look_outside)
 
         def count_matched() -> int:

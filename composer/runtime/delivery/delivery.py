@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
@@ -13,9 +13,9 @@ from composer.model import ChannelKind, Port
 from composer.runtime.delivery.action import LocalActionServer
 from composer.runtime.delivery.choice import ChannelKey, channel_of
 from composer.runtime.delivery.own_publications import ignore_own_publications, why_not_ignored
-from composer.runtime.delivery.queue import Queue
+from composer.runtime.delivery.sender import Origin, Sender
 from composer.runtime.delivery.server import Server
-from composer.runtime.delivery.topic import Inlet, Outlet, Topic
+from composer.runtime.delivery.topic import Inlet, Receiver, Topic, outlet_for
 
 S = TypeVar("S")
 
@@ -54,23 +54,23 @@ class Delivery:
         return self._objections.get(channel_of(port))
 
     def add_publisher(
-        self, port: Port, publisher: Publisher
-    ) -> tuple[Callable[[Any], None], Leave]:
-        """Return what sends a message of the port, and what ends that."""
+        self, port: Port, publisher: Publisher, origin: Origin
+    ) -> tuple[Sender, Leave]:
+        """Return what sends the messages of the port, and what ends that."""
         topic = self._topics.get(channel_of(port))
         if topic is None:
-            return publisher.publish, _nothing
-        outlet = Outlet(publisher, port)
+            return Sender(publisher, origin), _nothing
+        outlet = outlet_for(publisher, origin, port)
         topic.add_outlet(outlet)
-        return outlet.send, lambda: topic.remove_outlet(outlet)
+        return outlet, lambda: topic.remove_outlet(outlet)
 
-    def add_subscription(self, port: Port, subscription: Subscription, queue: Queue) -> Leave:
-        """Put into ``queue`` what is published in the process; return what ends that."""
+    def add_subscription(self, port: Port, subscription: Subscription, receiver: Receiver) -> Leave:
+        """Hand ``receiver`` what is published in the process; return what ends that."""
         topic = self._topics.get(channel_of(port))
         if topic is None:
-            return _nothing
+            return receiver.close
         ignore_own_publications(subscription)
-        inlet = Inlet(subscription.msg_type, port, queue)
+        inlet = Inlet(subscription.msg_type, port, receiver)
         topic.add_inlet(inlet)
         return lambda: topic.remove_inlet(inlet)
 

@@ -9,9 +9,9 @@ from weakref import ref
 
 from composer.model import Isolation, Port
 from composer.runtime.delivery.copying import copy_of
-from composer.runtime.delivery.queue import CallSoon
 from composer.runtime.tasks import Future
 
+CallSoon = Callable[[Callable[[], object]], None]
 Reply = Callable[[Any], None]
 Receive = Callable[[Any, Reply], None]
 

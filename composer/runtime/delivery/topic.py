@@ -8,107 +8,79 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from rclpy.publisher import Publisher
-from rclpy.serialization import deserialize_message
 
 from composer.model import Isolation, Port
 from composer.qos import Durability, incompatibilities
 from composer.runtime.delivery.copying import copy_of
-from composer.runtime.delivery.queue import Queue
-from composer.runtime.marks import MARKS, MatchMark
+from composer.runtime.delivery.sender import Origin, Sender, Target
+from composer.runtime.marks import MatchMark
 
-Send = Callable[[Any], None]
+
+class Receiver(Target, Protocol):
+    """What a subscription gets its messages by."""
+
+    def close(self) -> None:
+        """Take nothing more."""
 
 
 class Inlet:
     """A subscription, as publishers of its topic see it."""
 
-    __slots__ = ("isolated", "message_type", "profile", "queue")
+    __slots__ = ("isolated", "message_type", "profile", "receiver")
 
-    def __init__(self, message_type: Any, port: Port, queue: Queue) -> None:
+    def __init__(self, message_type: Any, port: Port, receiver: Receiver) -> None:
         self.message_type = message_type
         self.profile = port.qos.profile
         self.isolated = port.isolation is Isolation.COPY
-        self.queue = queue
-
-
-class Target(Protocol):
-    """Where messages are put."""
-
-    def put(self, message: Any) -> None:
-        """Have the message received."""
+        self.receiver = receiver
 
 
 class Copies:
-    """Puts copies into a queue."""
+    """Puts copies."""
 
-    __slots__ = ("_queue",)
+    __slots__ = ("_receiver",)
 
-    def __init__(self, queue: Queue) -> None:
-        self._queue = queue
+    def __init__(self, receiver: Receiver) -> None:
+        self._receiver = receiver
 
     def put(self, message: Any) -> None:
         """Have a copy of the message received."""
-        self._queue.put(copy_of(message))
+        self._receiver.put(copy_of(message))
 
 
-class Outlet:
-    """A publisher: hands each message to the inlets it matches, and to DDS where that is needed.
+class Outlet(Sender):
+    """A publisher that hands each message to the inlets it matches as well.
 
-    ``send`` may be called from any thread. Whether somebody outside listens is asked of the
-    middleware when something has matched or left, which a byte of ``MARKS`` says: asking takes half
-    a microsecond, of a message that takes little more than one.
+    Whether somebody outside listens is asked of the middleware when something has matched or left,
+    which a byte of :data:`~composer.runtime.marks.MARKS` says: asking takes half a microsecond, of
+    a message that takes less than one.
     """
 
     __slots__ = (
-        "_changed_at",
         "_count_matched",
-        "_has_outsiders",
         "_inlets",
         "_isolated",
-        "_latched",
-        "_lock",
         "_looking",
-        "_mark",
-        "_publish",
-        "_targets",
-        "message_type",
+        "_match_mark",
+        "_watchers",
         "profile",
-        "send",
     )
 
-    def __init__(self, publisher: Publisher, port: Port) -> None:
-        profile = port.qos.profile
-        self.message_type: Any = publisher.msg_type
-        self.profile = profile
+    def __init__(self, publisher: Publisher, origin: Origin, port: Port) -> None:
+        super().__init__(publisher, origin)
+        self.profile = port.qos.profile
         self._isolated = port.isolation is Isolation.COPY
-        self._publish: Send = publisher.publish
         self._count_matched: Callable[[], int] = publisher.handle.get_subscription_count
-        self._mark = MatchMark(publisher)
-        self._changed_at = self._mark.index
+        self._match_mark = MatchMark(publisher)
+        self._mark = self._match_mark.index
         self._has_outsiders = False
         self._looking = threading.Lock()  # the last look is what counts, not the slowest
         self._inlets: tuple[Inlet, ...] = ()
-        self._targets: tuple[Target, ...] = ()
-        self._latched: deque[Any] | None = None
-        self.send: Send = self._send
-        if profile.durability is Durability.TRANSIENT_LOCAL:
-            self._latched = deque(maxlen=profile.queue_depth)
-            self._lock = threading.Lock()  # who joins gets each message once
-            self.send = self._send_and_latch
+        self._watchers = origin.watchers
 
     def join(self, inlet: Inlet) -> None:
-        """Hand messages to ``inlet`` from now on, if they match; what is latched first."""
-        if inlet.message_type is not self.message_type:
-            return
-        if incompatibilities(self.profile, inlet.profile):
-            return
-        if self._latched is None:
-            self._reach((*self._inlets, inlet))
-            return
-        with self._lock:
-            if inlet.profile.durability is Durability.TRANSIENT_LOCAL:
-                for message in self._latched:
-                    self._target(inlet).put(message)
+        """Hand messages to ``inlet`` from now on, if they match."""
+        if self._matches(inlet):
             self._reach((*self._inlets, inlet))
 
     def leave(self, inlet: Inlet) -> None:
@@ -117,47 +89,68 @@ class Outlet:
 
     def close(self) -> None:
         """Send nothing any more. To be called before the publisher is destroyed."""
-        self._mark.close()
+        self._match_mark.close()
+
+    def _matches(self, inlet: Inlet) -> bool:
+        is_of_the_type = inlet.message_type is self.message_type
+        return is_of_the_type and not incompatibilities(self.profile, inlet.profile)
 
     def _reach(self, inlets: tuple[Inlet, ...]) -> None:
         self._inlets = inlets
-        self._targets = tuple(self._target(inlet) for inlet in inlets)
+        self._targets = (*self._watchers, *map(self._target, inlets))
         self._look_outside()
 
     def _target(self, inlet: Inlet) -> Target:
-        return Copies(inlet.queue) if self._isolated or inlet.isolated else inlet.queue
+        return Copies(inlet.receiver) if self._isolated or inlet.isolated else inlet.receiver
 
     def _look_outside(self) -> None:
         with self._looking:
-            self._mark.set()  # before the look: who matches in between is seen next time
+            self._match_mark.set()  # before the look: who matches in between is seen next time
             self._has_outsiders = self._count_matched() > len(self._inlets)
 
-    def _send(self, message: Any) -> None:
-        if message.__class__ is not self.message_type:
-            message = self._converted(message)
-        for target in self._targets:
-            target.put(message)
-        if not MARKS[self._changed_at]:
-            self._look_outside()
-        if self._has_outsiders:
-            self._publish(message)
 
-    def _send_and_latch(self, message: Any) -> None:
+class LatchingOutlet(Outlet):
+    """An outlet of a transient-local topic: who joins later gets what was sent before."""
+
+    __slots__ = ("_latched", "_lock")
+
+    def __init__(self, publisher: Publisher, origin: Origin, port: Port) -> None:
+        super().__init__(publisher, origin, port)
+        self._latched: deque[Any] = deque(maxlen=self.profile.queue_depth)
+        self._lock = threading.Lock()  # who joins gets each message once
+
+    def publish(self, message: Any) -> None:
+        """Send ``message``, from any thread. Raises TypeError when it is not of the topic's type.
+
+        It is dropped and counted while the node is not active.
+        """
+        if not self._gate.outgoing:
+            self._refuse()
+            return
         message = self._converted(message)
         with self._lock:
-            if self._latched is not None:
-                self._latched.append(copy_of(message) if self._isolated else message)
+            self._latched.append(copy_of(message) if self._isolated else message)
             for target in self._targets:
                 target.put(message)
             self._publish(message)  # somebody who is not here yet may want it
+        self.sent += 1
+        self._statistics.sent += 1
 
-    def _converted(self, message: Any) -> Any:
-        """Return what rclpy would publish. Raises TypeError where it would."""
-        if isinstance(message, self.message_type):
-            return message
-        if isinstance(message, bytes):
-            return deserialize_message(message, self.message_type)
-        raise TypeError(f"Expected {self.message_type}, got {type(message)}")
+    def join(self, inlet: Inlet) -> None:
+        """Hand messages to ``inlet`` from now on, if they match; what is latched first."""
+        if not self._matches(inlet):
+            return
+        with self._lock:
+            if inlet.profile.durability is Durability.TRANSIENT_LOCAL:
+                for message in self._latched:
+                    self._target(inlet).put(message)
+            self._reach((*self._inlets, inlet))
+
+
+def outlet_for(publisher: Publisher, origin: Origin, port: Port) -> Outlet:
+    """Return the outlet of a publisher port."""
+    latches = port.qos.profile.durability is Durability.TRANSIENT_LOCAL
+    return (LatchingOutlet if latches else Outlet)(publisher, origin, port)
 
 
 class Topic:
@@ -194,4 +187,4 @@ class Topic:
             self._inlets.remove(inlet)
             for outlet in self._outlets:
                 outlet.leave(inlet)
-        inlet.queue.close()
+        inlet.receiver.close()

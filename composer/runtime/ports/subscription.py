@@ -13,9 +13,8 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from composer.model import Port
 from composer.qos import Durability
 from composer.runtime.core import Core
-from composer.runtime.delivery.queue import Queue
-from composer.runtime.line import line_for
 from composer.runtime.messages import interface_class
+from composer.runtime.ports.mailbox import Mailbox, OverlappingMailbox
 from composer.runtime.ports.port import callback_group
 from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.ports.qos_events import QosEvents
@@ -35,16 +34,14 @@ class SubscriptionPort:
     __slots__ = (
         "_callback",
         "_core",
-        "_gate",
         "_handler",
         "_latched",
         "_leave",
         "_lifespan_s",
-        "_line",
+        "_mailbox",
         "_name",
         "_qos_events",
         "_reaction",
-        "_statistics",
         "_subscription",
         "_traced",
     )
@@ -57,8 +54,6 @@ class SubscriptionPort:
         handler: Callable[[Any], Any] | None,
     ) -> None:
         self._core = core
-        self._gate = core.gate
-        self._statistics = core.statistics
         self._name = port.name.value
         self._callback = f"on_{self._name}"
         self._reaction = reaction
@@ -68,12 +63,12 @@ class SubscriptionPort:
         work: Work[Any] = self._work
         if handler is not None and reaction is None and core.mutations is None:
             work = core.caller(self._callback, handler)  # which is shorter
-        self._line = line_for(
+        self._mailbox = (OverlappingMailbox if port.reentrant else Mailbox)(
             core,
             core.chains.hearing(port, work),
             CallbackTimer(core, self._traced, port.budget_ms),
-            depth=depth,
-            reentrant=port.reentrant,
+            self,
+            depth,
         )
         self._latched: deque[tuple[float, Any]] | None = None  # each with when it came
         lifespan_ms = port.qos.profile.lifespan_ms
@@ -84,42 +79,38 @@ class SubscriptionPort:
         self._subscription = core.node.create_subscription(
             interface_class(port.interface.value),
             port.full_name,
-            self.receive,
+            self._mailbox.receive,
             rclpy_profile(port.qos.profile),
             callback_group=callback_group(core, port),
             event_callbacks=cast(SubscriptionEventCallbacks, self._qos_events),
         )
-        queue = Queue(core.loop.call_soon, self.receive, depth, self._count_drop)
-        self._leave = core.delivery.add_subscription(port, self._subscription, queue)
-        core.loop.add_subscription(self._subscription, self.receive)
-
-    def receive(self, message: Any) -> None:
-        """Take a message that has come."""
-        if not self._gate.incoming:
-            if self._latched is None:
-                self._statistics.dropped += 1
-            else:
-                self._latched.append((monotonic(), message))
-            return
-        self._statistics.received += 1
-        if self._line.put(message) is not None:
-            self._count_drop()
+        self._leave = core.delivery.add_subscription(port, self._subscription, self._mailbox)
+        core.loop.add_subscription(self._subscription, self._mailbox.receive)
 
     def activate(self) -> None:
         """Take what was latched meanwhile."""
+        self._mailbox.begin_anew()
         since_s = monotonic() - self._lifespan_s
         while self._latched:
             came_s, message = self._latched.popleft()
             if came_s >= since_s:
-                self.receive(message)
+                self._mailbox.receive(message)
 
     def deactivate(self) -> None:
-        """Drop what waits."""
-        left = self._line.clear()
+        """Let go of what waits."""
+        self._mailbox.clear()
+
+    def hold(self, message: Any) -> None:
+        """Keep or drop a message that comes while the node is not active."""
         if self._latched is None:
-            self._statistics.dropped += len(left)
+            self._core.statistics.dropped += 1
         else:
-            self._latched.extend((monotonic(), message) for message in left)
+            self._latched.append((monotonic(), message))
+
+    def count_drop(self) -> None:
+        """Count a message that made room for the next."""
+        self._core.statistics.dropped += 1
+        self._traced.dropped += 1
 
     def destroy(self) -> None:
         """Leave the topic."""
@@ -127,10 +118,6 @@ class SubscriptionPort:
         self._leave()
         self._core.loop.remove(self._subscription)
         self._core.node.destroy_subscription(self._subscription)
-
-    def _count_drop(self) -> None:
-        self._statistics.dropped += 1
-        self._traced.dropped += 1
 
     def _work(self, message: Any) -> Coroutine[Any, Any, None] | None:
         if self._core.mutations is not None:

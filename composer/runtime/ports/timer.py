@@ -51,6 +51,7 @@ class TimerPort:
         """Make it, standing still. Raises PeriodError."""
         self._core = core
         self._name = timer.name.value
+        self._callback = f"on_{self._name}"
         self._clock = core.loop if timer.clock is TimerClock.STEADY else core.clock
         self._period = timer.period
         self._period_s = period_s(timer.period, core.names["parameters"])
@@ -115,4 +116,4 @@ class TimerPort:
                 self._core.faults.take(f"timer '{self._name}'", error)
         if self._handler is None:
             return None
-        return self._core.call(f"on_{self._name}", self._handler)
+        return self._core.call(self._callback, self._handler)
