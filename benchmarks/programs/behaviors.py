@@ -8,7 +8,7 @@ from typing import Any
 from composer_interfaces.action import Navigate
 from std_srvs.srv import Trigger
 
-from benchmarks.programs.payloads import age_ns, make
+from benchmarks.programs.payloads import make
 from benchmarks.programs.task import Task
 from benchmarks.programs.work import COUNTS, needs_kick
 from composer.behavior import Behavior
@@ -35,12 +35,12 @@ class Listener(Behavior):
 
 
 class Meter(Behavior):
-    """Hears messages and how old they are."""
+    """Hears messages and how long they took."""
 
     def on_input(self, message: Any) -> None:
-        """Note its age."""
+        """Note how long it took."""
+        COUNTS.took_ns.append(time.monotonic_ns() - COUNTS.sent_ns)
         COUNTS.delivered += 1
-        COUNTS.took_ns.append(age_ns(message))
 
 
 class Starter(Relay):
@@ -62,7 +62,9 @@ class Source(Behavior):
 
     def on_tick(self) -> None:
         """Send a new message."""
-        self.publishers.output.publish(make(TASKS[0].message))
+        message = make(TASKS[0].message)
+        COUNTS.sent_ns = time.monotonic_ns()
+        self.publishers.output.publish(message)
 
 
 class Ticker(Relay):

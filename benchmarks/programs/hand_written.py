@@ -15,7 +15,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 
-from benchmarks.programs.payloads import CLASSES, age_ns, make
+from benchmarks.programs.payloads import CLASSES, make
 from benchmarks.programs.task import Place, Task, places, task_from_arguments
 from benchmarks.programs.work import COUNTS, hand_over, measure, needs_kick
 
@@ -58,7 +58,7 @@ class Relay(LifecycleNode):
 
     def callback(self) -> Callable[[Any], None]:
         if not self.place.relays:
-            return self.on_aged_input
+            return self.on_measured_input
         return self.on_last_input if self.place.sends is None else self.on_input
 
     def on_input(self, message: Any) -> None:
@@ -68,12 +68,14 @@ class Relay(LifecycleNode):
     def on_last_input(self, message: Any) -> None:
         COUNTS.delivered += 1
 
-    def on_aged_input(self, message: Any) -> None:
+    def on_measured_input(self, message: Any) -> None:
+        COUNTS.took_ns.append(time.monotonic_ns() - COUNTS.sent_ns)
         COUNTS.delivered += 1
-        COUNTS.took_ns.append(age_ns(message))
 
     def send(self) -> None:
-        self.output.publish(make(self.task.message))
+        message = make(self.task.message)
+        COUNTS.sent_ns = time.monotonic_ns()
+        self.output.publish(message)
 
     def kick(self) -> None:
         if self.task.shape == "ring" and needs_kick(self.seen):

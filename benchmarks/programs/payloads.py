@@ -21,7 +21,7 @@ CLASSES = {"String": String, "LaserScan": LaserScan, "Image": Image}
 
 
 def make(kind: str) -> Any:
-    """Return a new message. A String holds the time: 32 characters."""
+    """Return a new message. A String holds 32 characters, others each time."""
     match kind:
         case "LaserScan":
             return LaserScan(ranges=_RANGES, intensities=_RANGES)
@@ -35,8 +35,3 @@ def make(kind: str) -> Any:
             )
         case _:
             return String(data=f"{time.monotonic_ns():032}")
-
-
-def age_ns(message: String) -> int:
-    """Return how long ago a String was made."""
-    return time.monotonic_ns() - int(message.data)

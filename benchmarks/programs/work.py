@@ -23,9 +23,13 @@ _OTHERS_LAST_S = 120.0  # is over long before; nobody may be left to end the oth
 
 @dataclass(slots=True)
 class Counts:
-    """What callbacks write and the main thread reads. ``took_ns`` are latencies and round trips."""
+    """What callbacks write and the main thread reads. ``took_ns`` are latencies and round trips.
+
+    ``sent_ns`` is when the message that is on its way was published.
+    """
 
     delivered: int = 0
+    sent_ns: int = 0
     ticks_ns: list[int] = field(default_factory=list)
     took_ns: list[int] = field(default_factory=list)
 
