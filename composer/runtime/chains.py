@@ -10,7 +10,6 @@ message is lost and nobody else publishes to the topic.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Coroutine
 from dataclasses import dataclass
 from itertools import pairwise
 from time import monotonic
@@ -18,7 +17,6 @@ from typing import Any
 
 from composer.model import Node, Port, System
 from composer.runtime.statistics import ChainStatistics
-from composer.runtime.strand import Work
 
 _ON_THE_WAY = 256  # messages from one node to the next; of more, the oldest are forgotten
 
@@ -70,18 +68,9 @@ class NodeChains:
         """Return those that are to get what a publisher sends."""
         return tuple(hop for name, _, hop in self.hops if name == port.name.value)
 
-    def hearing(self, port: Port, work: Work[Any]) -> Work[Any]:
-        """Return the work of a subscription; where chains lead through its topic, watched."""
-        hops = tuple(hop for _, topic, hop in self.hops if topic == port.full_name)
-        if not hops:
-            return work
-
-        def watched(message: Any) -> Coroutine[Any, Any, None] | None:
-            for hop in hops:
-                hop.hear(message)
-            return work(message)
-
-        return watched
+    def hearing(self, port: Port) -> tuple[Hop, ...]:
+        """Return those that are to hear what a subscription gets."""
+        return tuple(hop for _, topic, hop in self.hops if topic == port.full_name)
 
 
 class Chains:

@@ -19,7 +19,7 @@ from composer.runtime.log import Faults, Log
 from composer.runtime.loop import Loop
 from composer.runtime.mutation import MutationCheck
 from composer.runtime.statistics import Statistics
-from composer.runtime.strand import Strand, Work
+from composer.runtime.strand import Strand
 from composer.runtime.tasks import Cancelled, Future
 from composer.runtime.user_code import calls_user_code
 
@@ -71,27 +71,6 @@ class Core:
         for task in tuple(self.tasks):
             task.cancel()
 
-    def caller(self, name: str, function: Callable[[T], Any]) -> Work[T]:
-        """Return what calls ``function`` as :meth:`call` does."""
-
-        # Defaults are one object, found at once; what a closure knows is two objects a name, and
-        # in a large system what a message costs is to fetch objects from far away in memory.
-        @calls_user_code
-        def work(
-            item: T,
-            self: Core = self,  # by this name the watch finds whose callback hangs
-            name: str = name,
-            function: Callable[[T], Any] = function,
-        ) -> Coroutine[Any, Any, None] | None:
-            try:
-                result = function(item)
-            except BaseException as error:
-                self.faults.take(name, error)
-                return None
-            return None if result is None else self._rest_of(name, result)
-
-        return work
-
     @calls_user_code
     def call(
         self, name: str, function: Callable[..., Any], *arguments: Any
@@ -105,9 +84,10 @@ class Core:
         except BaseException as error:
             self.faults.take(name, error)
             return None
-        return None if result is None else self._rest_of(name, result)
+        return None if result is None else self.rest_of(name, result)
 
-    def _rest_of(self, name: str, result: object) -> Coroutine[Any, Any, None] | None:
+    def rest_of(self, name: str, result: object) -> Coroutine[Any, Any, None] | None:
+        """Return the rest of what user code has begun, where it is ``async``; see :meth:`call`."""
         return self._rest(name, result) if isinstance(result, Awaitable) else None
 
     @calls_user_code

@@ -65,7 +65,15 @@ class CallbackTimer:
     def call(self, work: Work[T], item: T) -> Coroutine[Any, Any, None] | None:
         """Do the work, timed."""
         began_s = monotonic()
-        rest = work(item)
+        return self.took(began_s, work(item))
+
+    def took(
+        self, began_s: float, rest: Coroutine[Any, Any, None] | None
+    ) -> Coroutine[Any, Any, None] | None:
+        """Count what began at ``began_s`` of ``monotonic()`` and keeps the thread no longer.
+
+        Returns ``rest``, timed: what is left of it where it is ``async``.
+        """
         took_s = monotonic() - began_s
         if rest is not None:
             self._time_each(1)

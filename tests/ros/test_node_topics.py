@@ -228,6 +228,100 @@ def test_runs_of_a_reentrant_port_overlap(tmp_path: Path, peer: Peer) -> None:
             system.wait_for_log(f"end {number}")
 
 
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
+def test_what_comes_while_a_node_rests_does_not_wait_for_it(tmp_path: Path, kind: str) -> None:
+    """A handler of before still awaits something, so that nobody takes what comes out of the queue.
+
+    Nothing of it may be left for when the node is active again.
+    """
+    text = f"""
+    system: resting
+    executors: {{chosen: {{kind: {kind}}}}}
+    nodes:
+      source:
+        executor: chosen
+        behavior: resting:Source
+        publishers:
+          output: {{type: std_msgs/msg/Int64, topic: /numbers}}
+      sink:
+        executor: chosen
+        behavior: resting:Sink
+        subscriptions:
+          input: {{type: std_msgs/msg/Int64, topic: /numbers}}
+    """
+    module = """
+    from composer.behavior import Behavior
+    from rclpy.task import Future
+
+    class Source(Behavior):
+        pass
+
+    class Sink(Behavior):
+        def on_configure(self):
+            self.release = Future()
+
+        async def on_input(self, message):
+            self.log.info(f"begin {message.data}")
+            await self.release
+            self.log.info(f"end {message.data}")
+    """
+    with running(text, tmp_path, resting=module) as system:
+        source, sink = (system.host._crew.nodes[name] for name in ("source", "sink"))
+        output = source._assembly.senders["output"]
+        output.publish(Int64(data=0))
+        system.wait_for_log("begin 0")
+        system.change("sink", "deactivate")
+        output.publish(Int64(data=1))
+        output.publish(Int64(data=2))
+        system.change("sink", "activate")
+        output.publish(Int64(data=3))
+        assert "begin 3" not in system.log_text()  # one at a time, also from before
+        sink._behavior.release.set_result(None)
+        system.wait_for_log("end 3")
+        counted = system.summary("/sink")
+    words = [f"{word} {number}" for number in (0, 3) for word in ("begin", "end")]
+    assert [line for line in system.log() if line in words or line.startswith("begin")] == words
+    assert (counted.received, counted.dropped) == (2, 2)
+
+
+def test_reentrant_callbacks_run_at_once_on_several_threads(tmp_path: Path) -> None:
+    text = """
+    system: overlapping
+    executors: {several: {kind: multi_threaded, threads: 3}}
+    nodes:
+      source:
+        behavior: overlapping:Source
+        publishers:
+          output: {type: std_msgs/msg/Int64, topic: /numbers}
+      sink:
+        executor: several
+        behavior: overlapping:Sink
+        subscriptions:
+          input: {type: std_msgs/msg/Int64, topic: /numbers, reentrant: true}
+    """
+    module = """
+    import threading
+    from composer.behavior import Behavior
+
+    class Source(Behavior):
+        pass
+
+    class Sink(Behavior):
+        def on_configure(self):
+            self.both = threading.Barrier(2, timeout=20.0)
+
+        def on_input(self, message):
+            self.both.wait()
+            self.log.info(f"met {message.data}")
+    """
+    with running(text, tmp_path, overlapping=module) as system:
+        output = system.host._crew.nodes["source"]._assembly.senders["output"]
+        output.publish(Int64(data=0))
+        output.publish(Int64(data=1))
+        for number in range(2):
+            system.wait_for_log(f"met {number}")
+
+
 def test_the_callbacks_of_a_node_take_turns_on_several_threads(tmp_path: Path, peer: Peer) -> None:
     text = """
     system: turns

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Coroutine
 from functools import partial
+from time import monotonic
 from typing import Any, Protocol
 
+from composer.model import Port
 from composer.runtime.core import Core
-from composer.runtime.strand import Direct, Work
+from composer.runtime.strand import Direct
 from composer.runtime.tracing import CallbackTimer
+from composer.runtime.user_code import calls_user_code
 
 
 class Keeper(Protocol):
@@ -25,10 +28,9 @@ class Keeper(Protocol):
 class Mailbox:
     """The messages of one subscription, in the order in which they were put, as deep as its QoS.
 
-    The port's work is done on its loop, with one message per turn of it, so that a flood holds
-    nobody up, and with one at a time: what the work has to await, the next message waits for as
-    well. Everything that a message needs is in this one object, as in
-    :class:`~composer.runtime.delivery.sender.Sender`.
+    They are handled on its loop, one per turn of it, so that a flood holds nobody up, and one at a
+    time: what a handler awaits, the next message waits for as well. Everything that a message needs
+    is in this one object, as in :class:`~composer.runtime.delivery.sender.Sender`.
     """
 
     __slots__ = (
@@ -36,31 +38,37 @@ class Mailbox:
         "_core",
         "_depth",
         "_gate",
+        "_handle",
         "_idle",
         "_is_awaiting",
         "_keeper",
         "_messages",
+        "_name",
         "_statistics",
         "_timer",
         "_turn",
-        "_work",
     )
     _overlaps = False
 
     def __init__(
         self,
         core: Core,
-        work: Work[Any],
+        port: Port,
+        handle: Callable[[Any], Any],
         timer: CallbackTimer,
         keeper: Keeper,
-        depth: int | None,
     ) -> None:
-        """Without ``depth`` it keeps everything."""
+        """Without a depth it keeps everything. What ``handle`` raises is a fault of the handler's.
+
+        What ``handle`` returns is awaited, where it can be.
+        """
+        depth = port.qos.profile.queue_depth
         self._core = core
+        self._name = f"on_{port.name.value}"
         self._call_soon = core.loop.call_soon
         self._gate = core.gate
         self._statistics = core.statistics
-        self._work = timer.watched(work)
+        self._handle = handle
         self._timer = timer
         self._depth = depth
         self._keeper = keeper
@@ -113,7 +121,7 @@ class Mailbox:
 
     def close(self) -> None:
         """Take nothing more."""
-        self._work = _ignore
+        self._handle = _ignore
         self._keeper = _Nobody()
         self._messages.clear()
 
@@ -127,13 +135,7 @@ class Mailbox:
         rest = None
         try:
             if self._gate.incoming:
-                self._statistics.received += 1
-                timer = self._timer
-                if timer.pause > 0:
-                    timer.pause -= 1
-                    rest = self._work(message)
-                else:
-                    rest = timer.call(self._work, message)
+                rest = self._work_on(message)
             else:
                 self._keeper.hold(message)
         finally:
@@ -145,6 +147,24 @@ class Mailbox:
                 self._idle.append(True)
                 if messages:
                     self._begin()
+
+    @calls_user_code
+    def _work_on(self, message: Any) -> Coroutine[Any, Any, None] | None:
+        """Have the message handled; return the rest of that, where it is ``async``."""
+        self._statistics.received += 1
+        timer = self._timer
+        began_s = 0.0
+        if timer.pause > 0:  # two threads may both count down the last
+            timer.pause -= 1
+        else:
+            began_s = monotonic()
+        try:
+            result = self._handle(message)
+        except BaseException as error:
+            self._core.faults.take(self._name, error)
+            result = None
+        rest = None if result is None else self._core.rest_of(self._name, result)
+        return timer.took(began_s, rest) if began_s else rest
 
     def _wait_for(self, rest: Coroutine[Any, Any, None]) -> None:
         self._is_awaiting = True
@@ -191,13 +211,7 @@ class OverlappingMailbox(Mailbox):
         if not self._gate.incoming:
             self._keeper.hold(message)
             return
-        self._statistics.received += 1
-        timer = self._timer
-        if timer.pause > 0:  # two threads may both count down the last
-            timer.pause -= 1
-            rest = self._work(message)
-        else:
-            rest = timer.call(self._work, message)
+        rest = self._work_on(message)
         if rest is not None:
             self._core.spawn(rest)
 

@@ -19,7 +19,6 @@ from composer.runtime.ports.port import callback_group
 from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.ports.qos_events import QosEvents
 from composer.runtime.reactions import RunningReaction
-from composer.runtime.strand import Work
 from composer.runtime.tracing import CallbackTimer
 
 
@@ -35,6 +34,7 @@ class SubscriptionPort:
         "_callback",
         "_core",
         "_handler",
+        "_hops",
         "_latched",
         "_leave",
         "_lifespan_s",
@@ -60,16 +60,13 @@ class SubscriptionPort:
         self._handler = handler
         depth = port.qos.profile.queue_depth
         self._traced = core.statistics.callback(port.kind.value, self._name)
-        work: Work[Any] = self._work
-        if handler is not None and reaction is None and core.mutations is None:
-            work = core.caller(self._callback, handler)  # which is shorter
-        self._mailbox = (OverlappingMailbox if port.reentrant else Mailbox)(
-            core,
-            core.chains.hearing(port, work),
-            CallbackTimer(core, self._traced, port.budget_ms),
-            self,
-            depth,
-        )
+        self._hops = core.chains.hearing(port)
+        timer = CallbackTimer(core, self._traced, port.budget_ms)
+        handle: Callable[[Any], Any] = timer.watched(self._handle)
+        if handler and not (reaction or core.mutations or self._hops):
+            handle = handler  # which is shorter
+        kind = OverlappingMailbox if port.reentrant else Mailbox
+        self._mailbox = kind(core, port, handle, timer, self)
         self._latched: deque[tuple[float, Any]] | None = None  # each with when it came
         lifespan_ms = port.qos.profile.lifespan_ms
         self._lifespan_s = inf if lifespan_ms is None else lifespan_ms / 1000.0
@@ -119,7 +116,9 @@ class SubscriptionPort:
         self._core.loop.remove(self._subscription)
         self._core.node.destroy_subscription(self._subscription)
 
-    def _work(self, message: Any) -> Coroutine[Any, Any, None] | None:
+    def _handle(self, message: Any) -> Coroutine[Any, Any, None] | None:
+        for hop in self._hops:
+            hop.hear(message)
         if self._core.mutations is not None:
             self._core.mutations.remember(message, f"received by '{self._name}'")
         if self._reaction is not None:
