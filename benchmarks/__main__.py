@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import platform
+import sysconfig
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -91,6 +92,7 @@ def _write(rows: list[Row], load_before: float, *, long: bool) -> Path:
     content = {
         "time": now.isoformat(timespec="seconds"),
         "python": platform.python_version(),
+        "python was built with": sysconfig.get_config_var("CONFIG_ARGS"),
         "processors": os.cpu_count(),
         "load": [load_before, os.getloadavg()[0]],
         "long": long,

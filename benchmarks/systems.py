@@ -8,6 +8,7 @@ from typing import Any
 
 from benchmarks.figures import Row, percentile
 from benchmarks.turns import (
+    BARE,
     COMPOSED,
     EVENTS,
     MULTI,
@@ -59,7 +60,11 @@ def streams(*, long: bool) -> list[Row]:
     for shape, nodes, message in _streams(long=long):
         rate_hz = 30.0 if message == "Image" else 100.0
         case = Case(shape, nodes, seconds, rounds, rate_hz, message)
-        ways = (COMPOSED, SINGLE, EVENTS) if long and nodes <= 30 else (COMPOSED, EVENTS)
+        ways = [COMPOSED, EVENTS]
+        if long and nodes <= 30:
+            ways.append(SINGLE)
+        if (shape, message) == ("chain", "String"):
+            ways.append(BARE)
         turns = take_turns(ways, case)
         found += rows(f"{shape}, {message} {rate_hz:g} Hz, N={nodes}", CPU, turns, cpu_us)
         found += rows(
@@ -91,10 +96,11 @@ def hops(*, long: bool) -> list[Row]:
     found: list[Row] = []
     for nodes in sizes:
         for rate_hz in rates_hz:
-            turns = take_turns((COMPOSED, EVENTS), Case("hop", nodes, seconds, rounds, rate_hz))
+            case = Case("hop", nodes, seconds, rounds, rate_hz)
+            turns = take_turns((COMPOSED, EVENTS, BARE), case)
             for share in (0.5, 0.99):
-                case = f"hop {rate_hz:g} Hz p{share * 100:g}, N={nodes}"
-                found += rows(case, "latency us", turns, _took_us(share))
+                name = f"hop {rate_hz:g} Hz p{share * 100:g}, N={nodes}"
+                found += rows(name, "latency us", turns, _took_us(share))
     return found
 
 

@@ -16,6 +16,8 @@ UNTRACED = "composed, no tracing"
 SINGLE = "SingleThreadedExecutor"
 MULTI = "MultiThreadedExecutor"
 EVENTS = "EventsExecutor"
+#: No executor: what remains when nothing is asked of one.
+BARE = "a bare loop in Python"
 
 Rounds = Mapping[str, Sequence[Mapping[str, Any] | None]]
 Figure = Callable[[Mapping[str, Any]], float | None]
@@ -71,6 +73,7 @@ def _run(way: str, case: Case) -> Mapping[str, Any] | None:
     program, executor, *more = {
         COMPOSED: ("composed", "events"),
         UNTRACED: ("composed", "events", "--no-tracing"),
+        BARE: ("bare", "none"),
     }.get(way, ("hand_written", way))
     command = (program, executor, *case.arguments, *more)
     try:
