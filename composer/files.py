@@ -64,7 +64,7 @@ class _Search:
 
     def look_below(self, folder: Path) -> None:
         project = Project.at(folder)
-        for path in sorted(_yaml_files(folder)):
+        for path in sorted(self._yaml_files(folder)):
             if path.name == SETTINGS_FILE or not _is_regular(path):
                 continue  # settings are not looked at, but kept to
             if path.is_symlink() and not project.holds(path):
@@ -72,14 +72,19 @@ class _Search:
             else:
                 (self.files if _is_ours(path) else self.foreign)[path] = None
 
+    def _yaml_files(self, folder: Path) -> Iterator[Path]:
+        for parent, folders, files in os.walk(folder, onerror=self._note_unreadable):
+            if _FOREIGN_FOLDER_MARKS.isdisjoint(files) or Path(parent) == folder:
+                folders[:] = [name for name in folders if _is_searched(name)]
+                yield from (Path(parent, name) for name in files if _has_suffix(name))
+            else:
+                folders.clear()
 
-def _yaml_files(folder: Path) -> Iterator[Path]:
-    for parent, folders, files in os.walk(folder):
-        if _FOREIGN_FOLDER_MARKS.isdisjoint(files) or Path(parent) == folder:
-            folders[:] = [name for name in folders if _is_searched(name)]
-            yield from (Path(parent, name) for name in files if _has_suffix(name))
-        else:
-            folders.clear()
+    def _note_unreadable(self, error: OSError) -> None:
+        why = f"this folder cannot be read: {error.strerror}"
+        self.findings.append(
+            Diagnostic(UNREADABLE_FILE, why, Span(SourceFile(str(Path(error.filename))), 1, 1))
+        )
 
 
 def _is_searched(folder_name: str) -> bool:
@@ -105,7 +110,7 @@ def _is_ours(path: Path) -> bool:
         with path.open("rb") as file:
             head = file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
     except OSError:
-        return False
+        return True  # whoever reads it says why it cannot be read
     first = next((line for line in head.splitlines() if _says_something(line)), "")
     return _MARKER.match(first) is not None or _LATER_MARKER.search(head) is not None
 

@@ -67,6 +67,7 @@ def load_system(
 
     What is only good to know stays with ``compose validate``.
     """
+    from composer.cli.files import is_there
     from composer.diagnostics import Severity
     from composer.loading import load
     from composer.report.text import render
@@ -74,7 +75,7 @@ def load_system(
 
     loading = load(
         path,
-        shown=str(path) if shown is None or not Path(shown).is_file() else shown,
+        shown=str(path) if shown is None or not is_there(Path(shown)) else shown,
         said=CommandLine(tuple(settings), namespace, use_sim_time),
     )
     pressing = [found for found in loading.diagnostics if found.severity is not Severity.INFO]

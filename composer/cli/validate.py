@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.failure import FINDINGS, UsageFailure
+from composer.cli.files import example_systems, is_there, nearest_path
 from composer.cli.help import examples
 from composer.cli.terminal import say, use_color, write_raw
 
@@ -117,8 +118,8 @@ def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
     from composer.loading import findings_of, load_bytes, load_files
 
     for path in paths:
-        if path != _STDIN and not path.exists():
-            raise UsageFailure(f"there is no file or folder '{path}'")
+        if path != _STDIN and not is_there(path):
+            raise UsageFailure(f"there is no file or folder '{path}'", hint=_meant(path))
     found = find_files(path for path in paths if path != _STDIN)
     loadings = load_files(found.files)
     if _STDIN in paths:
@@ -133,6 +134,13 @@ def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
         strict=any(loading.project.settings.strict for loading in loadings),
         foreign=found.foreign,
     )
+
+
+def _meant(path: Path) -> str | None:
+    """Return a hint at the path that may have been meant; here, examples go by their paths, too."""
+    examples = example_systems()
+    close = examples.get(str(path)) or nearest_path(path)
+    return None if close is None else f"did you mean '{close}'?"
 
 
 def _first(paths: Sequence[Path]) -> str:

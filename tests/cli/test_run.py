@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,14 @@ def test_a_setting_is_checked_like_what_is_in_the_file() -> None:
     assert done.code == 1
     assert "did you mean 'max_velocity'?" in done.err
     assert compose("run", "pipeline", "--dry-run", "--set", "planner.max_velocity=0.5").code == 0
+
+
+def test_what_is_no_file_is_told_as_what_it_is(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.yaml")
+    assert "expected a file, found a pipe" in compose("run", str(tmp_path / "pipe.yaml")).err
+    done = compose("run", "a" * 5000)
+    assert (done.code, done.out) == (1, "")
+    assert "this file cannot be read: File name too long" in done.err
 
 
 def test_a_node_type_is_not_run(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -128,6 +129,43 @@ def test_a_path_that_does_not_exist_is_a_usage_error(folder: Path) -> None:
     done = compose("validate", "nothing.yaml")
     assert done.code == 2
     assert done.err == "compose: there is no file or folder 'nothing.yaml'\n"
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("fin.yaml", "fine.yaml"),
+        ("sytems", "systems"),
+        ("sytems/robt.yaml", "systems/robot.yaml"),
+        ("fine", "fine.yaml"),
+    ],
+)
+def test_a_path_that_is_almost_right_gets_a_suggestion(
+    folder: Path, written: str, meant: str
+) -> None:
+    Path("systems").mkdir()
+    Path("systems/robot.yaml").write_text(FINE)
+    assert f"did you mean '{meant}'?" in compose("validate", written).err
+    assert f"did you mean '{meant}'?" in compose("run", "--dry-run", written).err
+
+
+def test_the_name_of_an_example_system_is_told_as_its_path(folder: Path) -> None:
+    done = compose("validate", "pipeline")
+    assert done.code == 2
+    assert done.err.endswith("/pipeline.yaml'?\n")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_what_may_not_be_read_is_told_and_not_left_alone(folder: Path) -> None:
+    Path("secret").mkdir(mode=0)
+    Path("other.yaml").touch(mode=0)
+    done = compose("validate", ".")
+    assert done.code == 1
+    assert "this folder cannot be read: Permission denied\n --> secret:1:1" in done.out
+    assert "this file cannot be read: Permission denied\n --> other.yaml:1:1" in done.out
+    for command in ("validate", "run", "config"):
+        told = compose(command, "secret/robot.yaml")
+        assert "Permission denied" in told.out + told.err
 
 
 def test_a_folder_without_anything_to_check_is_a_usage_error(folder: Path) -> None:
