@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context, is_opaque
+from composer.checks.words import safe_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
-from composer.names import namespace_problem
+from composer.model import System
+from composer.names import join, namespace_problem, node_name_problem
 
 RULE = register(
     Rule(
@@ -16,7 +18,8 @@ RULE = register(
         summary="A namespace is not one that ROS takes.",
         why=(
             "The parts of a namespace consist of letters, digits and underscores, none begins "
-            "with a digit, and there is one slash between them (rmw_validate_namespace)."
+            "with a digit, and there is one slash between them (rmw_validate_namespace). The name of "
+            "a system is such a part: its own node is /<system>/manager."
         ),
         bad="""\
 system: names
@@ -33,9 +36,23 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the namespace of every node; one that many nodes share is reported once."""
+    """Look at the namespace of every node, and of the system's own; one of many is told once."""
+    yield from _name_of_system(context.system)
     for node in context.system.nodes:
         namespace = node.namespace
         problem = namespace_problem(namespace.value)
         if problem is not None and not is_opaque(namespace.value):
             yield Diagnostic(RULE, f"namespace '{namespace}' {problem}", namespace.span)
+
+
+def _name_of_system(system: System) -> Iterator[Diagnostic]:
+    name = system.name
+    if system.node_type or is_opaque(name.value):
+        return
+    problem = node_name_problem(name.value)
+    if problem is None and namespace_problem(system.namespace) is None:
+        problem = namespace_problem(join(system.namespace, name.value))
+    if problem is not None:
+        valid = safe_name(name.value)
+        hint = f"call it '{valid}'" if valid != name.value else None
+        yield Diagnostic(RULE, f"system name '{name}' {problem}", name.span, hint=hint)
