@@ -18,8 +18,8 @@ RULE = register(
         summary="A namespace is not one that ROS takes.",
         why=(
             "The parts of a namespace consist of letters, digits and underscores, none begins "
-            "with a digit, and there is one slash between them (rmw_validate_namespace). The name of "
-            "a system is such a part: its own node is /<system>/manager."
+            "with a digit, and there is one slash between them (rmw_validate_namespace). The name "
+            "of a system is such a part: its own node is /<system>/manager."
         ),
         bad="""\
 system: names

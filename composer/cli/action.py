@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from composer.cli.failure import FINDINGS
+from composer.cli.finite import finite
 from composer.cli.help import examples
 from composer.cli.listing import Count, Json, ShowTypes, print_names
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
@@ -87,6 +88,7 @@ def send_goal(
             "--result-timeout",
             metavar="SECONDS",
             min=0.0,
+            callback=finite,
             help="Cancel the goal unless it has ended by then.",
             show_default="waits for ever",
         ),

@@ -10,6 +10,7 @@ import typer
 
 from composer.cli.failure import FINDINGS, Failure
 from composer.cli.files import system_file
+from composer.cli.finite import finite
 from composer.cli.help import examples
 from composer.cli.listing import Json
 from composer.cli.loaded import Namespace, SystemName, load_system
@@ -74,6 +75,7 @@ def diff(
             "--for",
             metavar="SECONDS",
             min=0.0,
+            callback=finite,
             help="End --watch after so long.",
             show_default="never",
         ),
@@ -81,7 +83,10 @@ def diff(
     grace: Annotated[
         float,
         typer.Option(
-            metavar="SECONDS", min=0.0, help="What lasts no longer than this is no difference."
+            metavar="SECONDS",
+            min=0.0,
+            callback=finite,
+            help="What lasts no longer than this is no difference.",
         ),
     ] = _GRACE_S,
     timeout: Timeout = _TIMEOUT_S,

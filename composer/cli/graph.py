@@ -11,6 +11,7 @@ import typer
 
 from composer.cli.failure import Failure, UsageFailure
 from composer.cli.files import system_file
+from composer.cli.finite import finite
 from composer.cli.help import examples
 from composer.cli.loaded import complete_system, load_system
 from composer.cli.ros import Timeout
@@ -127,7 +128,10 @@ def graph(
     measure: Annotated[
         float,
         typer.Option(
-            metavar="SECONDS", min=0.0, help="With --live: how long to count messages; 0: not."
+            metavar="SECONDS",
+            min=0.0,
+            callback=finite,
+            help="With --live: how long to count messages; 0: not.",
         ),
     ] = _MEASURE_S,
     timeout: Timeout = _LIVE_TIMEOUT_S,

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from composer.cli.finite import finite
 from composer.cli.option_groups import option_group
 from composer.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
 
@@ -39,7 +40,7 @@ class QosWish:
     durability: Annotated[Durability | None, typer.Option()] = None
     liveliness: Annotated[Liveliness | None, typer.Option()] = None
     liveliness_lease_duration_seconds: Annotated[
-        float | None, typer.Option(min=0.0, metavar="SECONDS")
+        float | None, typer.Option(min=0.0, callback=finite, metavar="SECONDS")
     ] = None
 
     def applied_to(self, start: QosProfile) -> QosProfile:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.failure import Failure
+from composer.cli.finite import finite
 from composer.cli.terminal import keep_stdout_for_data
 
 if TYPE_CHECKING:
@@ -18,7 +19,13 @@ if TYPE_CHECKING:
 #: How long a command waits, all in all, for other processes.
 Timeout = Annotated[
     float,
-    typer.Option("--timeout", metavar="SECONDS", min=0.0, help="How long to wait, all in all."),
+    typer.Option(
+        "--timeout",
+        metavar="SECONDS",
+        min=0.0,
+        callback=finite,
+        help="How long to wait, all in all.",
+    ),
 ]
 DEFAULT_TIMEOUT_S = 5.0
 

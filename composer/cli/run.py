@@ -12,6 +12,7 @@ import typer
 
 from composer.cli.failure import FINDINGS, Failure
 from composer.cli.files import system_file
+from composer.cli.finite import finite
 from composer.cli.hard_exit import end_now, end_within
 from composer.cli.help import examples
 from composer.cli.loaded import Namespace, SystemName, load_system
@@ -68,6 +69,7 @@ def run(
             "--for",
             metavar="SECONDS",
             min=0.0,
+            callback=finite,
             help="Stop by itself after so long.",
             show_default=False,
         ),
@@ -121,6 +123,7 @@ def run(
             "--timeout",
             metavar="SECONDS",
             min=0.0,
+            callback=finite,
             help="Take the system down again if it is not up by then.",
             show_default="none, 60 with --wait",
         ),
@@ -128,7 +131,11 @@ def run(
     grace: Annotated[
         float,
         typer.Option(
-            "--grace", metavar="SECONDS", min=0.0, help="How long the end may take at the most."
+            "--grace",
+            metavar="SECONDS",
+            min=0.0,
+            callback=finite,
+            help="How long the end may take at the most.",
         ),
     ] = 10.0,
 ) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.failure import Failure
+from composer.cli.finite import finite
 from composer.cli.help import examples
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
 from composer.cli.screen import Screen
@@ -42,7 +43,13 @@ def top(
     once: Annotated[bool, typer.Option("--once", help="Show one table and end.")] = False,
     interval: Annotated[
         float,
-        typer.Option("--interval", metavar="SECONDS", min=1.0, help="How often to show it anew."),
+        typer.Option(
+            "--interval",
+            metavar="SECONDS",
+            min=1.0,
+            callback=finite,
+            help="How often to show it anew.",
+        ),
     ] = 1.0,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print lines of JSON, for programs.")

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from composer.cli.finite import finite
 from composer.cli.listing import Json
 from composer.cli.qos_options import QosWish, takes_qos_options
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
@@ -27,7 +28,8 @@ def pub(
     ] = "{}",
     *,
     rate: Annotated[
-        float, typer.Option("--rate", "-r", min=0.001, metavar="HZ", help="How often.")
+        float,
+        typer.Option("--rate", "-r", min=0.001, callback=finite, metavar="HZ", help="How often."),
     ] = 1.0,
     once: Annotated[bool, typer.Option("--once", "-1", help="Publish once and end.")] = False,
     times: Annotated[

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from composer.cli.failure import UsageFailure
+from composer.cli.finite import finite
 from composer.cli.ros import DEFAULT_TIMEOUT_S
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ Patience = Annotated[
         "--timeout",
         metavar="SECONDS",
         min=0.0,
+        callback=finite,
         help="How long to wait for the topic, and then for each message.",
         show_default=f"{DEFAULT_TIMEOUT_S} for the topic, for ever for messages",
     ),

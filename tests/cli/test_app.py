@@ -64,6 +64,30 @@ def test_a_wrong_command_line_is_a_usage_error_on_stderr(arguments: list[str]) -
     assert "Error: " in done.err
 
 
+@pytest.mark.parametrize("option", ["--for", "--timeout", "--grace"])
+@pytest.mark.parametrize("value", ["nan", "inf", "1e300"])
+def test_what_no_clock_can_count_to_is_a_usage_error(option: str, value: str) -> None:
+    done = compose("run", "pipeline", "--dry-run", option, value)
+    assert (done.code, done.out) == (2, "")
+    assert f"'{option}': " in done.err
+
+
+def options_with_a_number() -> Iterator[tuple[str, Any]]:
+    waiting: list[tuple[str, Any]] = [("compose", typer.main.get_command(application()))]
+    while waiting:
+        name, command = waiting.pop()
+        waiting += [(f"{name} {word}", it) for word, it in getattr(command, "commands", {}).items()]
+        for option in command.params:
+            if option.type.name.startswith("float"):
+                yield f"{name} {option.opts[0]}", option
+
+
+def test_no_option_takes_a_number_that_is_none() -> None:
+    found = dict(options_with_a_number())
+    assert len(found) > 10
+    assert [name for name, option in found.items() if option.callback is None] == []
+
+
 def test_a_mistyped_command_gets_a_suggestion() -> None:
     assert "Did you mean 'validate'?" in compose("valdate").err
 
