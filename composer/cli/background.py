@@ -77,10 +77,9 @@ def tell_ready(text: str) -> None:
 
 
 def _log_path(system: str) -> Path:
-    """Return where to write; see https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Logging.html."""
-    folder = os.environ.get("ROS_LOG_DIR")
-    if not folder:
-        home = os.environ.get("ROS_HOME") or Path.home() / ".ros"
-        folder = str(Path(home, "log"))
+    """Return where to write: beside the logs of ROS."""
+    from composer.runtime.environment import log_folder
+
+    folder = log_folder(os.environ) or Path.home() / ".ros" / "log"
     now = datetime.now().astimezone().strftime("%Y-%m-%d-%H-%M-%S")
-    return Path(folder, f"{system}-{now}-{os.getpid()}.log")
+    return folder / f"{system}-{now}-{os.getpid()}.log"

@@ -64,10 +64,13 @@ def _findings(timeout: float) -> Iterator[Finding]:
     from composer.runtime.doctor.finding import Level, note
     from composer.runtime.doctor.network import look_at_network
     from composer.runtime.doctor.versions import look_at_versions
+    from composer.runtime.environment import complete_environment
     from composer.runtime.shared_memory import SHARED_MEMORY
 
     yield from look_at_versions(tool_version())
-    environment = list(look_at_environment(os.environ))
+    variables = dict(os.environ)
+    complete_environment(variables)
+    environment = list(look_at_environment(variables))
     yield from environment
     reach = discovery_range(os.environ)
     # For LOCALHOST rmw_fastrtps chooses the transports itself, shared memory among them.

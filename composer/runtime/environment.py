@@ -31,11 +31,25 @@ def check_environment(environment: Mapping[str, str]) -> None:
 
 def refusals(environment: Mapping[str, str]) -> Iterator[StartRefused]:
     """Yield every reason why the environment does not allow a start."""
-    for check in (_check_domain_id, _check_discovery_range, _check_security, _check_middleware):
+    for check in _CHECKS:
         try:
             check(environment)
         except StartRefused as refusal:
             yield refusal
+
+
+def log_folder(environment: Mapping[str, str]) -> Path | None:
+    """Return where ROS writes its logs; None where nothing says what is at home.
+
+    See https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Logging.html.
+    """
+    folder, ros_home = environment.get("ROS_LOG_DIR"), environment.get("ROS_HOME")
+    home = environment.get("HOME")
+    if folder:
+        return Path(folder).expanduser()
+    if ros_home:
+        return Path(ros_home, "log").expanduser()
+    return Path(home, ".ros", "log") if home else None
 
 
 def complete_environment(environment: MutableMapping[str, str]) -> None:
@@ -118,3 +132,25 @@ def _check_middleware(environment: Mapping[str, str]) -> None:
             f"RMW_IMPLEMENTATION is '{wanted}', which is not installed",
             f"installed: {', '.join(sorted(known))}",
         )
+
+
+def _check_log_folder(environment: Mapping[str, str]) -> None:
+    """Refuse to start where rcl would: without a folder for its logs."""
+    folder = log_folder(environment)
+    if folder is None:
+        return
+    there = next((place for place in (folder, *folder.parents) if os.path.lexists(place)), folder)
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise StartRefused(
+            f"ROS writes its logs to '{folder}', and that is not possible",
+            "set ROS_LOG_DIR to a folder that can be written",
+        )
+
+
+_CHECKS = (
+    _check_domain_id,
+    _check_discovery_range,
+    _check_security,
+    _check_middleware,
+    _check_log_folder,
+)

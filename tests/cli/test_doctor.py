@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -52,6 +53,21 @@ def test_an_environment_that_hinders_a_start_is_told_with_a_remedy(
     )
     assert head.endswith("ROS_AUTOMATIC_DISCOVERY_RANGE is 'LOCLHOST', which is no discovery range")
     assert remedy.strip().startswith("-> did you mean LOCALHOST?")
+    assert "not looked at: the environment does not let ROS start" in done.out
+
+
+def test_a_middleware_that_is_not_installed_is_told_before_anything_is_started(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    index = tmp_path / "share" / "ament_index" / "resource_index" / "rmw_typesupport"
+    index.mkdir(parents=True)
+    (index / "rmw_fastrtps_cpp").touch()
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_foo")
+    done = compose("doctor")
+    assert done.code == 1
+    assert "error    environment  RMW_IMPLEMENTATION is 'rmw_foo', which is not" in done.out
     assert "not looked at: the environment does not let ROS start" in done.out
 
 

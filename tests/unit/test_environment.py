@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.environment import check_environment, complete_environment
+from composer.runtime.environment import check_environment, complete_environment, log_folder
 from composer.runtime.start_refused import StartRefused
 
 SECURE = {
@@ -61,6 +61,25 @@ def test_what_ros_would_take_silently_is_refused(
         check_environment(environment)
     assert message in str(refusal.value)
     assert hint in refusal.value.hint
+
+
+@pytest.mark.parametrize("below", ["", "log"])
+def test_a_folder_for_logs_that_cannot_be_is_refused(tmp_path: Path, below: str) -> None:
+    (tmp_path / "file").touch(mode=0o644)
+    folder = str(tmp_path / "file" / below)
+    check_environment({"ROS_LOG_DIR": str(tmp_path / "new" / "folder")})
+    with pytest.raises(StartRefused, match="ROS writes its logs to") as refusal:
+        check_environment({"ROS_LOG_DIR": folder})
+    assert folder in str(refusal.value)
+    assert "ROS_LOG_DIR" in refusal.value.hint
+
+
+def test_logs_go_where_ros_puts_them() -> None:
+    home = {"HOME": "/home/me"}
+    assert log_folder({}) is None
+    assert log_folder(home) == Path("/home/me/.ros/log")
+    assert log_folder({**home, "ROS_HOME": "/ros"}) == Path("/ros/log")
+    assert log_folder({**home, "ROS_HOME": "/ros", "ROS_LOG_DIR": "/logs"}) == Path("/logs")
 
 
 def test_a_middleware_that_is_not_there_is_refused(tmp_path: Path) -> None:
