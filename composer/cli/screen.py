@@ -18,10 +18,13 @@ _KEYS_THAT_END = "qQ\x03\x04\x1b"
 
 
 class Screen:
-    """Use it in a ``with`` block. Where stdout is no terminal, what is drawn is printed below."""
+    """Use it in a ``with`` block. Where stdout is no terminal, what is drawn is printed below.
 
-    def __init__(self) -> None:
-        self._is_live = sys.stdout.isatty() and sys.stdin.isatty()
+    The same where it is not ``wanted``: what is shown anew is gone in the end.
+    """
+
+    def __init__(self, *, wanted: bool = True) -> None:
+        self._is_live = wanted and sys.stdout.isatty() and sys.stdin.isatty()
         self._before: list[Any] = []
 
     def __enter__(self) -> Self:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.failure import Failure
+from composer.cli.failure import Failure, UsageFailure
 from composer.cli.finite import finite
 from composer.cli.help import examples
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
@@ -68,12 +68,12 @@ def top(
         from composer.runtime.systems import Systems
 
         if sort not in list(Sorting):
-            raise Failure(f"cannot sort by '{sort}'", hint=f"what there is: {_SORTINGS}")
+            raise UsageFailure(f"cannot sort by '{sort}'", hint=f"what there is: {_SORTINGS}")
         systems = Systems(session, deadline, callbacks=True)
         found = systems.only() if name is None else systems.find(name)
         follower = _Follower(session, systems, systems.report(found))
         sorting = Sorting(sort)
-        with Screen() as screen:
+        with Screen(wanted=not (once or as_json)) as screen:
             while follower.wait(interval, screen.is_left):
                 text = follower.text(sorting, screen.lines, as_json=as_json)
                 if once:

@@ -54,6 +54,19 @@ def refused(*arguments: object) -> str:
     return done.stderr
 
 
+def on_a_terminal(*arguments: str) -> str:
+    """Run a command on a terminal of its own and return all that is shown there."""
+    ours, theirs = os.openpty()
+    shown = b""
+    with subprocess.Popen([*COMPOSE, *arguments], stdin=theirs, stdout=theirs, stderr=theirs):
+        os.close(theirs)
+        with suppress(OSError):  # so Linux tells that the other end is closed
+            while part := os.read(ours, 65_536):
+                shown += part
+    os.close(ours)
+    return shown.decode()
+
+
 @pytest.fixture(autouse=True)
 def nothing_stays_running() -> Iterator[None]:
     """End what a failed test left in the background: it would hinder all that come after."""
@@ -119,6 +132,15 @@ def callback_in(text: str) -> dict[str, Any]:
     found: dict[str, Any]
     (found,) = json.loads(line)["callbacks"]
     return found
+
+
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_one_look_at_callbacks_stays_on_the_terminal(
+    robot: Robot, options: tuple[str, ...]
+) -> None:
+    shown = on_a_terminal("top", "--once", *options)
+    assert "/fleet/planner" in shown
+    assert "\x1b" not in shown
 
 
 def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None:
