@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.checks.context import Context, is_opaque
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.interfaces.similar import similar_interface
 from composer.model import Port
 
 RULE = register(
@@ -56,16 +57,13 @@ def _word(port: Port) -> str:
 
 def _hint(context: Context, port: Port) -> str | None:
     folder = port.kind.channel.interface_folder
+    name = port.interface.value
+    package, slash, rest = name.partition("/")
     known = context.interfaces.names(folder)
-    package, _, rest = port.interface.value.partition("/")
-    stem = rest.rpartition("/")[2]
-    full = f"{package}/{folder}/{stem}"
+    full = f"{package}/{folder}/{rest.rpartition('/')[2]}"
     if full in known:
         return f"write '{full}'"
-    if any(name.startswith(f"{package}/") for name in known):
-        same_package = [name for name in known if name.startswith(f"{package}/")]
-        return suggestion(full, same_package)
-    elsewhere = [name for name in known if name.endswith(f"/{stem}")]
-    if stem and elsewhere:
-        return suggestion(full, elsewhere)
+    hint = similar_interface(full if slash else name, known)
+    if hint is not None or not slash:
+        return hint or f"write it with its package, as std_msgs/{folder}/Name"
     return f"package '{package}' is neither installed nor among the project's interfaces"

@@ -102,12 +102,13 @@ def send_goal(
     """
     type_name, goal = split_values(values or [])
     with ros_session("compose action", timeout) as (session, deadline):
+        from composer.runtime.finding import full_name
         from composer.runtime.inspect_calls import Sending, sent_goal
         from composer.runtime.inspect_names import Names
         from composer.runtime.inspect_values import to_plain
         from composer.runtime.session import Deadline
 
-        name = action if action.startswith("/") else f"/{action}"
+        name = full_name("action", action)
         found = type_name or one_type(Names(session, deadline), "action", name)
 
         def show(message: Any) -> None:

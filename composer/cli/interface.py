@@ -59,13 +59,13 @@ def show(
     json: Json = False,
 ) -> None:
     """Print the fields of a type; messages in it are opened, indented."""
-    from composer.diagnostics import suggestion
+    from composer.interfaces.similar import similar_interface
 
     interfaces = _interfaces()
     found = interfaces.find(name)
     if found is None:
         known = [item for folder in ("msg", "srv", "action") for item in interfaces.names(folder)]
-        raise Failure(f"there is no type '{name}'", hint=suggestion(name, known))
+        raise Failure(f"there is no type '{name}'", hint=similar_interface(name, known))
     if json:
         parts = {title: _as_data(part) for title, part in _parts(found).items()}
         write(as_json({"name": name, **parts}, indent=2))

@@ -81,11 +81,12 @@ def call(
     """Call a service and print the response."""
     type_name, request = split_values(values or [])
     with ros_session("compose service", timeout) as (session, deadline):
+        from composer.runtime.finding import full_name
         from composer.runtime.inspect_calls import call_service
         from composer.runtime.inspect_names import Names
         from composer.runtime.inspect_values import to_plain
 
-        name = service if service.startswith("/") else f"/{service}"
+        name = full_name("service", service)
         found = type_name or one_type(Names(session, deadline), "service", name)
         response = to_plain(call_service(session, deadline, name, found, request))
     write(as_json(response, indent=2) if json else as_yaml(response))

@@ -59,16 +59,17 @@ def echo(
         session,
         deadline,
     ):
+        from composer.runtime.finding import full_name
         from composer.runtime.inspect_topics import Listener, Topics
         from composer.runtime.inspect_values import part, to_plain
 
         topics = Topics(session, deadline)
-        name = topic if topic.startswith("/") else f"/{topic}"
+        name = full_name("topic", topic)
         found = type_name or topics.type_of(name)
         profile = qos.applied_to(topics.matching(name))
         with Listener(session, name, found, profile) as listener:
             left = 1 if once else count
-            for message in _messages(listener, name, message_timeout_s(timeout)):
+            for message in _messages(listener, message_timeout_s(timeout)):
                 if not is_wanted(wanted, message):
                     continue
                 plain = to_plain(message if field is None else part(message, field))
@@ -78,12 +79,12 @@ def echo(
                     return
 
 
-def _messages(listener: Listener, topic: str, timeout_s: float) -> Iterator[Any]:
-    from composer.runtime.session import Deadline, NoAnswer
+def _messages(listener: Listener, timeout_s: float) -> Iterator[Any]:
+    from composer.runtime.session import Deadline
 
     while True:
         received = listener.take(Deadline(timeout_s))
         if not received:
-            raise NoAnswer(f"nothing came over '{topic}' for {timeout_s:g} s")
+            raise listener.silence(timeout_s)
         for item in received:
             yield item.content

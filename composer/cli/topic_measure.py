@@ -58,11 +58,12 @@ def measure(topic: str, measuring: Measuring, qos: QosWish, limits: Limits) -> N
         session,
         deadline,
     ):
+        from composer.runtime.finding import full_name
         from composer.runtime.inspect_topics import Listener, Topics
         from composer.runtime.session import Deadline, NoAnswer
 
         topics = Topics(session, deadline)
-        name = topic if topic.startswith("/") else f"/{topic}"
+        name = full_name("topic", topic)
         type_name = topics.type_of(name)
         profile = qos.applied_to(topics.matching(name))
         seen = before = 0

@@ -71,11 +71,12 @@ def pub(
 
     limit = 1 if once else times
     with ros_session("compose topic", timeout, carries_messages=True) as (session, deadline):
+        from composer.runtime.finding import full_name
         from composer.runtime.inspect_publish import NotAcknowledged, Publishing, publish
         from composer.runtime.inspect_values import class_of, compile_content, to_plain
 
         publishing = Publishing(
-            topic=topic if topic.startswith("/") else f"/{topic}",
+            topic=full_name("topic", topic),
             type_name=type_name,
             build=compile_content(content, class_of(type_name), "the message"),
             qos=qos.applied_to(PRESETS["command"]),

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.validate_full_topic_name import validate_full_topic_name
+
 from composer.diagnostics import nearest
+from composer.names import topic_name_problem
 from composer.runtime.session import Deadline, NoAnswer, RosError, Session
 
 _MOST_LISTED = 8
@@ -12,6 +16,24 @@ _MOST_LISTED = 8
 
 class NotThere(RosError):
     """Nothing of that name is in the graph, or more than one; the hint says what is close."""
+
+
+class BadName(RosError):
+    """No topic, service or action can have that name."""
+
+
+def full_name(kind: str, name: str) -> str:
+    """Return the name that is meant: without a leading slash the one in the root namespace.
+
+    Raises BadName for what ROS does not take.
+    """
+    wanted = name if name.startswith("/") else f"/{name}"
+    try:
+        validate_full_topic_name(wanted)
+    except InvalidTopicNameException as error:
+        problem = topic_name_problem(wanted) or "is not valid"
+        raise BadName(f"{kind} name '{wanted}' {problem}") from error
+    return wanted
 
 
 def find_node(

@@ -12,6 +12,7 @@ from rclpy.action.client import ActionClient, ClientGoalHandle
 from rclpy.task import Future
 
 from composer.runtime.asking import call_once
+from composer.runtime.inspect_names import other_types
 from composer.runtime.inspect_values import class_of, compile_content
 from composer.runtime.session import Deadline, NoAnswer, RosError, Session
 
@@ -43,9 +44,12 @@ def call_service(
     session: Session, deadline: Deadline, name: str, type_name: str, request: str
 ) -> Any:
     """Return the response to ``request``, which is YAML. Raises BadValue, NoAnswer."""
-    service = class_of(type_name)
+    service = class_of(type_name, "service")
     message = compile_content(request, service.Request, "the request")({})
-    return call_once(session, service, name, message, deadline)
+    try:
+        return call_once(session, service, name, message, deadline)
+    except NoAnswer as error:
+        raise NoAnswer(str(error), other_types(session, "service", name, type_name)) from error
 
 
 class _Client(ActionClient):
@@ -120,7 +124,7 @@ def sent_goal(session: Session, deadline: Deadline, sending: Sending) -> Iterato
     is sent; a goal that is sent is waited for, so that it can be canceled.
     """
     name = sending.name
-    action = class_of(sending.type_name)
+    action = class_of(sending.type_name, "action")
     message = compile_content(sending.goal, action.Goal, "the goal")({})
     client = _Client(session.node, action, name)
     try:
@@ -130,7 +134,8 @@ def sent_goal(session: Session, deadline: Deadline, sending: Sending) -> Iterato
         if sending.stop():
             raise KeyboardInterrupt
         if not ready:
-            raise NoAnswer(f"no server of '{name}' was there within {deadline.timeout_s:g} s")
+            hint = other_types(session, "action", name, sending.type_name)
+            raise NoAnswer(f"no server of '{name}' was there within {deadline.timeout_s:g} s", hint)
         answer: Future = client.send_goal_async(
             message, lambda item: sending.on_feedback(item.feedback)
         )

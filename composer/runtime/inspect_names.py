@@ -13,7 +13,7 @@ from rclpy.action.graph import (
 )
 from rclpy.node import Node
 
-from composer.runtime.finding import find_node, not_there
+from composer.runtime.finding import find_node, full_name, not_there
 from composer.runtime.session import Deadline, Session
 
 T = TypeVar("T")
@@ -94,20 +94,16 @@ class Names:
 
     def types(self, kind: str, name: str) -> tuple[str, ...]:
         """Return the types of a topic, service or action. Raises NotThere."""
-        look = {
-            "topic": self._node.get_topic_names_and_types,
-            "service": self._node.get_service_names_and_types,
-            "action": lambda: get_action_names_and_types(self._node),
-        }[kind]
-        full_name = self.find(kind, name, lambda: tuple(found for found, _ in look()))
-        return dict(_named(look(), hidden=True))[full_name]
+        node = self._node
+        wanted = self.find(kind, name, lambda: tuple(found for found, _ in _look(node, kind)))
+        return dict(_named(_look(node, kind), hidden=True))[wanted]
 
     def find(self, kind: str, name: str, look: Callable[[], tuple[str, ...]]) -> str:
         """Wait until ``name`` is among what ``look`` finds, and return it. Raises NotThere.
 
         A name without a leading slash means the one in the root namespace.
         """
-        wanted = name if name.startswith("/") else f"/{name}"
+        wanted = full_name(kind, name)
         if self._session.search(lambda: wanted in look() or None, self._deadline):
             return wanted
         known = [found for found in look() if not is_hidden(found)]
@@ -145,6 +141,23 @@ class Names:
             servers += [node for found, _ in info.action_servers if found == name]
             clients += [node for found, _ in info.action_clients if found == name]
         return ActionInfo(name, types, tuple(servers), tuple(clients))
+
+
+def other_types(session: Session, kind: str, name: str, type_name: str) -> str | None:
+    """Return a hint where somebody knows ``name`` by another type, which explains a silence."""
+    known = dict(_named(_look(session.node, kind), hidden=True)).get(name, ())
+    others = [other for other in known if other != type_name]
+    return f"here it is of type {', '.join(others)}, not {type_name}" if others else None
+
+
+def _look(node: Node, kind: str) -> Iterable[tuple[str, list[str]]]:
+    match kind:
+        case "topic":
+            return node.get_topic_names_and_types()
+        case "service":
+            return node.get_service_names_and_types()
+        case _:
+            return get_action_names_and_types(node)
 
 
 def _named(found: Iterable[tuple[str, list[str]]], hidden: bool) -> tuple[Named, ...]:

@@ -10,6 +10,7 @@ from typing import Any
 from rclpy.duration import Duration
 
 from composer.qos import QosProfile
+from composer.runtime.inspect_names import other_types
 from composer.runtime.inspect_values import Build, class_of
 from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.session import Deadline, NoAnswer, RosError, Session
@@ -68,10 +69,11 @@ def _wait_for_match(
     session: Session, deadline: Deadline, matched: Callable[[], int], what: Publishing
 ) -> None:
     if session.wait_for(lambda: matched() >= what.wait_for or None, deadline) is None:
+        hint = "--wait-matching-subscriptions 0 publishes at once; compose topic info -v shows QoS"
         raise NoAnswer(
             f"{matched()} of {what.wait_for} subscriptions to '{what.topic}' were there within"
             f" {deadline.timeout_s:g} s",
-            "--wait-matching-subscriptions 0 publishes at once; compose topic info -v shows QoS",
+            other_types(session, "topic", what.topic, what.type_name) or hint,
         )
 
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from composer.qos import Durability, QosProfile, Reliability
-from composer.runtime.inspect_names import Names
+from composer.runtime.finding import full_name
+from composer.runtime.inspect_names import Names, other_types
 from composer.runtime.inspect_values import class_of
 from composer.runtime.ports.profiles import rclpy_profile
-from composer.runtime.session import Deadline, RosError, Session
+from composer.runtime.session import Deadline, NoAnswer, RosError, Session
 from composer.runtime.topic_ends import TopicInfo, topic_info
 
 _LISTEN_DEPTH = 1000
@@ -36,9 +37,9 @@ class Topics:
     def info(self, name: str) -> TopicInfo:
         """Return who publishes and subscribes to a topic. Raises NotThere."""
         types = self._names.types("topic", name)
-        full_name = name if name.startswith("/") else f"/{name}"
+        wanted = full_name("topic", name)
         return self._session.wait_until_still(
-            lambda: topic_info(self._session.node, full_name, types), self._deadline
+            lambda: topic_info(self._session.node, wanted, types), self._deadline
         )
 
     def type_of(self, name: str) -> str:
@@ -65,7 +66,9 @@ class Listener:
     def __init__(
         self, session: Session, topic: str, type_name: str, qos: QosProfile, *, raw: bool = False
     ) -> None:
+        self.topic = topic
         self._session = session
+        self._type_name = type_name
         self._received: deque[Received] = deque()
         self._subscription = session.node.create_subscription(
             class_of(type_name),
@@ -80,6 +83,11 @@ class Listener:
 
     def __exit__(self, *_: object) -> None:
         self._session.node.destroy_subscription(self._subscription)
+
+    def silence(self, timeout_s: float) -> NoAnswer:
+        """Return the error that says that nothing came for so long, and why if that is known."""
+        hint = other_types(self._session, "topic", self.topic, self._type_name)
+        return NoAnswer(f"nothing came over '{self.topic}' for {timeout_s:g} s", hint)
 
     def take(self, deadline: Deadline) -> list[Received]:
         """Return what has come; waits until something has, or the deadline."""

@@ -5,15 +5,33 @@ from __future__ import annotations
 import time
 from array import array
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from composer.diagnostics import suggestion
 from composer.document import parse_document
 from composer.expressions import EvaluationError
+from composer.interfaces import Interfaces
+from composer.interfaces.similar import similar_interface
 from composer.runtime.messages import MessageError, compile_message, interface_class
 from composer.runtime.session import RosError
 from composer.source import SourceFile
 from composer.templates import compile_template
+
+
+class _Kind(NamedTuple):
+    """Where the types of a kind are, and what only their classes have."""
+
+    folder: str
+    part: str
+
+
+_KINDS = {
+    "message": _Kind("msg", "get_fields_and_field_types"),
+    "service": _Kind("srv", "Request"),
+    "action": _Kind("action", "Goal"),
+}
+_SLASHES = 2
+_WHAT_A_TYPE_IS = "it has three parts, as std_msgs/msg/String"
 
 #: Makes a message; expressions in it see the names of the scope.
 Build = Callable[[Mapping[str, Any]], Any]
@@ -23,16 +41,28 @@ class BadValue(RosError):
     """What was given does not make a message of the type, or names no part of it."""
 
 
-def class_of(name: str) -> Any:
-    """Return the class of an interface. Raises BadValue when it is not installed here."""
-    if name.count("/") != 2:
-        raise BadValue(
-            f"'{name}' is not an interface name", "it has three parts, as std_msgs/msg/String"
-        )
+def class_of(name: str, kind: str = "message") -> Any:
+    """Return the class of an interface.
+
+    Raises BadValue when it is not installed here, or of another kind.
+    """
+    if name.count("/") != _SLASHES:
+        raise BadValue(f"there is no type '{name}'", _similar(name, kind) or _WHAT_A_TYPE_IS)
     try:
-        return interface_class(name)
+        found = interface_class(name)
     except MessageError as error:
-        raise BadValue(str(error), "the package that defines it must be installed here") from error
+        hint = _similar(name, kind) or "the package that defines it must be installed here"
+        raise BadValue(str(error), hint) from error
+    if not hasattr(found, _KINDS[kind].part):
+        raise BadValue(f"'{name}' is no {kind} type")
+    return found
+
+
+def _similar(name: str, kind: str) -> str | None:
+    interfaces = Interfaces.load()
+    if interfaces.find(name) is not None:
+        return None
+    return similar_interface(name, interfaces.names(_KINDS[kind].folder))
 
 
 def compile_content(text: str, message_type: Any, what: str) -> Build:
@@ -50,13 +80,13 @@ def compile_content(text: str, message_type: Any, what: str) -> Build:
     try:
         build = compile_message(template, message_type, what)
     except MessageError as error:
-        raise BadValue(str(error)) from error
+        raise BadValue(str(error), error.hint) from error
 
     def build_checked(scope: Mapping[str, Any]) -> Any:
         try:
             return build(scope)
         except (MessageError, EvaluationError) as error:
-            raise BadValue(f"{what}: {error}") from error
+            raise BadValue(f"{what}: {error}", getattr(error, "hint", None)) from error
 
     return build_checked
 

@@ -29,6 +29,7 @@ from rosidl_parser.definition import (
     UnboundedSequence,
 )
 
+from composer.diagnostics import suggestion
 from composer.templates import Computed, Constant, Items, Record, Template, Text, evaluate
 
 Scope: TypeAlias = Mapping[str, Any]
@@ -69,7 +70,14 @@ _LOADING = threading.Lock()
 
 
 class MessageError(Exception):
-    """A value does not fit the field it is put into; the text names both."""
+    """A value does not fit the field it is put into; the text names both.
+
+    ``hint`` names what may have been meant.
+    """
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.hint = hint
 
 
 @cache
@@ -122,7 +130,7 @@ def _record(template: Record, message_type: Any, where: str) -> Build:
     setters: list[tuple[str, Build]] = []
     for name, content in template.fields:
         if name.value not in types:
-            raise MessageError(f"{where}: {_type_name(message_type)} has no field '{name.value}'")
+            raise _no_field(where, message_type, name.value)
         build = _field(content, types[name.value], _inside(where, name.value))
         (constants if isinstance(content, Constant) else setters).append((name.value, build))
     values = [(name, build({})) for name, build in constants]
@@ -264,7 +272,7 @@ def _from_mapping(value: Mapping[str, Any], message_type: Any, where: str) -> An
     message = message_type()
     for name, content in value.items():
         if name not in types:
-            raise MessageError(f"{where}: {_type_name(message_type)} has no field '{name}'")
+            raise _no_field(where, message_type, name)
         setattr(message, name, _converter(types[name], _inside(where, name))(content))
     return message
 
@@ -306,6 +314,12 @@ def _field_types(message_type: Any) -> dict[str, Any]:
     return dict(
         zip(message_type.get_fields_and_field_types(), message_type.SLOT_TYPES, strict=True)
     )
+
+
+def _no_field(where: str, message_type: Any, name: str) -> MessageError:
+    known = message_type.get_fields_and_field_types()
+    text = f"{where}: {_type_name(message_type)} has no field '{name}'"
+    return MessageError(text, suggestion(name, known))
 
 
 def _message_class(field_type: NamespacedType) -> Any:
