@@ -6,13 +6,17 @@ stdout is data, stderr is everything else. Exit codes: 0 clean, 1 findings or a 
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
-from composer.cli.failure import Failure
+from composer.cli.failure import FINDINGS, Failure
 
 INTERNAL = 3
+
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -20,6 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns the exit code; nothing is raised.
     """
+    _have_streams()
     from composer.cli.app import application
 
     try:
@@ -30,11 +35,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Failure as failure:
         print(failure.text(), file=sys.stderr)
         return failure.exit_code
+    except OSError as error:
+        return _no_room(error) if error.errno in _NO_ROOM else _internal_error(error)
     except Exception as error:
         return _internal_error(error)
     finally:
         _flush()
     return 0
+
+
+def _have_streams() -> None:
+    """Let streams that the process was started without lead nowhere."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
+
+
+def _no_room(error: OSError) -> int:
+    print(f"compose: the output cannot be written: {error.strerror}", file=sys.stderr)
+    return FINDINGS
 
 
 def _exit_code(end: SystemExit) -> int:
@@ -64,5 +83,5 @@ def _flush() -> None:
 
     try:
         sys.stdout.flush()
-    except BrokenPipeError:
+    except OSError:
         drop_stdout()

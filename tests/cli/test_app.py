@@ -72,6 +72,31 @@ def test_what_no_clock_can_count_to_is_a_usage_error(option: str, value: str) ->
     assert f"'{option}': " in done.err
 
 
+def redirected(to: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a command with streams that a shell leads elsewhere."""
+    line = f'exec "$@" {to}'
+    return subprocess.run(
+        ["sh", "-c", line, "sh", *COMPOSE, *arguments],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=30,
+    )
+
+
+def test_streams_may_be_closed() -> None:
+    for closed in (">&-", "2>&-", "<&- >&- 2>&-"):
+        done = redirected(closed, "run", "pipeline", "--dry-run")
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("arguments", [["rule"], ["--help"], ["graph", "pipeline"]])
+def test_a_full_disk_is_no_fault_of_ours(arguments: list[str]) -> None:
+    done = redirected("> /dev/full", *arguments)
+    assert done.returncode == 1
+    assert done.stderr == "compose: the output cannot be written: No space left on device\n"
+
+
 def options_with_a_number() -> Iterator[tuple[str, Any]]:
     waiting: list[tuple[str, Any]] = [("compose", typer.main.get_command(application()))]
     while waiting:
