@@ -46,7 +46,7 @@ def list_actions(
         from composer.runtime.inspect_names import Names
 
         actions = Names(session, deadline).actions()
-    print_names(actions, types=types, count=count, json=json)
+    print_names("action", actions, types=types, count=count, json=json)
 
 
 @app.command("info", epilog=examples("compose action info /navigate"))

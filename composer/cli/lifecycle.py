@@ -12,6 +12,7 @@ import typer
 
 from composer.cli.failure import FINDINGS, Failure, UsageFailure
 from composer.cli.help import examples
+from composer.cli.listing import say_none_found
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
 from composer.cli.terminal import columns, say, write
 
@@ -67,6 +68,8 @@ def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, as_json: Json = False) -> None:
         elif states:
             write(columns([(name, state or "(no answer)") for name, state in states.items()]))
         control.check_all_answer()
+    if not states and not as_json:
+        say_none_found("lifecycle node")
 
 
 @app.command(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from composer.cli.terminal import columns, write
+from composer.cli.terminal import columns, say, write
 from composer.cli.values import as_json
 
 ShowTypes = Annotated[bool, typer.Option("--show-types", "-t", help="Print the types too.")]
@@ -18,8 +18,13 @@ Hidden = Annotated[
 ]
 
 
+def say_none_found(kind: str) -> None:
+    """Tell the person why there may be nothing to list."""
+    say(f"no {kind} was found: is the system running, with the same ROS_DOMAIN_ID?")
+
+
 def print_names(
-    named: Sequence[tuple[str, tuple[str, ...]]], *, types: bool, count: bool, json: bool
+    kind: str, named: Sequence[tuple[str, tuple[str, ...]]], *, types: bool, count: bool, json: bool
 ) -> None:
     """Print names, with their types or not, or how many there are."""
     if count:
@@ -29,3 +34,5 @@ def print_names(
     elif named:
         rows = [(name, ", ".join(found)) if types else (name,) for name, found in named]
         write(columns(rows))
+    else:
+        say_none_found(kind)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from composer.cli.help import examples
-from composer.cli.listing import Count, Hidden, Json
+from composer.cli.listing import Count, Hidden, Json, say_none_found
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
 from composer.cli.terminal import columns, write
 from composer.cli.values import as_json
@@ -49,6 +49,8 @@ def list_nodes(
         write(as_json(list(nodes), indent=2))
     elif nodes:
         write("\n".join(nodes))
+    else:
+        say_none_found("node")
 
 
 @app.command("info", epilog=examples("compose node info planner"))

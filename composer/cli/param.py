@@ -12,7 +12,7 @@ import typer
 
 from composer.cli.failure import Failure, UsageFailure
 from composer.cli.help import examples
-from composer.cli.listing import Json
+from composer.cli.listing import Json, say_none_found
 from composer.cli.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
 from composer.cli.terminal import columns, say, use_color, write
 from composer.cli.values import as_json, as_yaml
@@ -76,7 +76,10 @@ def _list_all(json: bool, timeout: float) -> None:
         found = names_by_node(session, deadline)
     if json:
         write(as_json(found, indent=2))
-    for node, names in () if json else found.items():
+        return
+    if not found:
+        say_none_found("node")
+    for node, names in found.items():
         if names is None:
             say(f"{node} did not answer: its parameter services may be off, or its process busy")
         else:

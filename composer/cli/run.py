@@ -16,7 +16,7 @@ from composer.cli.finite import finite
 from composer.cli.hard_exit import end_now, end_within
 from composer.cli.help import examples
 from composer.cli.loaded import Namespace, SystemName, load_system
-from composer.cli.ros import require_ros
+from composer.cli.ros import require_interfaces, require_ros
 from composer.cli.terminal import say, write
 
 if TYPE_CHECKING:
@@ -154,6 +154,7 @@ def run(
             write(str(plan))
         return
     require_ros("compose run")
+    require_interfaces(declared)
     if wait:
         from composer.cli.background import run_in_background
 

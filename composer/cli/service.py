@@ -43,7 +43,7 @@ def list_services(
         from composer.runtime.inspect_names import Names
 
         services = Names(session, deadline).services(hidden=hidden)
-    print_names(services, types=types, count=count, json=json)
+    print_names("service", services, types=types, count=count, json=json)
 
 
 @app.command("type", epilog=examples("compose service type /plan_trajectory"))

@@ -46,7 +46,7 @@ def list_topics(
         from composer.runtime.inspect_names import Names
 
         topics = Names(session, deadline).topics(hidden=hidden)
-    print_names(topics, types=types, count=count, json=json)
+    print_names("topic", topics, types=types, count=count, json=json)
 
 
 @app.command("info", epilog=examples("compose topic info -v /sensor_data"))

@@ -126,6 +126,34 @@ def test_an_environment_that_ros_would_misread_is_refused(monkeypatch: pytest.Mo
         assert "compose: ROS_DOMAIN_ID is '-1'" in done.stderr
 
 
+def test_an_interface_package_that_is_not_built_is_told_before_anything_starts(
+    tmp_path: Path,
+) -> None:
+    package = tmp_path / "interfaces" / "arm_interfaces"
+    (package / "msg").mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>arm_interfaces</name></package>")
+    (package / "msg" / "Grip.msg").write_text("float64 force\n")
+    (tmp_path / "composer.yaml").write_text("interfaces: [interfaces]\n")
+    system = tmp_path / "arm.yaml"
+    port = "{type: arm_interfaces/msg/Grip, qos: command, external: true}"
+    system.write_text(f"system: arm\nnodes:\n  arm: {{subscriptions: {{grip: {port}}}}}\n")
+    done = compose("run", system)
+    assert done.returncode == 1
+    assert "'arm_interfaces' of node 'arm' is not installed for this Python\n" in done.stderr
+    assert "  colcon build --packages-select arm_interfaces" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "kind"),
+    [("node list", "node"), ("topic list", "topic"), ("lifecycle nodes", "lifecycle node")],
+)
+def test_an_empty_list_is_explained(command: str, kind: str) -> None:
+    done = compose(*command.split())
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr.startswith(f"no {kind} was found: ")
+
+
 def test_no_nodes_at_all_is_told_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     started_s = time.monotonic()

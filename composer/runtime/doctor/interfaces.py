@@ -12,6 +12,13 @@ AREA = "interfaces"
 _KINDS = ("msg", "srv", "action")
 
 
+def how_to_build(package: str) -> str:
+    """Return what makes an interface package known to Python."""
+    by_colcon = f"colcon build --packages-select {package}, then source install/setup.bash"
+    ours = package == "composer_interfaces"  # a folder of the composer, which pip can build
+    return f"pip install ./interfaces   or: {by_colcon}" if ours else by_colcon
+
+
 def look_at_interfaces(
     packages: Iterable[str], sources: Interfaces, built: Interfaces
 ) -> Iterator[Finding]:
@@ -25,7 +32,7 @@ def look_at_interfaces(
         yield error(
             AREA,
             f"interface package '{package}' is not built: nodes that use it do not start",
-            f"colcon build --packages-select {package}, then source install/setup.bash",
+            how_to_build(package),
         )
     stale = {
         package: names
