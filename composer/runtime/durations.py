@@ -55,12 +55,15 @@ class Durations:
     def settle(self) -> None:
         """Put what waits into the histogram."""
         with self._lock:
-            settled = len(self.waiting)  # by now: others may go on appending
-            for took_s in self.waiting[:settled]:
-                self._buckets[bisect(BOUNDS_S, took_s)] += self._weight
-                self._total_s += took_s * self._weight
-                self._longest_s = max(self._longest_s, took_s)
-            del self.waiting[:settled]
+            settled = self.waiting[:]  # by now: others may go on appending
+            if not settled:
+                return
+            del self.waiting[: len(settled)]
+            buckets, weight = self._buckets, self._weight
+            for took_s in settled:
+                buckets[bisect(BOUNDS_S, took_s)] += weight
+            self._total_s += sum(settled) * weight
+            self._longest_s = max(self._longest_s, *settled)
 
     def stand_for(self, weight: int) -> None:
         """Let each time that comes from now on count as ``weight`` of them."""

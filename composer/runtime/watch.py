@@ -69,7 +69,8 @@ class Watch:
         self._tell = tell
         self._end = threading.Event()
         self._callbacks: dict[FrameType, _Seen] = {}  # by their calls
-        self._nodes = {name: _NodeWatch(name, crew) for name in crew.nodes}
+        watches = {name: _NodeWatch(name, crew) for name in crew.nodes}
+        self._nodes = {name: watch for name, watch in watches.items() if watch.has_limits}
         self._period_s = _period_s(crew)
         self._system_is_up = False
         self._thread = threading.Thread(target=self._run, name="composer watch", daemon=True)
@@ -200,6 +201,11 @@ class _NodeWatch:
         self._errors: deque[tuple[float, int]] = deque()  # when there were how many in all
         self._has_failed = False
         self._life: tuple[RunningNode, int] | None = None
+
+    @property
+    def has_limits(self) -> bool:
+        """Whether there is anything to look for."""
+        return bool(self._silences) or self._max_errors != math.inf
 
     def look(self, now_s: float) -> Iterator[Fault]:
         """Yield a fault when the node has failed; one at most until it is active anew."""
