@@ -87,11 +87,8 @@ class Sender:
         self.sent += 1
         self._statistics.sent += 1
 
-    def close(self) -> None:
-        """Send nothing any more. To be called before the publisher is destroyed."""
-
     def _look_outside(self) -> None:
-        """See whether somebody outside listens: something has matched or left."""
+        """See whether somebody outside listens; asked once something has matched or left."""
 
     def _converted(self, message: Any) -> Any:
         """Return what rclpy would publish. Raises TypeError where it would."""
