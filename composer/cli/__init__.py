@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,6 +16,7 @@ from pathlib import Path
 from composer.cli.failure import FINDINGS, Failure
 
 INTERNAL = 3
+INTERRUPTED = 128 + signal.SIGINT
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
@@ -25,11 +27,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns the exit code; nothing is raised.
     """
     _have_streams()
-    from composer.cli.app import application
-
     try:
+        from composer.cli.app import application
+
         given = sys.argv[1:] if arguments is None else list(arguments)
         application(given)(args=given, prog_name="compose")
+    except KeyboardInterrupt:  # so early, or so late, that typer does not see it
+        return INTERRUPTED
     except SystemExit as end:
         return _exit_code(end)
     except Failure as failure:

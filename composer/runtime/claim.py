@@ -24,7 +24,7 @@ _SUFFIX = ".lock"
 
 def refusal(name: str, host: str, pid: str | int) -> StartRefused:
     """Return why the system cannot be run. ``name`` is its manager's namespace."""
-    system = name.rpartition("/")[2]
+    system = name if name.count("/") > 1 else name.removeprefix("/")
     return StartRefused(
         f"system '{system}' runs already in ROS domain {_domain()}: host {host}, process {pid}",
         f"end it with 'compose down {system}', or run this one with another ROS_DOMAIN_ID or"

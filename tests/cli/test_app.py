@@ -97,6 +97,17 @@ def test_a_full_disk_is_no_fault_of_ours(arguments: list[str]) -> None:
     assert done.stderr == "compose: the output cannot be written: No space left on device\n"
 
 
+def test_ctrl_c_is_heard_while_a_command_is_still_being_loaded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("composer.cli.app.application", interrupt)
+    done = compose("validate", ".")
+    assert (done.code, done.out, done.err) == (130, "", "")
+
+
 def options_with_a_number() -> Iterator[tuple[str, Any]]:
     waiting: list[tuple[str, Any]] = [("compose", typer.main.get_command(application()))]
     while waiting:

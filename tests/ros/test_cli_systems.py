@@ -180,7 +180,8 @@ def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None
 
     refusal = refused("run", robot.path)
     assert f"process {robot.pid}" in refusal
-    assert "runs already in ROS domain" in refusal
+    assert "system '/fleet/robot' runs already in ROS domain" in refusal
+    assert "end it with 'compose down /fleet/robot'" in refusal
 
     assert said("down", "robot").startswith("/fleet/robot: the system has stopped")
     # It gives its name back, which 'down' waits for, and then sums up.
@@ -322,7 +323,7 @@ def test_of_two_hosts_the_second_one_yields(path: Path, monkeypatch: pytest.Monk
     try:
         monkeypatch.setenv("XDG_RUNTIME_DIR", str(second_folder))
         refusal = refused("run", path, "--for", PATIENCE_S)
-        assert "stopping: system 'robot' runs already in ROS domain" in refusal
+        assert "stopping: system '/fleet/robot' runs already in ROS domain" in refusal
         assert f"process {first.pid}" in refusal
         assert first.is_alive()
         assert first.states()["/fleet/motor"] == "active"

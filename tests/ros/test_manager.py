@@ -255,10 +255,10 @@ def test_a_second_composer_of_the_same_system_is_refused(tmp_path: Path, peer: P
     with running(ROBOT, tmp_path, planner=PLANNER) as first:
         system = system_of(ROBOT, tmp_path)
         second = Host(system, first.host._up, first.host._down, HostOptions())
-        with pytest.raises(StartRefused, match="system 'robot' runs already in ROS domain") as why:
+        with pytest.raises(StartRefused, match="system '/fleet/robot' runs already") as why:
             second.run()
         assert "process" in str(why.value)
-        assert "compose down robot" in why.value.hint
+        assert "compose down /fleet/robot" in why.value.hint
         assert peer.state("/fleet/planner") == "active"
     again = RunningSystem(system_of(ROBOT, tmp_path), HostOptions(run_for_s=0.1), None)
     assert again.end().exit_code == 0
