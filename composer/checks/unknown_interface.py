@@ -40,6 +40,10 @@ def check(context: Context) -> Iterator[Diagnostic]:
             name = port.interface
             if is_opaque(name.value) or context.interfaces.find(name.value) is not None:
                 continue
+            problem = context.interfaces.problem(name.value)
+            if problem is not None:
+                yield Diagnostic(RULE, str(problem), name.span, hint=f"see {problem.place}")
+                continue
             key = (name.value, port.kind.channel.interface_folder)
             if key not in hints:
                 hints[key] = _hint(context, port)

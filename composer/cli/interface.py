@@ -63,6 +63,9 @@ def show(
 
     interfaces = _interfaces()
     found = interfaces.find(name)
+    problem = interfaces.problem(name)
+    if problem is not None:
+        raise Failure(str(problem), hint=f"see {problem.place}")
     if found is None:
         known = [item for folder in ("msg", "srv", "action") for item in interfaces.names(folder)]
         raise Failure(f"there is no type '{name}'", hint=similar_interface(name, known))

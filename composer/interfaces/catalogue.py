@@ -16,6 +16,7 @@ from composer.interfaces.sources import (
     find_packages,
     installed_prefixes,
 )
+from composer.source import shown_path
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +27,14 @@ class InvalidDefinition:
     path: str
     line: int
     message: str
+
+    def __str__(self) -> str:
+        return f"the definition of '{self.name}' cannot be read: {self.message}"
+
+    @property
+    def place(self) -> str:
+        """Where it is, as a file and a line."""
+        return f"{shown_path(Path(self.path))}:{self.line}"
 
 
 class Interfaces:

@@ -168,6 +168,21 @@ def test_what_may_not_be_read_is_told_and_not_left_alone(folder: Path) -> None:
         assert "Permission denied" in told.out + told.err
 
 
+def test_an_interface_that_cannot_be_read_is_told_with_its_place(folder: Path) -> None:
+    definition = Path("interfaces/arm/msg/Grip.msg")
+    definition.parent.mkdir(parents=True)
+    definition.write_text("# How firm.\nflaot64 force\n")
+    Path("interfaces/arm/package.xml").write_text("<package><name>arm</name></package>")
+    Path("composer.yaml").write_text("interfaces: [interfaces]\n")
+    port = "{type: arm/msg/Grip, qos: command, external: true}"
+    Path("arm.yaml").write_text(f"system: arm\nnodes: {{arm: {{subscriptions: {{a: {port}}}}}}}\n")
+    for done in (compose("validate", "arm.yaml"), compose("interface", "show", "arm/msg/Grip")):
+        assert done.code == 1
+        told = done.out + done.err
+        assert "the definition of 'arm/msg/Grip' cannot be read: 'flaot64' is" in told
+        assert f"see {definition}:2" in told
+
+
 def test_a_folder_without_anything_to_check_is_a_usage_error(folder: Path) -> None:
     Path("empty").mkdir()
     assert compose("validate", "empty").code == 2
