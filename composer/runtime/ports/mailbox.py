@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Coroutine
 from functools import partial
-from time import monotonic
 from typing import Any, Protocol
 
 from composer.model import Port
 from composer.runtime.core import Core
+from composer.runtime.ports.callback import Callback
 from composer.runtime.strand import Direct
 from composer.runtime.tracing import CallbackTimer
-from composer.runtime.user_code import calls_user_code
 
 
 class Keeper(Protocol):
@@ -25,7 +24,7 @@ class Keeper(Protocol):
         """Count the oldest message, which made room."""
 
 
-class Mailbox:
+class Mailbox(Callback):
     """The messages of one subscription, in the order in which they were put, as deep as its QoS.
 
     They are handled on its loop, one per turn of it, so that a flood holds nobody up, and one at a
@@ -35,17 +34,13 @@ class Mailbox:
 
     __slots__ = (
         "_call_soon",
-        "_core",
         "_depth",
         "_gate",
-        "_handle",
         "_idle",
         "_is_awaiting",
         "_keeper",
         "_messages",
-        "_name",
         "_statistics",
-        "_timer",
         "_turn",
     )
     _overlaps = False
@@ -63,13 +58,10 @@ class Mailbox:
         What ``handle`` returns is awaited, where it can be.
         """
         depth = port.qos.profile.queue_depth
-        self._core = core
-        self._name = f"on_{port.name.value}"
+        super().__init__(core, f"on_{port.name.value}", handle, timer)
         self._call_soon = core.loop.call_soon
         self._gate = core.gate
         self._statistics = core.statistics
-        self._handle = handle
-        self._timer = timer
         self._depth = depth
         self._keeper = keeper
         self._messages: deque[Any] = deque(maxlen=depth)
@@ -135,7 +127,8 @@ class Mailbox:
         rest = None
         try:
             if self._gate.incoming:
-                rest = self._work_on(message)
+                self._statistics.received += 1
+                rest = self._call(message)
             else:
                 self._keeper.hold(message)
         finally:
@@ -147,24 +140,6 @@ class Mailbox:
                 self._idle.append(True)
                 if messages:
                     self._begin()
-
-    @calls_user_code
-    def _work_on(self, message: Any) -> Coroutine[Any, Any, None] | None:
-        """Have the message handled; return the rest of that, where it is ``async``."""
-        self._statistics.received += 1
-        timer = self._timer
-        began_s = 0.0
-        if timer.pause > 0:  # two threads may both count down the last
-            timer.pause -= 1
-        else:
-            began_s = monotonic()
-        try:
-            result = self._handle(message)
-        except BaseException as error:
-            self._core.faults.take(self._name, error)
-            result = None
-        rest = None if result is None else self._core.rest_of(self._name, result)
-        return timer.took(began_s, rest) if began_s else rest
 
     def _wait_for(self, rest: Coroutine[Any, Any, None]) -> None:
         self._is_awaiting = True
@@ -211,7 +186,8 @@ class OverlappingMailbox(Mailbox):
         if not self._gate.incoming:
             self._keeper.hold(message)
             return
-        rest = self._work_on(message)
+        self._statistics.received += 1
+        rest = self._call(message)
         if rest is not None:
             self._core.spawn(rest)
 

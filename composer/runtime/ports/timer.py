@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Coroutine, Mapping
+from functools import partial
 from typing import Any
 
 from composer.expressions import EvaluationError, Expression
@@ -12,6 +13,7 @@ from composer.model import Timer as TimerModel
 from composer.runtime.core import Core
 from composer.runtime.line import line_for
 from composer.runtime.loop import Timer
+from composer.runtime.ports.callback import NOTHING, Callback
 from composer.runtime.reactions import RunningReaction
 from composer.runtime.tracing import CallbackTimer
 
@@ -34,7 +36,7 @@ def period_s(period: Period, parameters: Mapping[str, Any]) -> float:
     return seconds
 
 
-class TimerPort:
+class TimerPort(Callback):
     """Calls the timer's reaction and handler while the node is active.
 
     A call that is due while the one before is not through is left out and counted, unless the
@@ -49,23 +51,20 @@ class TimerPort:
         handler: Callable[[], Any] | None,
     ) -> None:
         """Make it, standing still. Raises PeriodError."""
-        self._core = core
-        self._name = timer.name.value
-        self._callback = f"on_{self._name}"
+        name = timer.name.value
         self._clock = core.loop if timer.clock is TimerClock.STEADY else core.clock
         self._period = timer.period
         self._period_s = period_s(timer.period, core.names["parameters"])
         self._reaction = reaction
         self._handler = handler
-        self._traced = core.statistics.callback("timer", self._name)
-        self._line = line_for(
-            core,
-            self._work,
-            CallbackTimer(core, self._traced, timer.budget_ms),
-            depth=0,
-            reentrant=timer.reentrant,
-        )
-        self._timer: Timer | None = None
+        self._traced = core.statistics.callback("timer", name)
+        times = CallbackTimer(core, self._traced, timer.budget_ms)
+        handle: Callable[[], Any] = partial(times.watched(self._react), NOTHING)
+        if handler and not (reaction or core.mutations):
+            handle = handler  # which is shorter
+        super().__init__(core, f"on_{name}", handle, times)
+        self._line = line_for(core, self._call, None, depth=0, reentrant=timer.reentrant)
+        self._scheduled: Timer | None = None
 
     def follow_parameters(self) -> None:
         """Take over the period that the parameters say now. Raises PeriodError."""
@@ -81,39 +80,37 @@ class TimerPort:
 
     def activate(self) -> None:
         """Start; the first call comes one period from now."""
-        if self._timer is None:
-            self._timer = self._clock.call_every(self._period_s, self._tick)
+        if self._scheduled is None:
+            self._scheduled = self._clock.call_every(self._period_s, self._tick)
 
     def deactivate(self) -> None:
         """Stand still."""
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        if self._scheduled is not None:
+            self._scheduled.cancel()
+            self._scheduled = None
 
     def destroy(self) -> None:
         """End for good."""
         self.deactivate()
 
     def _begin_anew(self) -> None:
-        if self._timer is not None:
+        if self._scheduled is not None:
             self.deactivate()
             self.activate()
 
     def _tick(self) -> None:
         if not self._core.gate.incoming:
             return
-        if self._timer is not None and self._core.statistics.tracing:
-            self._traced.lateness.take(self._timer.late_s)
-        if self._line.put(True) is not None:
+        if self._scheduled is not None and self._core.statistics.tracing:
+            self._traced.lateness.take(self._scheduled.late_s)
+        if self._line.put(NOTHING) is not None:
             self._core.statistics.skipped += 1
             self._traced.dropped += 1
 
-    def _work(self, _: bool) -> Coroutine[Any, Any, None] | None:
+    def _react(self, _: object) -> Coroutine[Any, Any, None] | None:
         if self._reaction is not None:
             try:
                 self._reaction.run()
             except Exception as error:
-                self._core.faults.take(f"timer '{self._name}'", error)
-        if self._handler is None:
-            return None
-        return self._core.call(self._callback, self._handler)
+                self._core.faults.take(str(self._traced), error)
+        return None if self._handler is None else self._core.call(self._name, self._handler)
