@@ -34,7 +34,9 @@ def commands() -> Iterator[list[str]]:
         waiting += [([*words, name], item) for name, item in inner.items()]
 
 
-@pytest.mark.parametrize("command", commands(), ids=lambda words: " ".join(["compose", *words]))
+@pytest.mark.parametrize(
+    "command", list(commands()), ids=lambda words: " ".join(["compose", *words])
+)
 def test_every_help_page_ends_with_examples_of_that_command(command: list[str]) -> None:
     done = compose(*command, "--help")
     assert done.code == 0
