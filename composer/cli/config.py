@@ -44,7 +44,10 @@ def config(
     whole = canonical(loading.tree)
     text = write_document(whole)
     if not means_the_same(loading, text):
-        say("note: what stands beside the other files is not found from this one")
+        say(
+            "note: node types, behaviours and parameter files beside the files that were put in"
+            " are not found from elsewhere"
+        )
     if as_json:
         write(json.dumps(plain(whole), indent=2, ensure_ascii=False))
     else:

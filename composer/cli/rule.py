@@ -20,7 +20,9 @@ EPILOG = examples(
 def rule(
     code: Annotated[
         str | None,
-        typer.Argument(metavar="CODE", help="A code or a name.", show_default=False),
+        typer.Argument(
+            metavar="CODE", help="A code (RC301), a band (RC3) or a name.", show_default=False
+        ),
     ] = None,
 ) -> None:
     """Explain a rule: what is wrong, why it matters, and an example of it and of its cure."""
@@ -28,11 +30,12 @@ def rule(
     from composer.report.catalogue import all_rules, explain, find_rule
 
     rules = all_rules()
-    if code is None:
-        write(columns([(item.code, item.severity.value, item.name) for item in rules]))
-        return
-    found = find_rule(code, rules)
-    if found is None:
+    found = None if code is None else find_rule(code, rules)
+    band = [item for item in rules if code is None or item.code.startswith(code.upper())]
+    if found is not None:
+        write_raw(explain(found))
+    elif band:
+        write(columns([(item.code, item.severity.value, item.name) for item in band]))
+    else:
         names = [name for item in rules for name in (item.code, item.name)]
-        raise UsageFailure(f"no rule is called '{code}'", hint=suggestion(code, names))
-    write_raw(explain(found))
+        raise UsageFailure(f"no rule is called '{code}'", hint=suggestion(str(code), names))

@@ -40,4 +40,5 @@ def name_of_system(text: str) -> str:
     if isinstance(name, Scalar) and isinstance(name.value, str):
         return name.value
     why = findings[0].message if findings else "it has no key 'system'"
-    raise Failure(f"'{text}' is not a system: {why}")
+    hint = findings[0].hint if findings else None
+    raise Failure(f"'{text}' is not a system: {why}", hint=hint)

@@ -112,8 +112,8 @@ class Systems:
             here = _called(name, known)
         if not here:
             error = not_there("running system", name, (*claims(), *known))
-            start = f"start it with 'compose run {name.strip('/')}'"
-            raise NotThere(str(error), error.hint if known else start)
+            none = "no system is running: start one with 'compose run'"
+            raise NotThere(str(error), error.hint if known else none)
         if len(here) > 1:
             raise NotThere(f"'{name}' is more than one system", f"say which: {', '.join(here)}")
         return here[0]

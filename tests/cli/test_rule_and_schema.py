@@ -21,6 +21,14 @@ def test_all_rules_are_listed() -> None:
     assert lines == sorted(lines)
 
 
+def test_a_band_of_rules_is_listed_as_validate_takes_it() -> None:
+    done = compose("rule", "RC32")
+    assert (done.code, done.err) == (0, "")
+    codes = [line.split()[0] for line in done.out.splitlines()]
+    assert "RC324" in codes
+    assert all(code.startswith("RC32") for code in codes)
+
+
 def test_an_unknown_rule_gets_the_nearest() -> None:
     done = compose("rule", "unknown-nodes")
     assert done.code == 2

@@ -269,6 +269,8 @@ def test_a_system_that_was_killed_is_said_not_to_run(robot: Robot) -> None:
     assert said("ps") == "nothing is running\n"
     assert said("lifecycle", "nodes") == ""
     assert "there is no running system 'robot'" in refused("ps", "robot")
+    assert "no system is running: start one with" in refused("ps", robot.path)
+    assert "did you mean" in refused("ps", robot.path.with_name("robt.yaml"))
     for command in ("up", "down", "pause", "resume", "reset"):
         assert "there is no running system 'robot'" in refused(command, "robot")
     for arguments in (("set", "planner", "deactivate"), ("get", "/fleet/planner")):
