@@ -177,7 +177,8 @@ def _yaml(text: str) -> Any:
     try:
         return yaml.safe_load(text)
     except yaml.YAMLError as error:
-        raise UsageFailure(f"'{text:.40}' is not YAML: {error}") from error
+        problem = getattr(error, "problem", None) or "it cannot be read"
+        raise UsageFailure(f"'{text:.40}' is not YAML: {problem}") from error
 
 
 def _read(file: Path) -> ParameterFiles:

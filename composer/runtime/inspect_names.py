@@ -86,7 +86,7 @@ class Names:
     def action(self, name: str) -> ActionInfo:
         """Return who serves and uses an action. Raises NotThere."""
         types = self.types("action", name)
-        return self._still(lambda: self._action_info(name, types))
+        return self._still(lambda: self._action_info(full_name("action", name), types))
 
     def find_node(self, name: str) -> str:
         """Return the full name of the node that ``name`` means. Raises NotThere."""

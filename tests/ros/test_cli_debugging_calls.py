@@ -44,6 +44,7 @@ def test_actions() -> None:
     ]
     info = json.loads(listed(("/lab/talker",), "action", "info", "/lab/navigate", "--json"))
     assert info["servers"] == ["/lab/talker"]
+    assert json.loads(said("action", "info", "lab/navigate", "--json")) == info
 
 
 def test_a_goal_gives_feedback_and_a_result() -> None:
@@ -110,6 +111,8 @@ def test_parameters_are_read_and_set() -> None:
 
 def test_a_parameter_that_is_not_taken_is_told_with_the_reason() -> None:
     assert "out of range" in error("param", "set", "talker", "speed", "99")
+    told = compose("param", "set", "talker", "gains", "[3").stderr
+    assert told == "compose: '[3' is not YAML: expected ',' or ']', but got '<stream end>'\n"
     assert "'speed' is a double, which 'fast' is not" in error(
         "param", "set", "talker", "speed", "fast"
     )
