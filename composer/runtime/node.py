@@ -178,9 +178,8 @@ class RunningNode:
         self._lifecycle.give_up()
 
     def sent(self, publisher: str) -> int:
-        """Return how many messages went through a publisher since the node was configured."""
-        port = self._assembly.publishers.get(publisher)
-        return 0 if port is None else port.sender.sent
+        """Return how many messages went through a publisher."""
+        return self.statistics.publisher(publisher).sent
 
     @property
     def cores(self) -> tuple[Core, Core]:

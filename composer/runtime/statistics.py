@@ -30,6 +30,13 @@ class CallbackStatistics:
 
 
 @dataclass(slots=True)
+class PublisherStatistics:
+    """How many messages went through a publisher."""
+
+    sent: int = 0
+
+
+@dataclass(slots=True)
 class ChainStatistics:
     """What is counted of a chain: how long data took, and how often longer than it may."""
 
@@ -54,17 +61,26 @@ class Statistics:
 
     tracing: bool = True
     received: int = 0
-    sent: int = 0
     calls: int = 0
     dropped: int = 0
     skipped: int = 0
     errors: int = 0
     qos_events: Counter[str] = field(default_factory=Counter)
     callbacks: dict[tuple[str, str], CallbackStatistics] = field(default_factory=dict)
+    publishers: dict[str, PublisherStatistics] = field(default_factory=dict)
+
+    def publisher(self, name: str) -> PublisherStatistics:
+        """Return where the messages of a publisher are counted, from now on or as before."""
+        return self.publishers.setdefault(name, PublisherStatistics())
 
     def callback(self, kind: str, name: str) -> CallbackStatistics:
         """Return where the callbacks of a port or timer are counted, from now on or as before."""
         return self.callbacks.setdefault((kind, name), CallbackStatistics(kind, name))
+
+    @property
+    def sent(self) -> int:
+        """How many messages went through all publishers."""
+        return sum(publisher.sent for publisher in tuple(self.publishers.values()))
 
     @property
     def busy_s(self) -> float:

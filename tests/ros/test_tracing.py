@@ -118,8 +118,11 @@ SOURCE_AND_SINK = """
 from std_msgs.msg import Int64
 
 class Source:
+    has_sent = False
+
     def on_tick(self):
-        if self.publishers.number.sent == 0:
+        if not self.has_sent:
+            self.has_sent = True
             for number in range(4100):
                 self.publishers.number.publish(Int64(data=number))
 

@@ -11,7 +11,7 @@ from rclpy.serialization import deserialize_message
 
 from composer.runtime.gate import Gate
 from composer.runtime.marks import MARKS, STEADY
-from composer.runtime.statistics import Statistics
+from composer.runtime.statistics import PublisherStatistics
 
 
 class Target(Protocol):
@@ -30,7 +30,7 @@ class Origin:
     """
 
     gate: Gate
-    statistics: Statistics
+    counted: PublisherStatistics
     refuse: Callable[[], None]
     watchers: tuple[Target, ...] = ()
 
@@ -44,26 +44,23 @@ class Sender:
     """
 
     __slots__ = (
+        "_counted",
         "_gate",
         "_has_outsiders",
         "_mark",
         "_publish",
         "_refuse",
-        "_statistics",
         "_targets",
         "message_type",
-        "sent",
     )
 
     def __init__(self, publisher: Publisher, origin: Origin) -> None:
         self._gate = origin.gate
-        self._statistics = origin.statistics
+        self._counted = origin.counted
         self._refuse = origin.refuse
         self._publish: Callable[[Any], None] = publisher.publish
         #: The message class of the topic.
         self.message_type: Any = publisher.msg_type
-        #: How many messages were sent.
-        self.sent = 0
         self._targets = origin.watchers
         self._has_outsiders = True  # whether there are is for DDS to know
         self._mark = STEADY
@@ -84,8 +81,7 @@ class Sender:
             self._look_outside()
         if self._has_outsiders:
             self._publish(message)
-        self.sent += 1
-        self._statistics.sent += 1
+        self._counted.sent += 1
 
     def _look_outside(self) -> None:
         """See whether somebody outside listens; asked once something has matched or left."""

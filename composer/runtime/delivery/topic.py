@@ -133,8 +133,7 @@ class LatchingOutlet(Outlet):
             for target in self._targets:
                 target.put(message)
             self._publish(message)  # somebody who is not here yet may want it
-        self.sent += 1
-        self._statistics.sent += 1
+        self._counted.sent += 1
 
     def join(self, inlet: Inlet) -> None:
         """Hand messages to ``inlet`` from now on, if they match; what is latched first."""

@@ -40,7 +40,8 @@ class PublisherPort:
             callback_group=core.group,
             event_callbacks=cast(PublisherEventCallbacks, self._qos_events),
         )
-        origin = Origin(core.gate, core.statistics, self._drop, tuple(self._watchers(port)))
+        counted = core.statistics.publisher(self._name)
+        origin = Origin(core.gate, counted, self._drop, tuple(self._watchers(port)))
         #: What the node publishes with.
         self.sender, self._leave = core.delivery.add_publisher(port, self._publisher, origin)
         self._warned = False
