@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         return _no_room(error) if error.errno in _NO_ROOM else _internal_error(error)
     except Exception as error:
-        return _internal_error(error)
+        return INTERRUPTED if _comes_of_an_interrupt(error) else _internal_error(error)
     finally:
         _flush()
     return 0
@@ -64,6 +64,14 @@ def _exit_code(end: SystemExit) -> int:
     if end.code is None:
         return 0
     return end.code if isinstance(end.code, int) else 1
+
+
+def _comes_of_an_interrupt(error: BaseException) -> bool:
+    """Say whether it was Ctrl-C: a module in C makes another error of it while it is loaded."""
+    cause = error.__cause__
+    return isinstance(cause, KeyboardInterrupt) or (
+        cause is not None and _comes_of_an_interrupt(cause)
+    )
 
 
 def _internal_error(error: Exception) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 import sys
 from dataclasses import replace
 from enum import StrEnum
@@ -153,6 +154,10 @@ def run(
         if plan.steps:
             write(str(plan))
         return
+    if not wait:
+        # Nothing has begun, so Ctrl-C may end the process at once until the host hears it: raised
+        # while ROS is being loaded, it can be taken for a failure of that, or be lost.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     require_ros("compose run")
     require_interfaces(declared)
     if wait:

@@ -110,6 +110,21 @@ def test_ctrl_c_is_heard_while_a_command_is_still_being_loaded(
     assert (done.code, done.out, done.err) == (130, "", "")
 
 
+def test_ctrl_c_is_told_from_a_module_that_cannot_be_loaded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """rclpy is in C: what it meets while it is loaded it makes an ImportError of."""
+
+    def interrupt(*_: object) -> None:
+        failure = ImportError("initialization failed")
+        failure.__cause__ = KeyboardInterrupt()
+        raise ImportError("read the guide") from failure
+
+    monkeypatch.setattr("composer.cli.app.application", interrupt)
+    done = compose("validate", ".")
+    assert (done.code, done.out, done.err) == (130, "", "")
+
+
 def options_with_a_number() -> Iterator[tuple[str, Any]]:
     waiting: list[tuple[str, Any]] = [("compose", typer.main.get_command(application()))]
     while waiting:

@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -177,3 +178,31 @@ def test_ctrl_c_ends_a_waiting_command_without_a_traceback(peer: Peer) -> None:
     out, err = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, out) == (130, "")
     assert "Traceback" not in err
+
+
+LOADING = """
+import sys
+import time
+
+class Slow:
+    def find_spec(self, name, path=None, target=None):
+        if name == "rclpy":
+            print("loading", flush=True)
+            time.sleep(60)
+
+sys.meta_path.insert(0, Slow())
+from composer.cli import main
+sys.exit(main(["run", "pipeline"]))
+"""
+
+
+def test_ctrl_c_ends_a_run_that_is_still_loading_ros() -> None:
+    command = [sys.executable, "-c", LOADING]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "loading\n"
+        process.send_signal(signal.SIGINT)
+        _, error = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, error) == (-signal.SIGINT, "")
