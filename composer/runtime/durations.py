@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import threading
-from bisect import bisect
+from array import array
 from collections.abc import Iterable
-from itertools import accumulate, pairwise
+from itertools import pairwise
+
+import numpy as np
 
 _SHORTEST_S = 1e-7
 _LONGEST_S = 100.0
@@ -21,27 +23,27 @@ def _bounds() -> Iterable[float]:
 
 
 #: The limits between buckets, in seconds: bucket ``i`` ends at ``BOUNDS_S[i]``, the last nowhere.
-BOUNDS_S = tuple(_bounds())
-
+BOUNDS_S = np.array(tuple(_bounds()))
+_BUCKETS = len(BOUNDS_S) + 1
 
 #: So many times are put into the histogram together.
-TOGETHER = 64
+TOGETHER = 256
 
 
 class Durations:
     """A histogram of times in seconds.
 
     Who counts a million a second appends to ``waiting`` by itself, and calls :meth:`settle` at
-    every :data:`TOGETHER`: a list is a place in memory that is near, buckets are not. Any thread
+    every :data:`TOGETHER`: its end is a place in memory that is near, buckets are not. Any thread
     may count and ask.
     """
 
     __slots__ = ("_buckets", "_lock", "_longest_s", "_total_s", "_weight", "waiting")
 
     def __init__(self) -> None:
-        self.waiting: list[float] = []
+        self.waiting = array("d")
         self._weight = 1
-        self._buckets = [0] * (len(BOUNDS_S) + 1)
+        self._buckets = np.zeros(_BUCKETS, np.int64)
         self._total_s = 0.0
         self._longest_s = 0.0
         self._lock = threading.Lock()
@@ -55,15 +57,15 @@ class Durations:
     def settle(self) -> None:
         """Put what waits into the histogram."""
         with self._lock:
-            settled = self.waiting[:]  # by now: others may go on appending
-            if not settled:
+            waiting = self.waiting[:]  # by now: others may go on appending
+            if not waiting:
                 return
-            del self.waiting[: len(settled)]
-            buckets, weight = self._buckets, self._weight
-            for took_s in settled:
-                buckets[bisect(BOUNDS_S, took_s)] += weight
-            self._total_s += sum(settled) * weight
-            self._longest_s = max(self._longest_s, *settled)
+            del self.waiting[: len(waiting)]
+            settled = np.frombuffer(waiting)
+            counted = np.bincount(BOUNDS_S.searchsorted(settled, "right"), minlength=_BUCKETS)
+            self._buckets += counted * self._weight
+            self._total_s += float(settled.sum()) * self._weight
+            self._longest_s = max(self._longest_s, float(settled.max()))
 
     def stand_for(self, weight: int) -> None:
         """Let each time that comes from now on count as ``weight`` of them."""
@@ -87,7 +89,7 @@ class Durations:
     def count(self) -> int:
         """How many there were."""
         self.settle()
-        return sum(self._buckets)
+        return int(self._buckets.sum())
 
     @property
     def mean_s(self) -> float:
@@ -97,16 +99,16 @@ class Durations:
     def percentile_s(self, share: float) -> float:
         """Return what ``share`` (0 to 1) of them do not exceed, within 10 %; 0 without any."""
         self.settle()
-        counted = list(accumulate(self._buckets))
+        counted: list[int] = self._buckets.cumsum().tolist()
         if not counted[-1]:
             return 0.0
         rank = share * counted[-1]
         index = next(index for index, below in enumerate(counted) if below >= rank and below)
-        return min(self._longest_s, _MIDDLES_S[index])
+        return float(min(self._longest_s, _MIDDLES_S[index]))
 
 
 _MIDDLES_S = (
     _SHORTEST_S,
-    *(before + (after - before) / 2.0 for before, after in pairwise(BOUNDS_S)),
+    *(before + (after - before) / 2.0 for before, after in pairwise(BOUNDS_S.tolist())),
     float("inf"),
 )
