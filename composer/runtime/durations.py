@@ -76,8 +76,8 @@ class Durations:
     @property
     def total_s(self) -> float:
         """All of them together."""
-        self.settle()
-        return self._total_s
+        with self._lock:  # without settling: this is asked each second
+            return self._total_s + sum(self.waiting) * self._weight
 
     @property
     def longest_s(self) -> float:
