@@ -73,7 +73,7 @@ class Sender:
         if not self._gate.outgoing:
             self._refuse()
             return
-        if message.__class__ is not self.message_type:
+        if type(message) is not self.message_type:
             message = self._converted(message)
         for target in self._targets:
             target.put(message)

@@ -32,7 +32,7 @@ class Callback:
         """Have ``message`` handled; return the rest of that, where it is ``async``."""
         timer = self._timer
         began_s = 0.0
-        if timer.pause > 0:  # two threads may both count down the last
+        if timer.pause > 0.0:  # two threads may both count down the last
             timer.pause -= 1
         else:
             began_s = monotonic()
