@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from bisect import bisect
 from random import Random
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +12,7 @@ import pytest
 
 from composer.cli.callback_table import callback_table
 from composer.cli.top_table import Sorting, as_json, sorted_rates, table
-from composer.runtime.durations import Durations
+from composer.runtime.durations import BOUNDS_S, TOGETHER, Durations
 from composer.runtime.figures import CallbackFigures, figures, rates
 from composer.runtime.statistics import CallbackStatistics, Statistics
 
@@ -34,6 +35,23 @@ def test_a_percentile_is_right_within_a_tenth(scale_s: float) -> None:
     assert durations.count == 1000
     assert durations.mean_s == pytest.approx(sum(times_s) / 1000)
     assert durations.longest_s == times_s[-1]
+
+
+def test_times_that_settle_together_come_into_the_buckets_of_each() -> None:
+    random = Random(3)
+    kinds = (
+        lambda: random.choice(BOUNDS_S),
+        lambda: random.uniform(0.0, 1e-5),
+        lambda: random.uniform(0.0, 200.0),
+    )
+    durations, one_by_one = Durations(), [0] * (len(BOUNDS_S) + 1)
+    for _ in range(100):
+        times_s = [random.choice(kinds)() for _ in range(random.randint(1, TOGETHER))]
+        for time_s in times_s:
+            one_by_one[bisect(BOUNDS_S, time_s)] += 1
+        durations.waiting.extend(times_s)
+        durations.settle()
+    assert durations._buckets == one_by_one
 
 
 def test_the_ends_of_the_scale_are_no_limits() -> None:
