@@ -81,8 +81,10 @@ class TimerHeap:
         """
         if call.period_s is None or call.cancelled:
             return
-        missed = math.floor((monotonic() - call.due_s) / call.period_s)
-        call.due_s += (max(missed, 0) + 1) * call.period_s
+        call.due_s += call.period_s
+        late_s = call.late_s
+        if late_s >= 0.0:
+            call.due_s += (math.floor(late_s / call.period_s) + 1) * call.period_s
         self.add(call)
 
     def _sweep(self) -> None:
