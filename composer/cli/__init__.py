@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(failure.text(), file=sys.stderr)
         return failure.exit_code
     except OSError as error:
-        return _no_room(error) if error.errno in _NO_ROOM else _internal_error(error)
+        return _machine_error(error)
     except Exception as error:
         return INTERRUPTED if _comes_of_an_interrupt(error) else _internal_error(error)
     finally:
@@ -55,9 +55,23 @@ def _have_streams() -> None:
             setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
 
 
-def _no_room(error: OSError) -> int:
-    print(f"compose: the output cannot be written: {error.strerror}", file=sys.stderr)
+def _machine_error(error: OSError) -> int:
+    """Say what is wrong with the machine, where that is known, and not with us."""
+    if error.errno in _NO_ROOM:
+        text = f"the output cannot be written: {error.strerror}"
+    elif not _is_in_a_folder():
+        text = "the current folder is gone: somebody has removed it"
+    else:
+        return _internal_error(error)
+    print(f"compose: {text}", file=sys.stderr)
     return FINDINGS
+
+
+def _is_in_a_folder() -> bool:
+    try:
+        return bool(Path.cwd())
+    except FileNotFoundError:
+        return False
 
 
 def _exit_code(end: SystemExit) -> int:

@@ -99,6 +99,23 @@ def test_a_full_disk_is_no_fault_of_ours(arguments: list[str]) -> None:
     assert done.stderr == "compose: the output cannot be written: No space left on device\n"
 
 
+def test_a_current_folder_that_is_gone_is_told_as_such(tmp_path: Path) -> None:
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    python = f"{sys.executable} -P -m composer"
+    done = subprocess.run(
+        ["sh", "-c", f"rmdir ../gone && {python} validate ."],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(Path(cli.__file__).parents[2])},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=30,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == "compose: the current folder is gone: somebody has removed it\n"
+
+
 def test_ctrl_c_is_heard_while_a_command_is_still_being_loaded(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -189,7 +189,7 @@ def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None
     wait_until(lambda: summary.search(robot.log.read_text()), "the summary")
     refusal = refused("down", robot.path)
     assert refusal.startswith("compose: there is no running system 'robot'")
-    assert "compose run robot" in refusal
+    assert "no system is running: start one with 'compose run'" in refusal
 
 
 def test_commands_to_a_whole_system(robot: Robot) -> None:
