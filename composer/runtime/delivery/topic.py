@@ -13,7 +13,7 @@ from composer.model import Isolation, Port
 from composer.qos import Durability, incompatibilities
 from composer.runtime.delivery.copying import copy_of
 from composer.runtime.delivery.sender import Origin, Sender, Target
-from composer.runtime.marks import MatchMark
+from composer.runtime.marks import STEADY, MatchMark
 
 
 class Receiver(Target, Protocol):
@@ -46,6 +46,20 @@ class Copies:
     def put(self, message: Any) -> None:
         """Have a copy of the message received."""
         self._receiver.put(copy_of(message))
+
+
+class Latched:
+    """Keeps what was sent last; of messages that nobody is to share, copies."""
+
+    __slots__ = ("_isolated", "messages")
+
+    def __init__(self, depth: int | None, *, isolated: bool) -> None:
+        self._isolated = isolated
+        self.messages: deque[Any] = deque(maxlen=depth)
+
+    def put(self, message: Any) -> None:
+        """Keep the message."""
+        self.messages.append(copy_of(message) if self._isolated else message)
 
 
 class Outlet(Sender):
@@ -116,7 +130,10 @@ class LatchingOutlet(Outlet):
 
     def __init__(self, publisher: Publisher, origin: Origin, port: Port) -> None:
         super().__init__(publisher, origin, port)
-        self._latched: deque[Any] = deque(maxlen=self.profile.queue_depth)
+        self._latched = Latched(self.profile.queue_depth, isolated=self._isolated)
+        self._targets = self._watchers = (*origin.watchers, self._latched)
+        self._has_outsiders = True  # somebody who is not here yet may want what is sent
+        self._mark = STEADY
         self._lock = threading.Lock()  # who joins gets each message once
 
     def publish(self, message: Any) -> None:
@@ -124,16 +141,8 @@ class LatchingOutlet(Outlet):
 
         It is dropped and counted while the node is not active.
         """
-        if not self._gate.outgoing:
-            self._refuse()
-            return
-        message = self._converted(message)
         with self._lock:
-            self._latched.append(copy_of(message) if self._isolated else message)
-            for target in self._targets:
-                target.put(message)
-            self._publish(message)  # somebody who is not here yet may want it
-        self._counted.sent += 1
+            super().publish(message)
 
     def join(self, inlet: Inlet) -> None:
         """Hand messages to ``inlet`` from now on, if they match; what is latched first."""
@@ -141,9 +150,12 @@ class LatchingOutlet(Outlet):
             return
         with self._lock:
             if inlet.profile.durability is Durability.TRANSIENT_LOCAL:
-                for message in self._latched:
+                for message in self._latched.messages:
                     self._target(inlet).put(message)
             self._reach((*self._inlets, inlet))
+
+    def _look_outside(self) -> None:
+        """Send to DDS whoever is there."""
 
 
 def outlet_for(publisher: Publisher, origin: Origin, port: Port) -> Outlet:

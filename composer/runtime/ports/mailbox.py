@@ -134,9 +134,7 @@ class Mailbox(Callback):
         finally:
             if rest is not None:
                 self._wait_for(rest)
-            elif messages:  # as in _go_on, but without a call
-                self._call_soon(self._turn)
-            else:
+            else:  # as in _go_on, but without a call
                 self._idle.append(True)
                 if messages:
                     self._begin()
@@ -151,11 +149,9 @@ class Mailbox(Callback):
         self._go_on()
 
     def _go_on(self) -> None:
-        if self._messages:
-            self._call_soon(self._turn)
-            return
+        """Give the turn back; whoever finds that something waits has it taken anew."""
         self._idle.append(True)
-        if self._messages:  # put there while nobody thought us idle
+        if self._messages:
             self._begin()
 
     def _begin(self, *, at_once: bool = False) -> None:
