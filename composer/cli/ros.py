@@ -14,7 +14,7 @@ from composer.cli.finite import finite
 from composer.cli.terminal import keep_stdout_for_data
 
 if TYPE_CHECKING:
-    from composer.model import System
+    from composer.model import Node, System
     from composer.runtime.session import Deadline, Session
 
 #: How long a command waits, all in all, for other processes.
@@ -55,15 +55,17 @@ def require_interfaces(system: System) -> None:
     """Raise a Failure where Python lacks types that ports have: their nodes would not come up."""
     from composer.runtime.doctor.interfaces import how_to_build
 
+    users: dict[str, Node] = {}  # by the package: each is looked for once
     for node in system.nodes:
         for port in node.ports:
-            package = port.interface.value.partition("/")[0]
-            if find_spec(package) is None:
-                raise Failure(
-                    f"interface package '{package}' of node '{node.name}' is not installed for"
-                    " this Python",
-                    hint=how_to_build(package),
-                )
+            users.setdefault(port.interface.value.partition("/")[0], node)
+    for package, node in users.items():
+        if find_spec(package) is None:
+            raise Failure(
+                f"interface package '{package}' of node '{node.name}' is not installed for"
+                " this Python",
+                hint=how_to_build(package),
+            )
 
 
 @contextmanager
