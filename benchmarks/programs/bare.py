@@ -47,7 +47,7 @@ def spin(first: Stage, task: Task) -> None:
     due_s = time.monotonic()
     while True:
         due_s += 1.0 / task.rate_hz
-        time.sleep(max(0.0, due_s - time.monotonic()))
+        time.sleep(max(0.0, due_s - time.monotonic()))  # waking up is part of what is measured
         message = make(task.message)
         COUNTS.sent_ns = time.monotonic_ns()
         first.waiting.append(message)

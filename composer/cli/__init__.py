@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _have_streams() -> None:
     """Let streams that the process was started without lead nowhere."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
+        if getattr(sys, name) is None:  # opened for as long as the process lives
             setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
 
 

@@ -49,7 +49,7 @@ class Running:
                 return
             assert not has_ended, self.log.read_text()
             assert time.monotonic() < until_s, self.log.read_text()
-            time.sleep(0.02)
+            time.sleep(0.02)  # between two looks at a file that nothing announces
 
     def stop(self, number: int = signal.SIGINT) -> tuple[int, str, str]:
         """Send the signal; return exit code, stdout and stderr."""
