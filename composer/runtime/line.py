@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 
 from composer.runtime.core import Core
 from composer.runtime.strand import Direct, Work
-from composer.runtime.tracing import CallbackTimer, Untimed
+from composer.runtime.tracing import CallbackTimer
 
 T = TypeVar("T")
 
@@ -37,15 +37,13 @@ def line_for(
 class Line(Generic[T]):
     """Items that wait for ``work``, on several threads."""
 
-    __slots__ = ("_busy", "_core", "_depth", "_lock", "_timed", "_timer", "_waiting", "_work")
+    __slots__ = ("_busy", "_core", "_depth", "_lock", "_waiting", "_work")
 
     def __init__(
         self, core: Core, work: Work[T], timer: CallbackTimer | None, depth: int | None
     ) -> None:
         self._core = core
-        self._timer = timer or Untimed()
-        self._timed = work if timer is None else timer.around(work)
-        self._work = work if timer is None else timer.watched(work)
+        self._work = work if timer is None else timer.around(work)
         self._depth = depth
         self._waiting: deque[T] = deque()
         self._busy = False
@@ -81,7 +79,7 @@ class Line(Generic[T]):
                     self._busy = False
                     return
                 item = self._waiting.popleft()
-            coroutine = self._timed(item)
+            coroutine = self._work(item)
             if coroutine is not None:
                 self._spawn(coroutine)
                 return
@@ -104,12 +102,7 @@ class OneThreadLine(Line[T]):
         if self._busy:
             return super().put(item)
         self._busy = True
-        timer = self._timer
-        if timer.pause:
-            timer.pause -= 1
-            coroutine = self._work(item)
-        else:
-            coroutine = self._timed(item)
+        coroutine = self._work(item)
         if coroutine is not None:
             self._spawn(coroutine)
         elif self._waiting:
@@ -126,6 +119,6 @@ class OverlappingLine(Line[T]):
 
     def put(self, item: T) -> None:
         """Work on ``item`` at once."""
-        coroutine = self._timed(item)
+        coroutine = self._work(item)
         if coroutine is not None:
             self._core.spawn(coroutine)

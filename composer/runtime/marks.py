@@ -1,14 +1,14 @@
-"""Bytes that the middleware zeroes when something has changed: looking costs next to nothing.
+"""A byte that the middleware zeroes when something has changed: looking costs next to nothing.
 
 As with :mod:`composer.runtime.readiness`, what rcl calls back may not be Python. Here it is libc's
 ``bzero``, whose two arguments (an address, a count) travel as those of ``void (*)(const void *
-user_data, size_t count)`` do. It zeroes ``count`` bytes; that those behind are zeroed with it only
-means that somebody looks once more than needed.
+user_data, size_t count)`` do. It zeroes ``count`` bytes, for which there has to be room.
 """
 
 from __future__ import annotations
 
 import ctypes
+from typing import Final
 
 from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -16,32 +16,46 @@ from rclpy.publisher import Publisher
 
 from composer.runtime.readiness import EVENT
 
-_MARKS = 1 << 14  # more publishers than a process can start; a place is an int of Python
-_ROOM_BEHIND = 1 << 20  # more than events can come together; Linux gives memory when it is used
+_ROOM = 1 << 20  # more than events can come together; Linux gives memory when it is used
 
-#: The bytes of all marks of the process.
-MARKS = bytearray(_MARKS + _ROOM_BEHIND)
+#: The first byte is zero when a subscription has matched a publisher of this process, or left it.
+MARK: Final = bytearray(_ROOM)
 
-_ADDRESS = ctypes.addressof(ctypes.c_char.from_buffer(MARKS))
+_ADDRESS = ctypes.addressof(ctypes.c_char.from_buffer(MARK))
 _ZERO = ctypes.cast(ctypes.CDLL(None).bzero, ctypes.c_void_p)
-#: The byte at 0 is for those who have none of their own: always zero.
-_NONE = 0
-#: The byte that is never zero, of those who need not look: no mark is before it.
-STEADY = 1
-MARKS[STEADY] = 1
-_free = list(range(_MARKS - 1, STEADY, -1))
 
 
-class MatchMark:
-    """A byte that becomes zero whenever a subscription matches the publisher, or leaves it.
+class Matches:
+    """Who has matched whom, in periods that end whenever that changes.
 
-    Where the middleware does not tell, or there are too many publishers, it is zero at any time.
+    A publisher that has looked in this ``period`` need not look again. One mark and one period
+    serve all of them: they are near, and something of each would have to be fetched from memory
+    for each message.
     """
 
-    __slots__ = ("_event", "index")
+    __slots__ = ("period",)
+
+    def __init__(self) -> None:
+        #: An object like no other.
+        self.period = object()
+
+    def begin_period(self) -> None:
+        """To be called when the mark is zero."""
+        MARK[0] = 1  # first: a change that comes now has to end the period that begins
+        self.period = object()
+
+
+MATCHES: Final = Matches()
+
+
+class MatchEvent:
+    """Zeroes the mark whenever a subscription matches the publisher, or leaves it."""
+
+    __slots__ = ("_event", "is_told")
 
     def __init__(self, publisher: Publisher) -> None:
-        self.index = _NONE
+        #: False where the middleware does not tell.
+        self.is_told = False
         try:
             with publisher.handle:
                 self._event = rclpy_implementation.EventHandle(
@@ -49,28 +63,14 @@ class MatchMark:
                 )
         except UnsupportedEventTypeError:
             return
-        try:
-            index = _free.pop()
-        except IndexError:
-            return
         with self._event:
-            if EVENT(self._event.pointer, _ZERO, _ADDRESS + index) == 0:
-                self.index = index
-            else:
-                _free.append(index)
-
-    def set(self) -> None:
-        """Make the byte one until something changes."""
-        if self.index != _NONE:
-            MARKS[self.index] = 1
+            self.is_told = EVENT(self._event.pointer, _ZERO, _ADDRESS) == 0
 
     def close(self) -> None:
-        """Leave the byte alone from now on. To be called before the publisher is destroyed."""
-        if self.index == _NONE:
+        """Leave the mark alone from now on. To be called before the publisher is destroyed."""
+        if not self.is_told:
             return
         with self._event:
             EVENT(self._event.pointer, None, 0)
         self._event.destroy_when_not_in_use()
-        MARKS[self.index] = 0
-        _free.append(self.index)
-        self.index = _NONE
+        self.is_told = False

@@ -11,17 +11,18 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Coroutine
 from functools import partial
+from math import inf
 from time import monotonic, sleep
 from typing import Any, TypeVar
 
 from composer.runtime.handover import Handover
 from composer.runtime.loop import ExceptionHandler
-from composer.runtime.poller import Poller
+from composer.runtime.poller import Announced, Poller, wake_in_time
 from composer.runtime.slots import Slot
 from composer.runtime.sources import Source
 from composer.runtime.stacks import where
 from composer.runtime.tasks import Future, Task, name_of
-from composer.runtime.timers import ScheduledCall, TimerHeap
+from composer.runtime.timers import ScheduledCall, Timetable
 
 T = TypeVar("T")
 
@@ -41,7 +42,7 @@ class Scheduler:
         self._name = name
         self._on_exception = on_exception
         self._poller = Poller()
-        self._timers = TimerHeap()
+        self._timers = Timetable()
         self._calls: deque[Callable[[], object]] = deque()
         self._ready: deque[Slot] = deque()  # with something to take
         self._slots: dict[int, Slot] = {}  # by the file descriptor of their signal
@@ -158,6 +159,7 @@ class Scheduler:
     # --- the thread
 
     def _spin(self) -> None:
+        wake_in_time()
         while not self._stopping:
             try:
                 self._take_turns()
@@ -170,33 +172,39 @@ class Scheduler:
 
     def _take_turns(self) -> None:
         timers, calls, ready = self._timers, self._calls, self._ready
-        busy_until_s = 0.0
+        rest_at_s = inf  # not known yet
         while not self._stopping:
             now_s = monotonic()
             if now_s >= timers.next_s:
-                self._run_timers()
+                self._run_timers(now_s)
             if calls:
                 self._run_calls()
-            if not (calls or ready):
-                self._gather(self._wait())
-                busy_until_s = monotonic() + BUSY_S
-            else:
-                if now_s > busy_until_s:
+            if calls or ready:
+                if now_s > rest_at_s:
                     sleep(MOMENT_S)
-                    busy_until_s = now_s + BUSY_S
-                self._gather(self._poller.ready())
-            for _ in range(_ROUND):
-                if not ready:
-                    break
-                self._serve(ready.popleft())
-                if monotonic() >= timers.next_s:
-                    break
+                    rest_at_s = inf
+                if rest_at_s == inf:
+                    rest_at_s = now_s + BUSY_S
+                announced = self._poller.ready()
+            else:
+                announced = self._wait()
+                rest_at_s = inf
+            if announced:
+                self._gather(announced)
+            if ready:
+                self._serve_round()
 
-    def _run_timers(self) -> None:
-        for call in self._timers.take_due():
-            if not call.cancelled:  # by one of those before it
-                self._call(call.callback)
-                self._timers.repeat(call)
+    def _run_timers(self, now_s: float) -> None:
+        timers = self._timers
+        while timers.next_s <= now_s:
+            call = timers.take()
+            try:
+                if not call.cancelled:
+                    self._call(call.callback)
+                    if self._calls:  # what it has brought about need not wait until it is put back
+                        self._run_calls()
+            finally:
+                timers.repeat(call)
 
     def _run_calls(self) -> None:
         calls, timers = self._calls, self._timers
@@ -210,7 +218,7 @@ class Scheduler:
                 break
         self._running = None
 
-    def _wait(self) -> list[tuple[int, int]]:
+    def _wait(self) -> Announced:
         self._sleeping = True
         try:
             if self._calls or self._stopping:  # put there while nobody thought us asleep
@@ -219,13 +227,20 @@ class Scheduler:
         finally:
             self._sleeping = False
 
-    def _gather(self, announced: list[tuple[int, int]]) -> None:
+    def _gather(self, announced: Announced) -> None:
         for fd, _ in announced:
             slot = self._slots.get(fd)
             if slot is not None:
                 if not slot.due:
                     self._ready.append(slot)
                 slot.due += slot.signal.count()
+
+    def _serve_round(self) -> None:
+        ready, timers = self._ready, self._timers
+        for _ in range(_ROUND):
+            self._serve(ready.popleft())
+            if not ready or monotonic() >= timers.next_s:
+                break
 
     def _serve(self, slot: Slot) -> None:
         brought = 0

@@ -9,7 +9,7 @@ from time import monotonic
 from typing import Protocol
 
 from composer.runtime.tasks import name_of
-from composer.runtime.timers import ScheduledCall, TimerHeap
+from composer.runtime.timers import ScheduledCall, Timetable
 
 
 class Caller(Protocol):
@@ -27,7 +27,7 @@ class TimerThread:
 
     def __init__(self, loop: Caller, name: str) -> None:
         self._loop = loop
-        self._timers = TimerHeap()
+        self._timers = Timetable()
         self._changed = threading.Condition()
         self._stopping = False
         self.thread = threading.Thread(target=self._run, name=name, daemon=True)
@@ -54,14 +54,12 @@ class TimerThread:
             with self._changed:
                 if self._stopping:
                     return
-                due_s = self._timers.next_due_s()
-                remaining_s = threading.TIMEOUT_MAX if due_s is None else due_s - monotonic()
+                remaining_s = self._timers.next_due_s() - monotonic()
                 if remaining_s > 0.0:
                     self._changed.wait(min(remaining_s, threading.TIMEOUT_MAX))
                     continue
-                due = self._timers.take_due()
-            for call in due:
-                self._loop.call_soon(partial(self._call, call))
+                call = self._timers.take()
+            self._loop.call_soon(partial(self._call, call))
 
     def _call(self, call: ScheduledCall) -> None:
         if call.cancelled or self._stopping:

@@ -1,14 +1,14 @@
-"""Calls at a time: a heap on the steady clock."""
+"""Calls at a time of the steady clock."""
 
 from __future__ import annotations
 
-import heapq
 import itertools
-import math
+from bisect import insort
 from collections.abc import Callable
+from math import floor, inf, isnan
 from time import monotonic
 
-_MANY = 64  # cancelled calls that may linger in the heap before it is swept
+_MANY = 64  # cancelled calls that may linger before they are swept out
 
 
 class ScheduledCall:
@@ -22,10 +22,10 @@ class ScheduledCall:
         """Raise ValueError for a period that is not positive and a time that is no number."""
         if period_s is not None and not period_s > 0:
             raise ValueError(f"a period must be positive, not {period_s:g} s")
-        if math.isnan(due_s):
+        if isnan(due_s):
             raise ValueError("a delay must be a number")
         self.due_s = due_s
-        self.period_s = period_s
+        self.period_s = inf if period_s is None else period_s
         self.callback = callback
         self.cancelled = False
 
@@ -39,55 +39,70 @@ class ScheduledCall:
         self.cancelled = True
 
 
-class TimerHeap:
-    """Scheduled calls, the next one first. To be used by one thread."""
+class Timetable:
+    """Scheduled calls. To be used by one thread.
+
+    A sorted list, the next call last, and no heap: to take that one out and, where there are few,
+    to put it back is no search then, and a call has to be put back each time it was made.
+    """
 
     def __init__(self) -> None:
-        self._heap: list[tuple[float, int, ScheduledCall]] = []
-        self._order = itertools.count()  # calls due at the same time keep their order
+        self._entries: list[tuple[float, int, ScheduledCall]] = []  # -due_s, -place, call
+        self._places = itertools.count(0, -1)  # calls due at the same time keep their order
         self._sweep_at = _MANY
-        self.next_s = math.inf  # nothing is due before; a cancelled call may still count here
+        self.next_s = inf  # nothing is due before; a cancelled call may still count here
 
     def add(self, call: ScheduledCall) -> None:
         """Put a call in its place."""
-        if len(self._heap) >= self._sweep_at:
-            self._sweep()
-        heapq.heappush(self._heap, (call.due_s, next(self._order), call))
-        self.next_s = self._heap[0][0]
+        self._insert(call)
+        self.next_s = min(self.next_s, call.due_s)
 
-    def next_due_s(self) -> float | None:
-        """Return when the next call is due, or None when there is none."""
-        heap = self._heap
-        while heap and heap[0][2].cancelled:
-            heapq.heappop(heap)
-        self.next_s = heap[0][0] if heap else math.inf
-        return heap[0][0] if heap else None
+    def next_due_s(self) -> float:
+        """Return when the next call is due; infinity when there is none."""
+        entries = self._entries
+        while entries and entries[-1][2].cancelled:
+            entries.pop()
+        self.next_s = -entries[-1][0] if entries else inf
+        return self.next_s
 
-    def take_due(self) -> list[ScheduledCall]:
-        """Take out every call that is due by now, in order."""
-        now_s = monotonic()
-        due = []
-        while self._heap and self._heap[0][0] <= now_s:
-            call = heapq.heappop(self._heap)[2]
-            if not call.cancelled:
-                due.append(call)
-        self.next_s = self._heap[0][0] if self._heap else math.inf
-        return due
+    def take(self) -> ScheduledCall:
+        """Take the next call out, a cancelled one as well. Raises IndexError when there is none.
+
+        ``next_s`` has regard to when a periodic one is due again, until it is put back.
+        """
+        entries = self._entries
+        call = entries.pop()[2]
+        self.next_s = call.due_s + call.period_s
+        if entries and -entries[-1][0] < self.next_s:
+            self.next_s = -entries[-1][0]
+        return call
 
     def repeat(self, call: ScheduledCall) -> None:
         """Put a periodic call back for its next multiple of the period that is still to come.
 
         A late call does not shift the next one; periods missed altogether are skipped.
         """
-        if call.period_s is None or call.cancelled:
-            return
-        call.due_s += call.period_s
-        late_s = call.late_s
-        if late_s >= 0.0:
-            call.due_s += (math.floor(late_s / call.period_s) + 1) * call.period_s
-        self.add(call)
+        period_s = call.period_s
+        if period_s != inf and not call.cancelled:
+            due_s = call.due_s + period_s
+            late_s = monotonic() - due_s
+            if late_s >= 0.0:
+                due_s += (floor(late_s / period_s) + 1) * period_s
+            call.due_s = due_s
+            self._insert(call)
+        entries = self._entries
+        self.next_s = -entries[-1][0] if entries else inf
+
+    def _insert(self, call: ScheduledCall) -> None:
+        entries = self._entries
+        if len(entries) >= self._sweep_at:
+            self._sweep()
+        entry = (-call.due_s, next(self._places), call)
+        if not entries or entries[-1] < entry:
+            entries.append(entry)
+        else:
+            insort(entries, entry)
 
     def _sweep(self) -> None:
-        self._heap = [entry for entry in self._heap if not entry[2].cancelled]
-        heapq.heapify(self._heap)
-        self._sweep_at = max(_MANY, 2 * len(self._heap))
+        self._entries[:] = [entry for entry in self._entries if not entry[2].cancelled]
+        self._sweep_at = max(_MANY, 2 * len(self._entries))

@@ -135,15 +135,6 @@ class CallbackTimer:
         self._times.stand_for(how_many)
 
 
-class Untimed:
-    """Stands where there may be a timer."""
-
-    __slots__ = ("pause",)
-
-    def __init__(self) -> None:
-        self.pause = inf
-
-
 class _Stopwatch:
     """Adds up the steps of a coroutine."""
 

@@ -10,7 +10,7 @@ from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
 from composer.runtime.gate import Gate
-from composer.runtime.marks import MARKS, STEADY
+from composer.runtime.marks import MARK, MATCHES
 from composer.runtime.statistics import PublisherStatistics
 
 
@@ -47,7 +47,7 @@ class Sender:
         "_counted",
         "_gate",
         "_has_outsiders",
-        "_mark",
+        "_period",
         "_publish",
         "_refuse",
         "_targets",
@@ -63,7 +63,7 @@ class Sender:
         self.message_type: Any = publisher.msg_type
         self._targets = origin.watchers
         self._has_outsiders = True  # whether there are is for DDS to know
-        self._mark = STEADY
+        self._period: object = None  # in which it was last looked who is there
 
     def publish(self, message: Any) -> None:
         """Send ``message``, from any thread. Raises TypeError when it is not of the topic's type.
@@ -77,14 +77,17 @@ class Sender:
             message = self._converted(message)
         for target in self._targets:
             target.put(message)
-        if not MARKS[self._mark]:
+        if not MARK[0]:
+            MATCHES.begin_period()
+        if self._period is not MATCHES.period:
             self._look_outside()
         if self._has_outsiders:
             self._publish(message)
         self._counted.sent += 1
 
     def _look_outside(self) -> None:
-        """See whether somebody outside listens; asked once something has matched or left."""
+        """See whether somebody outside listens: once, and when something has matched or left."""
+        self._period = MATCHES.period
 
     def _converted(self, message: Any) -> Any:
         """Return what rclpy would publish. Raises TypeError where it would."""

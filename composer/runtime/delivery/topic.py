@@ -13,7 +13,7 @@ from composer.model import Isolation, Port
 from composer.qos import Durability, incompatibilities
 from composer.runtime.delivery.copying import copy_of
 from composer.runtime.delivery.sender import Origin, Sender, Target
-from composer.runtime.marks import STEADY, MatchMark
+from composer.runtime.marks import MATCHES, MatchEvent
 
 
 class Receiver(Target, Protocol):
@@ -65,9 +65,9 @@ class Latched:
 class Outlet(Sender):
     """A publisher that hands each message to the inlets it matches as well.
 
-    Whether somebody outside listens is asked of the middleware when something has matched or left,
-    which a byte of :data:`~composer.runtime.marks.MARKS` says: asking takes half a microsecond, of
-    a message that takes less than one.
+    Whether somebody outside listens is asked of the middleware when something has matched or left
+    (:class:`~composer.runtime.marks.Matches`): asking takes half a microsecond, of a message that
+    takes less than one.
     """
 
     __slots__ = (
@@ -75,7 +75,7 @@ class Outlet(Sender):
         "_inlets",
         "_isolated",
         "_looking",
-        "_match_mark",
+        "_match_event",
         "_watchers",
         "profile",
     )
@@ -85,8 +85,7 @@ class Outlet(Sender):
         self.profile = port.qos.profile
         self._isolated = port.isolation is Isolation.COPY
         self._count_matched: Callable[[], int] = publisher.handle.get_subscription_count
-        self._match_mark = MatchMark(publisher)
-        self._mark = self._match_mark.index
+        self._match_event = MatchEvent(publisher)
         self._has_outsiders = False
         self._looking = threading.Lock()  # the last look is what counts, not the slowest
         self._inlets: tuple[Inlet, ...] = ()
@@ -103,7 +102,7 @@ class Outlet(Sender):
 
     def close(self) -> None:
         """Send nothing any more. To be called before the publisher is destroyed."""
-        self._match_mark.close()
+        self._match_event.close()
 
     def _matches(self, inlet: Inlet) -> bool:
         is_of_the_type = inlet.message_type is self.message_type
@@ -119,7 +118,8 @@ class Outlet(Sender):
 
     def _look_outside(self) -> None:
         with self._looking:
-            self._match_mark.set()  # before the look: who matches in between is seen next time
+            # Before the look: who matches in between is seen next time.
+            self._period = MATCHES.period if self._match_event.is_told else None
             self._has_outsiders = self._count_matched() > len(self._inlets)
 
 
@@ -133,7 +133,6 @@ class LatchingOutlet(Outlet):
         self._latched = Latched(self.profile.queue_depth, isolated=self._isolated)
         self._targets = self._watchers = (*origin.watchers, self._latched)
         self._has_outsiders = True  # somebody who is not here yet may want what is sent
-        self._mark = STEADY
         self._lock = threading.Lock()  # who joins gets each message once
 
     def publish(self, message: Any) -> None:
@@ -156,6 +155,7 @@ class LatchingOutlet(Outlet):
 
     def _look_outside(self) -> None:
         """Send to DDS whoever is there."""
+        self._period = MATCHES.period
 
 
 def outlet_for(publisher: Publisher, origin: Origin, port: Port) -> Outlet:

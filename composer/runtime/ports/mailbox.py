@@ -30,15 +30,20 @@ class Mailbox(Callback):
     They are handled on its loop, one per turn of it, so that a flood holds nobody up, and one at a
     time: what a handler awaits, the next message waits for as well. Everything that a message needs
     is in this one object, as in :class:`~composer.runtime.delivery.sender.Sender`.
+
+    Each message brings a turn along. One that pushes another out does not, or a flood would fill
+    the loop; there, and after a handler that awaited, an extra turn takes one message and sees to
+    it that whatever is left is taken.
     """
 
     __slots__ = (
-        "_call_soon",
         "_depth",
+        "_extra_turn",
         "_gate",
-        "_idle",
+        "_has_no_extra",
         "_is_awaiting",
         "_keeper",
+        "_loop",
         "_messages",
         "_statistics",
         "_turn",
@@ -59,43 +64,38 @@ class Mailbox(Callback):
         """
         depth = port.qos.profile.queue_depth
         super().__init__(core, f"on_{port.name.value}", handle, timer)
-        self._call_soon = core.loop.call_soon
+        self._loop = core.loop
         self._gate = core.gate
         self._statistics = core.statistics
         self._depth = depth
         self._keeper = keeper
         self._messages: deque[Any] = deque(maxlen=depth)
-        # Popping is atomic: whoever gets the item has the turn taken, so it is taken once at a
-        # time, also where the loop has several threads.
-        self._idle = [True]
+        # Popping is atomic: there is one extra turn at a time, whichever thread wants it.
+        self._has_no_extra = [True]
         self._is_awaiting = False
-        self._turn: Callable[[], object] = self._take_turn
-        if not (self._overlaps or isinstance(core.strand, Direct)):
-            self._turn = partial(core.strand.post, self._take_turn)
+        self._turn = self._one_at_a_time(self._take_turn)
+        self._extra_turn = self._one_at_a_time(self._take_extra_turn)
 
     def put(self, message: Any) -> None:
         """Have the message worked on soon, from any thread."""
         messages = self._messages
         if len(messages) == self._depth:
             self._keeper.count_drop()
-        messages.append(message)
-        idle = self._idle
-        if idle:  # as in _begin, but without a call: this is done for each message
-            try:
-                idle.pop()
-            except IndexError:
-                return  # somebody was faster
-            self._call_soon(self._turn)
+            messages.append(message)
+            self._ask_for_extra()
+        else:
+            messages.append(message)
+            self._loop.call_soon(self._turn)
 
     def receive(self, message: Any) -> None:
         """Have the message worked on, at once where nothing waits. To be called on the loop."""
         if not self._gate.incoming:
             self._keeper.hold(message)
-            return
-        if len(self._messages) == self._depth:
-            self._keeper.count_drop()
-        self._messages.append(message)
-        self._begin(at_once=True)
+        elif self._messages:
+            self.put(message)
+        else:
+            self._messages.append(message)
+            self._turn()
 
     def begin_anew(self) -> None:
         """Let go of what has come since the gate was shut, and waits for what was begun before."""
@@ -117,27 +117,25 @@ class Mailbox(Callback):
         self._keeper = _Nobody()
         self._messages.clear()
 
+    def _one_at_a_time(self, take: Callable[[], object]) -> Callable[[], object]:
+        strand = self._core.strand
+        # On a loop of one thread it is that anyway.
+        return take if self._overlaps or isinstance(strand, Direct) else partial(strand.post, take)
+
     def _take_turn(self) -> None:
-        messages = self._messages
+        if self._is_awaiting:
+            return  # an extra turn comes after it
         try:
-            message = messages.popleft()
-        except IndexError:  # cleared meanwhile
-            self._go_on()
+            message = self._messages.popleft()
+        except IndexError:
+            return  # cleared meanwhile, or pushed out
+        if not self._gate.incoming:
+            self._keeper.hold(message)
             return
-        rest = None
-        try:
-            if self._gate.incoming:
-                self._statistics.received += 1
-                rest = self._call(message)
-            else:
-                self._keeper.hold(message)
-        finally:
-            if rest is not None:
-                self._wait_for(rest)
-            else:  # as in _go_on, but without a call
-                self._idle.append(True)
-                if messages:
-                    self._begin()
+        self._statistics.received += 1
+        rest = self._call(message)
+        if rest is not None:
+            self._wait_for(rest)
 
     def _wait_for(self, rest: Coroutine[Any, Any, None]) -> None:
         self._is_awaiting = True
@@ -146,23 +144,23 @@ class Mailbox(Callback):
 
     def _resume(self, _: object) -> None:
         self._is_awaiting = False
-        self._go_on()
-
-    def _go_on(self) -> None:
-        """Give the turn back; whoever finds that something waits has it taken anew."""
-        self._idle.append(True)
         if self._messages:
-            self._begin()
+            self._ask_for_extra()
 
-    def _begin(self, *, at_once: bool = False) -> None:
+    def _ask_for_extra(self) -> None:
         try:
-            self._idle.pop()
+            self._has_no_extra.pop()
         except IndexError:
-            return  # who has put it there takes the turn
-        if at_once:
-            self._turn()
-        else:
-            self._call_soon(self._turn)
+            return  # it is on its way, and has not begun
+        self._loop.call_soon(self._extra_turn)
+
+    def _take_extra_turn(self) -> None:
+        self._has_no_extra.append(True)  # first: what comes from now on may ask for the next
+        try:
+            self._take_turn()
+        finally:
+            if self._messages and not self._is_awaiting:
+                self._ask_for_extra()
 
 
 class OverlappingMailbox(Mailbox):
@@ -172,20 +170,8 @@ class OverlappingMailbox(Mailbox):
 
     _overlaps = True
 
-    def _take_turn(self) -> None:
-        try:
-            message = self._messages.popleft()
-        except IndexError:  # cleared meanwhile
-            self._go_on()
-            return
-        self._go_on()
-        if not self._gate.incoming:
-            self._keeper.hold(message)
-            return
-        self._statistics.received += 1
-        rest = self._call(message)
-        if rest is not None:
-            self._core.spawn(rest)
+    def _wait_for(self, rest: Coroutine[Any, Any, None]) -> None:
+        self._core.spawn(rest)
 
 
 class _Nobody:

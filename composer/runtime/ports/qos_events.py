@@ -45,7 +45,7 @@ class QosEvents:
     They are the same ones as rclpy itself makes. Deadlines and the own liveliness are counted as
     they are announced (:mod:`composer.runtime.announced_events`); nobody listens for lost messages
     and for the liveliness of others, which only a status could tell from their return. That a
-    publisher has matched is for delivery to know (:class:`~composer.runtime.marks.MatchMark`): rmw
+    publisher has matched is for delivery to know (:class:`~composer.runtime.marks.MatchEvent`): rmw
     tells one callback of each kind of event.
 
     What goes on with a port of a node that is not active is nobody's concern: it is to be silent.

@@ -58,6 +58,7 @@ class TimerPort(Callback):
         self._reaction = reaction
         self._handler = handler
         self._traced = core.statistics.callback("timer", name)
+        self._lateness = self._traced.lateness if core.statistics.tracing else None
         times = CallbackTimer(core, self._traced, timer.budget_ms)
         handle: Callable[[], Any] = partial(times.watched(self._react), NOTHING)
         if handler and not (reaction or core.mutations):
@@ -101,8 +102,8 @@ class TimerPort(Callback):
     def _tick(self) -> None:
         if not self._core.gate.incoming:
             return
-        if self._scheduled is not None and self._core.statistics.tracing:
-            self._traced.lateness.take(self._scheduled.late_s)
+        if self._lateness is not None and self._scheduled is not None:
+            self._lateness.take(self._scheduled.late_s)
         if self._line.put(NOTHING) is not None:
             self._core.statistics.skipped += 1
             self._traced.dropped += 1

@@ -1,0 +1,84 @@
+"""Waiting for eventfds and for a time."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator
+from math import inf
+from time import monotonic
+
+import pytest
+
+from composer.runtime import poller as module
+from composer.runtime.poller import Poller
+
+_LONG_S = 30.0
+
+
+@pytest.fixture(params=["exact", "milliseconds"])
+def poller(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Poller:
+    if request.param == "milliseconds":  # as where Linux is older than 5.11
+        monkeypatch.setattr(module, "_COUNTS_IN_NANOSECONDS", False)
+    elif not module._COUNTS_IN_NANOSECONDS:
+        pytest.skip("this Linux has no epoll_pwait2")
+    return Poller()
+
+
+@pytest.fixture
+def written() -> Iterator[int]:
+    fd = os.eventfd(1)
+    yield fd
+    os.close(fd)
+
+
+@pytest.mark.parametrize("wait_s", [0.0003, 0.02, 1.01])
+def test_waits_until_the_time_has_come(poller: Poller, wait_s: float) -> None:
+    until_s = monotonic() + wait_s
+    assert not poller.wait(until_s)
+    assert monotonic() >= until_s
+
+
+def test_a_time_may_be_far_off(poller: Poller) -> None:
+    poller.wake()
+    poller.wait(1e300)  # returns
+
+
+def test_a_time_that_is_over_is_not_waited_for(poller: Poller, written: int) -> None:
+    poller.watch(written)
+    assert [fd for fd, _ in poller.wait(monotonic() - 1.0)] == [written]
+
+
+@pytest.mark.parametrize("until_s", [0.0, _LONG_S, inf])
+def test_tells_of_what_was_written_until_it_is_read(
+    poller: Poller, written: int, until_s: float
+) -> None:
+    poller.watch(written)
+    for _ in range(2):
+        assert [fd for fd, _ in poller.wait(monotonic() + until_s)] == [written]
+    os.eventfd_read(written)
+    assert not poller.ready()
+
+
+def test_tells_no_more_of_what_is_forgotten(poller: Poller, written: int) -> None:
+    poller.watch(written)
+    poller.forget(written)
+    assert not poller.ready()
+
+
+@pytest.mark.parametrize("until_s", [_LONG_S, inf])
+def test_another_thread_ends_the_wait(poller: Poller, until_s: float) -> None:
+    began_s = monotonic()
+    waker = threading.Timer(0.02, poller.wake)
+    waker.start()
+    poller.wait(began_s + until_s)
+    assert monotonic() - began_s < _LONG_S / 2
+    waker.join()
+
+
+@pytest.mark.parametrize("until_s", [_LONG_S, inf])
+def test_who_is_woken_before_does_not_wait(poller: Poller, until_s: float) -> None:
+    began_s = monotonic()
+    poller.wake()
+    poller.wait(began_s + until_s)
+    assert monotonic() - began_s < _LONG_S / 2
