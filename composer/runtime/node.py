@@ -179,7 +179,7 @@ class RunningNode:
 
     def sent(self, publisher: str) -> int:
         """Return how many messages went through a publisher."""
-        return self.statistics.publisher(publisher).sent
+        return self.statistics.publisher(publisher).count
 
     @property
     def cores(self) -> tuple[Core, Core]:

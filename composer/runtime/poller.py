@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ctypes
 import errno
-import math
 import os
 import select
 from collections.abc import Callable, Sequence
@@ -24,14 +23,9 @@ _PR_SET_TIMERSLACK = 29  # of <sys/prctl.h>
 _NANOSECONDS = 1e9
 _AT_ONCE = 64  # what one call reports; the rest comes with the next
 _EVENT_BYTES = 16  # of one epoll_event, at most
+_TIME_BYTES = 16  # of a timespec: seconds, nanoseconds
 _NOBODY = -1
-_LONGEST_S = 1e6  # a time of C has an end
-
-
-class _TimeSpecification(ctypes.Structure):
-    """``struct timespec``."""
-
-    _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
+_NEVER_S = 1e9  # the machine will not run for so long, and a time of C has an end
 
 
 def _counts_in_nanoseconds() -> bool:
@@ -39,7 +33,7 @@ def _counts_in_nanoseconds() -> bool:
     libc = ctypes.CDLL(None, use_errno=True)
     if not hasattr(libc, "epoll_pwait2"):
         return False
-    libc.epoll_pwait2(_NOBODY, None, 1, ctypes.byref(_TimeSpecification()), None)
+    libc.epoll_pwait2(_NOBODY, None, 1, None, None)
     return ctypes.get_errno() != errno.ENOSYS
 
 
@@ -65,11 +59,11 @@ class Poller:
         #: Returns what was written since the last time, without waiting.
         #: Not a method: this is called for each message.
         self.ready: Callable[[], Announced] = partial(self._epoll.poll, 0, _AT_ONCE)
-        self._left = _TimeSpecification()
+        self._left = memoryview(bytearray(_TIME_BYTES)).cast("l")
         self._event = ctypes.create_string_buffer(_EVENT_BYTES)
         self._sleep: Callable[[], int] | None = None
         if _COUNTS_IN_NANOSECONDS:
-            left = ctypes.byref(self._left)
+            left = (ctypes.c_char * _TIME_BYTES).from_buffer(self._left)
             epoll_fd = self._epoll.fileno()
             self._sleep = partial(_LIBC.epoll_pwait2, epoll_fd, self._event, 1, left, None)
         self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
@@ -93,17 +87,15 @@ class Poller:
 
         It may wait for less than that. Where Linux is older than 5.11, up to a millisecond longer.
         """
-        if until_s == math.inf:
+        if until_s > _NEVER_S:
             return self._epoll.poll(None, _AT_ONCE)
         left_s = until_s - monotonic()
         if left_s <= 0.0:
             return self.ready()
         if self._sleep is None:
             return self._epoll.poll(left_s, _AT_ONCE)
-        left_s = min(left_s, _LONGEST_S)
-        left = self._left
-        left.seconds = seconds = int(left_s)
-        left.nanoseconds = int((left_s - seconds) * _NANOSECONDS)
+        self._left[0] = seconds = int(left_s)
+        self._left[1] = int((left_s - seconds) * _NANOSECONDS)
         if self._sleep() == 0:
             return ()
         return self.ready()

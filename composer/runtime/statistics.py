@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from composer.runtime.durations import Durations
 
@@ -29,11 +30,34 @@ class CallbackStatistics:
         return f"{self.kind} '{self.name}'"
 
 
-@dataclass(slots=True)
-class PublisherStatistics:
-    """How many messages went through a publisher."""
+class Counting(Protocol):
+    """Counts the messages that pass through it: in itself, where that costs least."""
 
-    sent: int = 0
+    count: int
+
+
+class Tally:
+    """How many messages have passed through a port, which is another each time it is configured."""
+
+    __slots__ = ("_before", "_now")
+
+    def __init__(self) -> None:
+        self._before = 0
+        self._now: Counting | None = None
+
+    @property
+    def count(self) -> int:
+        """All of them."""
+        return self._before + (0 if self._now is None else self._now.count)
+
+    def begin(self, counting: Counting) -> None:
+        """Add what ``counting`` counts, from now on."""
+        self._now = counting
+
+    def end(self) -> None:
+        """Keep what was counted, and nothing of who did."""
+        self._before = self.count
+        self._now = None
 
 
 @dataclass(slots=True)
@@ -60,18 +84,22 @@ class Statistics:
     """
 
     tracing: bool = True
-    received: int = 0
     calls: int = 0
     dropped: int = 0
     skipped: int = 0
     errors: int = 0
     qos_events: Counter[str] = field(default_factory=Counter)
     callbacks: dict[tuple[str, str], CallbackStatistics] = field(default_factory=dict)
-    publishers: dict[str, PublisherStatistics] = field(default_factory=dict)
+    publishers: dict[str, Tally] = field(default_factory=dict)
+    subscriptions: dict[str, Tally] = field(default_factory=dict)
 
-    def publisher(self, name: str) -> PublisherStatistics:
-        """Return where the messages of a publisher are counted, from now on or as before."""
-        return self.publishers.setdefault(name, PublisherStatistics())
+    def publisher(self, name: str) -> Tally:
+        """Return the tally of a publisher, from now on or as before."""
+        return self.publishers.setdefault(name, Tally())
+
+    def subscription(self, name: str) -> Tally:
+        """Return the tally of a subscription, from now on or as before."""
+        return self.subscriptions.setdefault(name, Tally())
 
     def callback(self, kind: str, name: str) -> CallbackStatistics:
         """Return where the callbacks of a port or timer are counted, from now on or as before."""
@@ -80,7 +108,12 @@ class Statistics:
     @property
     def sent(self) -> int:
         """How many messages went through all publishers."""
-        return sum(publisher.sent for publisher in tuple(self.publishers.values()))
+        return sum(publisher.count for publisher in tuple(self.publishers.values()))
+
+    @property
+    def received(self) -> int:
+        """How many messages came to all subscriptions while the node was active."""
+        return sum(subscription.count for subscription in tuple(self.subscriptions.values()))
 
     @property
     def busy_s(self) -> float:

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 from composer.runtime.budget import Budget
 from composer.runtime.core import Core
 from composer.runtime.durations import TOGETHER
+from composer.runtime.mutation import MutationCheck
 from composer.runtime.statistics import CallbackStatistics
 from composer.runtime.strand import Work, in_steps
 from composer.source import Located
@@ -89,7 +90,7 @@ class CallbackTimer:
 
     def around(self, work: Work[T]) -> Work[T]:
         """Return ``work``, timed."""
-        work = self.watched(work)
+        work = watched(self._mutations, self._statistics, work)
 
         def timed(item: T) -> Coroutine[Any, Any, None] | None:
             if self.pause > 0:  # two threads may both count down the last
@@ -98,12 +99,6 @@ class CallbackTimer:
             return self.call(work, item)
 
         return timed
-
-    def watched(self, work: Work[T]) -> Work[T]:
-        """Return ``work``, after which messages are looked at where that is asked for."""
-        if self._mutations is None:
-            return work
-        return self._mutations.around(str(self._statistics), work)
 
     def steps(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
         """Return ``coroutine``, the steps of which are timed and count as one call."""
@@ -133,6 +128,13 @@ class CallbackTimer:
         """Time one of so many calls, for all of them."""
         self._pause = how_many - 1.0
         self._times.stand_for(how_many)
+
+
+def watched(
+    mutations: MutationCheck | None, statistics: CallbackStatistics, work: Work[T]
+) -> Work[T]:
+    """Return ``work``, after which messages are looked at where that is asked for."""
+    return work if mutations is None else mutations.around(str(statistics), work)
 
 
 class _Stopwatch:

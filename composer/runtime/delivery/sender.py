@@ -11,7 +11,6 @@ from rclpy.serialization import deserialize_message
 
 from composer.runtime.gate import Gate
 from composer.runtime.marks import MARK, MATCHES
-from composer.runtime.statistics import PublisherStatistics
 
 
 class Target(Protocol):
@@ -30,7 +29,6 @@ class Origin:
     """
 
     gate: Gate
-    counted: PublisherStatistics
     refuse: Callable[[], None]
     watchers: tuple[Target, ...] = ()
 
@@ -44,21 +42,22 @@ class Sender:
     """
 
     __slots__ = (
-        "_counted",
         "_gate",
         "_has_outsiders",
         "_period",
         "_publish",
         "_refuse",
         "_targets",
+        "count",
         "message_type",
     )
 
     def __init__(self, publisher: Publisher, origin: Origin) -> None:
         self._gate = origin.gate
-        self._counted = origin.counted
         self._refuse = origin.refuse
         self._publish: Callable[[Any], None] = publisher.publish
+        #: How many messages were sent.
+        self.count = 0
         #: The message class of the topic.
         self.message_type: Any = publisher.msg_type
         self._targets = origin.watchers
@@ -83,7 +82,7 @@ class Sender:
             self._look_outside()
         if self._has_outsiders:
             self._publish(message)
-        self._counted.sent += 1
+        self.count += 1
 
     def _look_outside(self) -> None:
         """See whether somebody outside listens: once, and when something has matched or left."""

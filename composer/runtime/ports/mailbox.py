@@ -10,8 +10,8 @@ from typing import Any, Protocol
 from composer.model import Port
 from composer.runtime.core import Core
 from composer.runtime.ports.callback import Callback
+from composer.runtime.statistics import CallbackStatistics
 from composer.runtime.strand import Direct
-from composer.runtime.tracing import CallbackTimer
 
 
 class Keeper(Protocol):
@@ -45,8 +45,8 @@ class Mailbox(Callback):
         "_keeper",
         "_loop",
         "_messages",
-        "_statistics",
         "_turn",
+        "count",
     )
     _overlaps = False
 
@@ -55,7 +55,7 @@ class Mailbox(Callback):
         core: Core,
         port: Port,
         handle: Callable[[Any], Any],
-        timer: CallbackTimer,
+        statistics: CallbackStatistics,
         keeper: Keeper,
     ) -> None:
         """Without a depth it keeps everything. What ``handle`` raises is a fault of the handler's.
@@ -63,10 +63,11 @@ class Mailbox(Callback):
         What ``handle`` returns is awaited, where it can be.
         """
         depth = port.qos.profile.queue_depth
-        super().__init__(core, f"on_{port.name.value}", handle, timer)
+        super().__init__(core, f"on_{port.name.value}", handle, statistics, port.budget_ms)
         self._loop = core.loop
         self._gate = core.gate
-        self._statistics = core.statistics
+        #: How many messages were given to the handler.
+        self.count = 0
         self._depth = depth
         self._keeper = keeper
         self._messages: deque[Any] = deque(maxlen=depth)
@@ -132,7 +133,7 @@ class Mailbox(Callback):
         if not self._gate.incoming:
             self._keeper.hold(message)
             return
-        self._statistics.received += 1
+        self.count += 1
         rest = self._call(message)
         if rest is not None:
             self._wait_for(rest)

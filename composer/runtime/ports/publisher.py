@@ -25,6 +25,7 @@ class PublisherPort:
         "_name",
         "_publisher",
         "_qos_events",
+        "_tally",
         "_warned",
         "sender",
     )
@@ -40,10 +41,11 @@ class PublisherPort:
             callback_group=core.group,
             event_callbacks=cast(PublisherEventCallbacks, self._qos_events),
         )
-        counted = core.statistics.publisher(self._name)
-        origin = Origin(core.gate, counted, self._drop, tuple(self._watchers(port)))
+        origin = Origin(core.gate, self._drop, tuple(self._watchers(port)))
         #: What the node publishes with.
         self.sender, self._leave = core.delivery.add_publisher(port, self._publisher, origin)
+        self._tally = core.statistics.publisher(self._name)
+        self._tally.begin(self.sender)
         self._warned = False
 
     def activate(self) -> None:
@@ -57,6 +59,7 @@ class PublisherPort:
         """Leave the topic."""
         self._qos_events.close()
         self._leave()
+        self._tally.end()
         self._core.node.destroy_publisher(self._publisher)
 
     def _watchers(self, port: Port) -> Iterator[Target]:

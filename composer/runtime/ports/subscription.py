@@ -19,7 +19,7 @@ from composer.runtime.ports.port import callback_group
 from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.ports.qos_events import QosEvents
 from composer.runtime.reactions import RunningReaction
-from composer.runtime.tracing import CallbackTimer
+from composer.runtime.tracing import watched
 
 
 class SubscriptionPort:
@@ -43,6 +43,7 @@ class SubscriptionPort:
         "_qos_events",
         "_reaction",
         "_subscription",
+        "_tally",
         "_traced",
     )
 
@@ -61,12 +62,13 @@ class SubscriptionPort:
         depth = port.qos.profile.queue_depth
         self._traced = core.statistics.callback(port.kind.value, self._name)
         self._hops = core.chains.hearing(port)
-        timer = CallbackTimer(core, self._traced, port.budget_ms)
-        handle: Callable[[Any], Any] = timer.watched(self._handle)
+        handle: Callable[[Any], Any] = watched(core.mutations, self._traced, self._handle)
         if handler and not (reaction or core.mutations or self._hops):
             handle = handler  # which is shorter
         kind = OverlappingMailbox if port.reentrant else Mailbox
-        self._mailbox = kind(core, port, handle, timer, self)
+        self._mailbox = kind(core, port, handle, self._traced, self)
+        self._tally = core.statistics.subscription(self._name)
+        self._tally.begin(self._mailbox)
         self._latched: deque[tuple[float, Any]] | None = None  # each with when it came
         lifespan_ms = port.qos.profile.lifespan_ms
         self._lifespan_s = inf if lifespan_ms is None else lifespan_ms / 1000.0
@@ -113,6 +115,7 @@ class SubscriptionPort:
         """Leave the topic."""
         self._qos_events.close()
         self._leave()
+        self._tally.end()
         self._core.loop.remove(self._subscription)
         self._core.node.destroy_subscription(self._subscription)
 

@@ -15,7 +15,7 @@ from composer.runtime.line import line_for
 from composer.runtime.loop import Timer
 from composer.runtime.ports.callback import NOTHING, Callback
 from composer.runtime.reactions import RunningReaction
-from composer.runtime.tracing import CallbackTimer
+from composer.runtime.tracing import watched
 
 
 class PeriodError(Exception):
@@ -59,11 +59,11 @@ class TimerPort(Callback):
         self._handler = handler
         self._traced = core.statistics.callback("timer", name)
         self._lateness = self._traced.lateness if core.statistics.tracing else None
-        times = CallbackTimer(core, self._traced, timer.budget_ms)
-        handle: Callable[[], Any] = partial(times.watched(self._react), NOTHING)
+        react = watched(core.mutations, self._traced, self._react)
+        handle: Callable[[], Any] = partial(react, NOTHING)
         if handler and not (reaction or core.mutations):
             handle = handler  # which is shorter
-        super().__init__(core, f"on_{name}", handle, times)
+        super().__init__(core, f"on_{name}", handle, self._traced, timer.budget_ms)
         self._line = line_for(core, self._call, None, depth=0, reentrant=timer.reentrant)
         self._scheduled: Timer | None = None
 
