@@ -26,7 +26,7 @@ from composer.runtime.timers import ScheduledCall, Timetable
 
 T = TypeVar("T")
 
-_ROUND = 64  # calls, then items of entities, before readiness is looked at again
+_ROUND = range(64)  # calls, then items of entities, before readiness is looked at again
 _PAUSE_AFTER_FAULT_S = 0.01
 #: So long the loop may be busy before it sleeps for a moment, which Linux makes 50 us. Each look at
 #: what is ready lets go of the interpreter's lock and has it back before a thread that waits for it
@@ -208,7 +208,7 @@ class Scheduler:
 
     def _run_calls(self) -> None:
         calls, timers = self._calls, self._timers
-        for _ in range(_ROUND):  # those that calls bring about included
+        for _ in _ROUND:  # those that calls bring about included
             self._running = callback = calls.popleft()
             try:
                 callback()
@@ -237,7 +237,7 @@ class Scheduler:
 
     def _serve_round(self) -> None:
         ready, timers = self._ready, self._timers
-        for _ in range(_ROUND):
+        for _ in _ROUND:
             self._serve(ready.popleft())
             if not ready or monotonic() >= timers.next_s:
                 break
@@ -290,7 +290,7 @@ class Scheduler:
         for task in list(self._tasks):
             task.future.cancel()
         self._stopped = True
-        for _ in range(_ROUND):
+        for _ in _ROUND:
             for _ in range(len(self._calls)):
                 self._call(self._calls.popleft())
         for task in list(self._tasks):

@@ -221,6 +221,25 @@ def test_a_flood_leaves_what_the_depth_allows_and_the_rest_is_counted(tmp_path: 
         assert near.statistics.dropped == 900
 
 
+@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+def test_a_flood_fills_no_loop_and_delays_nothing_that_comes_after(
+    tmp_path: Path, kind: str
+) -> None:
+    with running(NUMBERS.replace("KIND", kind), tmp_path, counting=MODULE) as system:
+        far, release = system.host._crew.nodes["far"], threading.Event()
+        for _ in range(8):  # as many as it can have threads
+            far.loop.call_soon(release.wait)
+        for _ in range(20):
+            send(system, 500)  # from the thread of another loop
+        assert len(far.loop._calls) < 120  # its depth, and little else
+        release.set()
+        wait_until(lambda: len(far._behavior.heard) + far.statistics.dropped == 10_000)
+        assert numbers(far._behavior.heard)[-100:] == list(range(9_900, 10_000))
+        for number in range(10_000, 10_003):
+            send(system, 1)
+            wait_until(lambda n=number: numbers(far._behavior.heard)[-1] == n)
+
+
 LATCHED = """
 system: latched
 nodes:

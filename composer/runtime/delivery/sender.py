@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -18,6 +18,25 @@ class Target(Protocol):
 
     def put(self, message: Any) -> None:
         """Take in the message, from any thread."""
+
+
+class Several:
+    """Puts messages to each of some targets, or to none."""
+
+    __slots__ = ("_targets",)
+
+    def __init__(self, targets: Sequence[Target]) -> None:
+        self._targets = targets
+
+    def put(self, message: Any) -> None:
+        """Put it to each of them."""
+        for target in self._targets:
+            target.put(message)
+
+
+def as_one(targets: Sequence[Target]) -> Target:
+    """Return what puts messages to all of ``targets``: where there is one, as most often, that."""
+    return targets[0] if len(targets) == 1 else Several(targets)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +66,7 @@ class Sender:
         "_period",
         "_publish",
         "_refuse",
-        "_targets",
+        "_target",
         "count",
         "message_type",
     )
@@ -60,7 +79,7 @@ class Sender:
         self.count = 0
         #: The message class of the topic.
         self.message_type: Any = publisher.msg_type
-        self._targets = origin.watchers
+        self._target = as_one(origin.watchers)
         self._has_outsiders = True  # whether there are is for DDS to know
         self._period: object = None  # in which it was last looked who is there
 
@@ -74,8 +93,7 @@ class Sender:
             return
         if type(message) is not self.message_type:
             message = self._converted(message)
-        for target in self._targets:
-            target.put(message)
+        self._target.put(message)
         if not MARK[0]:
             MATCHES.begin_period()
         if self._period is not MATCHES.period:

@@ -12,7 +12,7 @@ from rclpy.publisher import Publisher
 from composer.model import Isolation, Port
 from composer.qos import Durability, incompatibilities
 from composer.runtime.delivery.copying import copy_of
-from composer.runtime.delivery.sender import Origin, Sender, Target
+from composer.runtime.delivery.sender import Origin, Sender, Target, as_one
 from composer.runtime.marks import MATCHES, MatchEvent
 
 
@@ -110,10 +110,10 @@ class Outlet(Sender):
 
     def _reach(self, inlets: tuple[Inlet, ...]) -> None:
         self._inlets = inlets
-        self._targets = (*self._watchers, *map(self._target, inlets))
+        self._target = as_one((*self._watchers, *map(self._target_of, inlets)))
         self._look_outside()
 
-    def _target(self, inlet: Inlet) -> Target:
+    def _target_of(self, inlet: Inlet) -> Target:
         return Copies(inlet.receiver) if self._isolated or inlet.isolated else inlet.receiver
 
     def _look_outside(self) -> None:
@@ -131,7 +131,8 @@ class LatchingOutlet(Outlet):
     def __init__(self, publisher: Publisher, origin: Origin, port: Port) -> None:
         super().__init__(publisher, origin, port)
         self._latched = Latched(self.profile.queue_depth, isolated=self._isolated)
-        self._targets = self._watchers = (*origin.watchers, self._latched)
+        self._watchers = (*origin.watchers, self._latched)
+        self._target = as_one(self._watchers)
         self._has_outsiders = True  # somebody who is not here yet may want what is sent
         self._lock = threading.Lock()  # who joins gets each message once
 
@@ -150,7 +151,7 @@ class LatchingOutlet(Outlet):
         with self._lock:
             if inlet.profile.durability is Durability.TRANSIENT_LOCAL:
                 for message in self._latched.messages:
-                    self._target(inlet).put(message)
+                    self._target_of(inlet).put(message)
             self._reach((*self._inlets, inlet))
 
     def _look_outside(self) -> None:
