@@ -16,11 +16,11 @@ from composer.runtime.poller import Poller
 _LONG_S = 30.0
 
 
-@pytest.fixture(params=["exact", "milliseconds"])
+@pytest.fixture(params=["with epoll_pwait2", "without"])
 def poller(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Poller:
-    if request.param == "milliseconds":  # as where Linux is older than 5.11
-        monkeypatch.setattr(module, "_COUNTS_IN_NANOSECONDS", False)
-    elif not module._COUNTS_IN_NANOSECONDS:
+    if request.param == "without":  # as where Linux is older than 5.11
+        monkeypatch.setattr(module, "_HAS_PWAIT2", False)
+    elif not module._HAS_PWAIT2:
         pytest.skip("this Linux has no epoll_pwait2")
     return Poller()
 
@@ -35,8 +35,23 @@ def written() -> Iterator[int]:
 @pytest.mark.parametrize("wait_s", [0.0003, 0.02, 1.01])
 def test_waits_until_the_time_has_come(poller: Poller, wait_s: float) -> None:
     until_s = monotonic() + wait_s
-    assert not poller.wait(until_s)
+    poller.wait(until_s)
     assert monotonic() >= until_s
+
+
+def test_a_wait_that_something_else_has_ended_goes_on_until_the_time_has_come(
+    poller: Poller, written: int
+) -> None:
+    poller.watch(written)
+    for _ in range(2):  # for two times, each waited for more than once
+        until_s = monotonic() + 0.05
+        for _ in range(3):
+            os.eventfd_write(written, 1)
+            assert [fd for fd, _ in poller.wait(until_s)] == [written]
+            os.eventfd_read(written)
+        while monotonic() < until_s:
+            assert written not in [fd for fd, _ in poller.wait(until_s)]
+        assert monotonic() < until_s + _LONG_S
 
 
 def test_a_time_may_be_far_off(poller: Poller) -> None:
