@@ -28,11 +28,11 @@ T = TypeVar("T")
 
 _ROUND = range(64)  # calls, then items of entities, before readiness is looked at again
 _PAUSE_AFTER_FAULT_S = 0.01
-#: So long the loop may be busy before it sleeps for a moment, which Linux makes 50 us. Each look at
-#: what is ready lets go of the interpreter's lock and has it back before a thread that waits for it
-#: is awake, who takes that for a change of hands and asks for none: for seconds he gets no turn.
+#: So long the loop may be busy before it sleeps for a moment. Each look at what is ready lets go of
+#: the interpreter's lock and has it back before a thread that waits for it is awake, who takes that
+#: for a change of hands and asks for none: for seconds he gets no turn.
 BUSY_S = 0.005
-MOMENT_S = 1e-6
+MOMENT_S = 5e-5  # enough to wake up
 
 
 class Scheduler:
