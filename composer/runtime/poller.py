@@ -34,13 +34,16 @@ _NEVER_S = 1e9  # the machine will not run for so long, and a time of C has an e
 
 
 def _has_pwait2() -> bool:
-    """Say whether there is ``epoll_pwait2``, as there is since Linux 5.11."""
+    """Say whether there is ``epoll_pwait2``, as there is since Linux 5.11.
+
+    What keeps a container from system calls that it does not know may forbid it there, too.
+    """
     libc = ctypes.CDLL(None, use_errno=True)
     if not hasattr(libc, "epoll_pwait2"):
         return False
     nobody = -1
     libc.epoll_pwait2(nobody, None, 1, None, None)
-    return ctypes.get_errno() != errno.ENOSYS
+    return ctypes.get_errno() == errno.EBADF
 
 
 _HAS_PWAIT2 = _has_pwait2()
