@@ -66,7 +66,8 @@ class Scheduler:
 
     def call_later(self, delay_s: float, callback: Callable[[], object]) -> ScheduledCall:
         """Call ``callback`` once, ``delay_s`` seconds from now."""
-        return self._schedule(ScheduledCall(monotonic() + delay_s, None, callback))
+        # Never before now: what is due then is called in one go, whatever else there is to do.
+        return self._schedule(ScheduledCall(monotonic() + max(delay_s, 0.0), None, callback))
 
     def call_every(self, period_s: float, callback: Callable[[], object]) -> ScheduledCall:
         """Call ``callback`` each ``period_s`` seconds; a late call does not shift the next.

@@ -63,14 +63,19 @@ def test_timers_do_not_wait_for_whole_milliseconds(on: Bench) -> None:
     assert gaps_s[len(gaps_s) // 2] < 0.0008
 
 
-def test_a_call_posting_itself_starves_nobody(on: Bench) -> None:
+@pytest.mark.parametrize("post", ["call_soon", "call_later in the past", "call_later at once"])
+def test_a_call_posting_itself_starves_nobody(on: Bench, post: str) -> None:
     stop: list[bool] = []
     seen: list[int] = []
     ticks: list[int] = []
 
     def again() -> None:
-        if not stop:
+        if stop:
+            return
+        if post == "call_soon":
             on.loop.call_soon(again)
+        else:
+            on.loop.call_later(-1.0 if "past" in post else 0.0, again)
 
     on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
     on.loop.call_every(0.005, lambda: ticks.append(1))

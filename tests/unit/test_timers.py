@@ -42,7 +42,7 @@ def test_calls_due_at_the_same_time_keep_their_order() -> None:
     assert take_due(timetable) == calls
 
 
-def test_an_empty_heap_is_never_due() -> None:
+def test_an_empty_timetable_is_never_due() -> None:
     timetable = Timetable()
     assert timetable.next_due_s() == timetable.next_s == math.inf
     assert take_due(timetable) == []
