@@ -22,11 +22,12 @@ class Repeated:
         self._untold = 0
         self._timer: Cancellable | None = None
 
-    def take(self) -> None:
-        """Warn that it happened, or count it where that was told just now."""
+    def take(self, number: int) -> None:
+        """Warn that it happened so many times, or count it where that was told just now."""
+        self._untold += number
         if self._timer is not None:
-            self._untold += 1
             return
+        self._untold -= 1
         self._log.warn(self._text())
         self._timer = self._clock.call_later(AGAIN_AFTER_S, self._sum_up)
 

@@ -17,9 +17,9 @@ PATIENCE_S = 30.0
 
 
 @contextmanager
-def hand_written(program: str) -> Iterator[subprocess.Popen[str]]:
+def hand_written(program: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
     """Run a file of this folder, nodes as anybody would write them, for the length of the block."""
-    command = [sys.executable, str(Path(__file__).with_name(program))]
+    command = [sys.executable, str(Path(__file__).with_name(program)), *arguments]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None

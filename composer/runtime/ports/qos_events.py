@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import partial
 from typing import Any
@@ -39,12 +40,25 @@ _KINDS = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class _Event:
+    """What can happen, how it is counted and how it is told.
+
+    ``how_many`` says how often it happened by a status; without it, each announcement is once.
+    """
+
+    name: str
+    kind: IntEnum
+    text: str
+    how_many: Callable[[Any], int] | None = None
+
+
 class QosEvents:
     """What rclpy makes the event handlers of one port with: its ``event_callbacks``.
 
     They are the same ones as rclpy itself makes. Deadlines and the own liveliness are counted as
-    they are announced (:mod:`composer.runtime.announced_events`); nobody listens for lost messages
-    and for the liveliness of others, which only a status could tell from their return. That a
+    they are announced (:mod:`composer.runtime.announced_events`); of lost messages and of the
+    liveliness of others the status is taken, which tells how many, and loss from return. That a
     publisher has matched is for delivery to know (:class:`~composer.runtime.marks.MatchEvent`): rmw
     tells one callback of each kind of event.
 
@@ -62,9 +76,10 @@ class QosEvents:
         self, callback_group: CallbackGroup, endpoint: Any, _topic_name: str
     ) -> list[EventHandler]:
         """Return handlers of what the middleware has, and begin to count what is announced."""
-        for event, wanted, text in self._announced():
+        is_publisher = self._port.kind is PortKind.PUBLISHER
+        for event in self._of_publisher() if is_publisher else self._of_subscription():
             with suppress(UnsupportedEventTypeError):
-                self._watch(endpoint, event, wanted, text)
+                self._watch(endpoint, event)
         handlers = []
         for kind in _KINDS[self._port.kind]:
             with suppress(UnsupportedEventTypeError):
@@ -86,34 +101,65 @@ class QosEvents:
         for repeated in self._repeated.values():
             repeated.close()
 
-    def _announced(self) -> Iterator[tuple[str, IntEnum, str]]:
-        """Yield what can happen: its name, its kind, and how it is told."""
+    def _of_publisher(self) -> Iterator[_Event]:
         profile = self._port.qos.profile
-        is_publisher = self._port.kind is PortKind.PUBLISHER
         if profile.deadline_ms is not None:
-            what, kind = "nothing came", _SUBSCRIPTION.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED
-            if is_publisher:
-                what = "nothing was published"
-                kind = _PUBLISHER.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED
-            text = f"{what} within its deadline of {profile.deadline_ms:g} ms"
-            yield "deadline_missed", kind, text
+            yield _Event(
+                "deadline_missed",
+                _PUBLISHER.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED,
+                f"nothing was published within its deadline of {profile.deadline_ms:g} ms",
+            )
         lease_ms = profile.liveliness_lease_duration_ms
-        if is_publisher and lease_ms is not None:
-            text = f"it gave no sign of life within its lease of {lease_ms:g} ms"
-            yield "liveliness_lost", _PUBLISHER.RCL_PUBLISHER_LIVELINESS_LOST, text
+        if lease_ms is not None:
+            yield _Event(
+                "liveliness_lost",
+                _PUBLISHER.RCL_PUBLISHER_LIVELINESS_LOST,
+                f"it gave no sign of life within its lease of {lease_ms:g} ms",
+            )
 
-    def _watch(self, endpoint: Any, event: str, kind: IntEnum, text: str) -> None:
-        core, name = self._core, f"{self._port.kind} '{self._port.name}' on {self._port.full_name}"
-        take = partial(self._take, event)
-        self._ends.append(core.events.watch(endpoint, kind, lambda: core.loop.call_soon(take)))
-        self._repeated[event] = Repeated(
-            core.log, core.loop, lambda: f"{name}: {text}{self._publishers()}"
+    def _of_subscription(self) -> Iterator[_Event]:
+        profile = self._port.qos.profile
+        if profile.deadline_ms is not None:
+            yield _Event(
+                "deadline_missed",
+                _SUBSCRIPTION.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED,
+                f"nothing came within its deadline of {profile.deadline_ms:g} ms",
+            )
+        lease_ms = profile.liveliness_lease_duration_ms
+        if lease_ms is not None:
+            yield _Event(
+                "liveliness_changed",
+                _SUBSCRIPTION.RCL_SUBSCRIPTION_LIVELINESS_CHANGED,
+                f"a publisher gave no sign of life within the lease of {lease_ms:g} ms",
+                lambda status: status.not_alive_count_change,  # less than none: one has come back
+            )
+        yield _Event(
+            "message_lost",
+            _SUBSCRIPTION.RCL_SUBSCRIPTION_MESSAGE_LOST,
+            "a message was lost on its way",
+            lambda status: status.total_count_change,
         )
 
-    def _take(self, event: str) -> None:
-        if self._core.gate.incoming:
-            self._core.statistics.qos_events[event] += 1
-            self._repeated[event].take()
+    def _watch(self, endpoint: Any, event: _Event) -> None:
+        core, name = self._core, f"{self._port.kind} '{self._port.name}' on {self._port.full_name}"
+
+        def happened(number: int) -> None:
+            core.loop.call_soon(partial(self._take, event.name, number))
+
+        how_many = event.how_many
+        if how_many is None:
+            end = core.events.watch(endpoint, event.kind, lambda: happened(1))
+        else:
+            end = core.events.watch_status(endpoint, event.kind, lambda it: happened(how_many(it)))
+        self._ends.append(end)
+        self._repeated[event.name] = Repeated(
+            core.log, core.loop, lambda: f"{name}: {event.text}{self._publishers()}"
+        )
+
+    def _take(self, event: str, number: int) -> None:
+        if number > 0 and self._core.gate.incoming:
+            self._core.statistics.qos_events[event] += number
+            self._repeated[event].take(number)
 
     def _publishers(self) -> str:
         """Return whose messages a subscription waits for, to be added to a sentence."""
