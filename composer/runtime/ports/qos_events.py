@@ -96,8 +96,8 @@ class QosEvents:
     def close(self) -> None:
         """Tell nothing more. To be called before the endpoint is destroyed."""
         self._misfits.close()
-        for end in self._ends:
-            end()
+        while self._ends:  # each holds a file descriptor
+            self._ends.pop()()
         for repeated in self._repeated.values():
             repeated.close()
 
