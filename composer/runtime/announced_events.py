@@ -59,9 +59,10 @@ class _Event:
 
     passes_over = True
 
-    def __init__(self, endpoint: Any, kind: IntEnum) -> None:
+    def __init__(self, endpoint: Any, kind: IntEnum, happened: Callable[..., None]) -> None:
         with endpoint:
             self._event = rclpy_implementation.EventHandle(endpoint, kind)
+        self._happened = happened
         self.name = kind.name
 
     def attach(self, signal: Signal) -> None:
@@ -78,8 +79,7 @@ class _Announced(_Event):
     """A source of the loop: what is announced has happened."""
 
     def __init__(self, endpoint: Any, kind: IntEnum, happened: Callable[[], None]) -> None:
-        super().__init__(endpoint, kind)
-        self._happened = happened
+        super().__init__(endpoint, kind, happened)
         self._is_first = True
 
     def take(self) -> bool | None:
@@ -102,8 +102,7 @@ class _Status(_Event):
     """
 
     def __init__(self, endpoint: Any, kind: IntEnum, happened: Callable[[Any], None]) -> None:
-        super().__init__(endpoint, kind)
-        self._happened = happened
+        super().__init__(endpoint, kind, happened)
         self._passed_over: float = inf  # so many announcements to come; until it has begun, all
 
     def begin(self, slot: Slot) -> None:

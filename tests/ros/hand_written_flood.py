@@ -2,7 +2,8 @@
 
 Node /flood publishes numbered images on /big (best effort): a hundred large ones in one go, then
 small ones for a moment, and again. On /alive it gives a sign of life each 20 ms of that moment; its
-lease is 500 ms. Other figures may be given. Prints ``ready`` at the start.
+lease is 500 ms. Arguments: another lease in milliseconds, and how many large ones. Prints ``ready``
+at the start.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ def main() -> None:
     alive = node.create_publisher(String, "alive", qos)
     print("ready", flush=True)
     while not alive.get_subscription_count():
-        time.sleep(0.01)
+        time.sleep(0.01)  # rclpy tells nobody who waits for a match
     number = 0
     while True:
         for data in [_LARGE] * large + [_SMALL] * 20:
@@ -40,7 +41,7 @@ def main() -> None:
             big.publish(Image(width=number, data=data))
             if data is _SMALL:
                 alive.publish(String())
-                time.sleep(0.02)
+                time.sleep(0.02)  # what is lost of the flood shows when something arrives after it
 
 
 if __name__ == "__main__":
