@@ -26,7 +26,9 @@ from composer.runtime.timers import ScheduledCall, Timetable
 
 T = TypeVar("T")
 
-_ROUND = range(64)  # calls, then items of entities, before readiness is looked at again
+#: So long calls, then items of entities, go on before readiness is looked at again.
+_ROUND_S = 5e-4
+_LAST_ROUNDS = 64  # of calls that others bring about at the very end
 _PAUSE_AFTER_FAULT_S = 0.01
 #: So long the loop may be busy before it sleeps for a moment. Each look at what is ready lets go of
 #: the interpreter's lock and has it back before a thread that waits for it is awake, who takes that
@@ -201,21 +203,21 @@ class Scheduler:
             call = timers.take()
             try:
                 if not call.cancelled:
-                    self._call(call.callback)
-                    if self._calls:  # what it has brought about need not wait until it is put back
-                        self._run_calls()
+                    self._calls.appendleft(call.callback)
+                    self._run_calls()  # what it brings about need not wait until it is put back
             finally:
                 timers.repeat(call)
 
     def _run_calls(self) -> None:
         calls, timers = self._calls, self._timers
-        for _ in _ROUND:  # those that calls bring about included
+        until_s = monotonic() + _ROUND_S
+        while True:  # those that calls bring about included
             self._running = callback = calls.popleft()
             try:
                 callback()
             except BaseException as error:
                 self._report(name_of(callback), error)
-            if not calls or monotonic() >= timers.next_s:
+            if not calls or (now_s := monotonic()) >= timers.next_s or now_s >= until_s:
                 break
         self._running = None
 
@@ -238,9 +240,10 @@ class Scheduler:
 
     def _serve_round(self) -> None:
         ready, timers = self._ready, self._timers
-        for _ in _ROUND:
+        until_s = monotonic() + _ROUND_S
+        while True:
             self._serve(ready.popleft())
-            if not ready or monotonic() >= timers.next_s:
+            if not ready or (now_s := monotonic()) >= timers.next_s or now_s >= until_s:
                 break
 
     def _serve(self, slot: Slot) -> None:
@@ -291,7 +294,7 @@ class Scheduler:
         for task in list(self._tasks):
             task.future.cancel()
         self._stopped = True
-        for _ in _ROUND:
+        for _ in range(_LAST_ROUNDS):
             for _ in range(len(self._calls)):
                 self._call(self._calls.popleft())
         for task in list(self._tasks):
