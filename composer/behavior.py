@@ -186,6 +186,19 @@ class Behavior:
     In a test without ROS, set the attributes a handler uses to whatever stands in for them.
     """
 
+    # Slots are in the object, where a message finds them at once. Whatever else may be set as well.
+    __slots__ = (
+        "__dict__",
+        "__weakref__",
+        "action_clients",
+        "clients",
+        "clock",
+        "log",
+        "name",
+        "parameters",
+        "publishers",
+    )
+
     name: str
     parameters: Any  # self.parameters.max_velocity: the value now
     publishers: Any  # self.publishers.motor_commands: a Publisher

@@ -8,6 +8,7 @@ import importlib.util
 import sys
 import threading
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -92,32 +93,41 @@ def _imported(name: str, path: Path) -> ModuleType:
 class Named:
     """``self.publishers``, ``self.clients``: things of one kind, by name."""
 
+    __slots__ = ("__entries", "__kind")
+
     def __init__(self, kind: str, entries: Mapping[str, Any]) -> None:
-        self._kind = kind
-        self._entries = entries
+        self.__kind = kind
+        self.__entries = entries
 
     @may_be_interrupted
     def __getattr__(self, name: str) -> Any:
         try:
-            return self._entries[name]
+            return self.__entries[name]
         except KeyError:
-            known = ", ".join(sorted(self._entries)) or "none"
-            raise AttributeError(f"no {self._kind} '{name}'; there is: {known}") from None
+            known = ", ".join(sorted(self.__entries)) or "none"
+            raise AttributeError(f"no {self.__kind} '{name}'; there is: {known}") from None
 
     def __getitem__(self, name: str) -> Any:
-        return self._entries[name]
+        return self.__entries[name]
 
     def __dir__(self) -> list[str]:
-        return sorted(self._entries)
+        return sorted(self.__entries)
 
 
-class NamedPorts(Named):
-    """Ports by name: there are never others, so that each is a plain attribute, found at once."""
+def named_ports(kind: str, entries: Mapping[str, Any]) -> Named:
+    """Return ports by name: there are never others, so that most are attributes, found at once."""
+    # A slot with a leading underscore might be of another name, or one of ours.
+    plain = tuple(name for name in entries if not name.startswith("_"))
+    ports = _ports_type(plain)(kind, entries)
+    for name in plain:
+        setattr(ports, name, entries[name])
+    return ports
 
-    def __init__(self, kind: str, entries: Mapping[str, Any]) -> None:
-        super().__init__(kind, entries)
-        for name, entry in entries.items():
-            setattr(self, name, entry)  # not by vars(): a dict of its own is further away
+
+@cache
+def _ports_type(names: tuple[str, ...]) -> type[Named]:
+    """Return the type of ports with these names: slots are in the object, a dict is far away."""
+    return type("Ports", (Named,), {"__slots__": names})
 
 
 class NodeClock:

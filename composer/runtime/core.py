@@ -35,7 +35,8 @@ class Core:
     ``delivery`` is where its ports meet those of other nodes of the process, ``chains`` what they
     have to do with the chains of the system, ``events`` tells of QoS events. ``mutations`` is there
     when changes of messages are looked for. ``names`` is what every expression of the node may
-    use: ``parameters``, ``state``, ``node``. ``group`` is the callback group of its ports.
+    use: ``parameters``, ``state``, ``node``. ``group`` is the callback group of its ports. ``used``
+    is what most of its callbacks use: the behaviour, and what that publishes with.
     """
 
     node: Node
@@ -53,6 +54,7 @@ class Core:
     mutations: MutationCheck | None = None
     tasks: set[Future[Any]] = field(default_factory=set)
     group: CallbackGroup = field(default_factory=MutuallyExclusiveCallbackGroup)
+    used: tuple[object, ...] = ()
 
     def now_s(self) -> float:
         """Return the node's time in seconds."""

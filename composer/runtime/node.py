@@ -19,7 +19,7 @@ from composer.behavior import TransitionFailed
 from composer.model import BehaviorReference, Event, LogLevel, Node
 from composer.runtime.announced_events import AnnouncedEvents
 from composer.runtime.assembly import Assembly
-from composer.runtime.behaviors import Named, NamedPorts, NodeClock, behavior_class, method
+from composer.runtime.behaviors import Named, NodeClock, behavior_class, method, named_ports
 from composer.runtime.chains import Chains
 from composer.runtime.clock import Clock
 from composer.runtime.core import Core
@@ -286,9 +286,13 @@ class RunningNode:
         behavior.log = self._core.log
         behavior.clock = NodeClock(self._core, self._standby)
         behavior.parameters = Named("parameter", self._core.names["parameters"])
-        behavior.publishers = NamedPorts("publisher", assembly.senders)
-        behavior.clients = NamedPorts("client", assembly.clients)
-        behavior.action_clients = NamedPorts("action client", assembly.action_clients)
+        behavior.publishers = named_ports("publisher", assembly.senders)
+        behavior.clients = named_ports("client", assembly.clients)
+        behavior.action_clients = named_ports("action client", assembly.action_clients)
+        self._use(behavior, behavior.publishers, *assembly.senders.values())
+
+    def _use(self, *used: object) -> None:
+        self._core.used = self._standby.used = used
 
     async def _leave(self, core: Core, ports: Iterable[RunningPort]) -> None:
         """Take nothing more in, end what is under way. Publishers stay open for a last word."""
@@ -333,6 +337,7 @@ class RunningNode:
                 self._core.log.error(f"cannot destroy {type(port).__name__}: {describe(error)}")
         self._assembly = Assembly(self._core, self._standby)
         self._behavior = None
+        self._use()
 
     # --- parameters
 

@@ -122,6 +122,36 @@ def test_a_node_has_a_first_and_a_last_word_but_none_when_it_is_not_active(
     ]
 
 
+PORTS = """
+system: ports
+nodes:
+  talker:
+    behavior: talker:Talker
+    publishers:
+      plain: {type: std_msgs/msg/Int64, topic: /a}
+      _hidden: {type: std_msgs/msg/Int64, topic: /b}
+      __entries: {type: std_msgs/msg/Int64, topic: /c}
+      class: {type: std_msgs/msg/Int64, topic: /d}
+"""
+PORTS_MODULE = """
+class Talker(dict):  # any class will do
+    def on_activate(self):
+        for name in dir(self.publishers):
+            assert getattr(self.publishers, name) is self.publishers[name]
+            self.log.info(name)
+        try:
+            self.publishers.plan
+        except AttributeError as error:
+            self.log.info(str(error))
+"""
+
+
+def test_ports_are_attributes_of_what_a_behavior_has(tmp_path: Path) -> None:
+    with running(PORTS, tmp_path, talker=PORTS_MODULE) as system:
+        names = ["__entries", "_hidden", "class", "plain"]
+        assert system.log() == [*names, f"no publisher 'plan'; there is: {', '.join(names)}"]
+
+
 FAULTY = """
 system: faulty
 executors: {shared: {kind: KIND}}

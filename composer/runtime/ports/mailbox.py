@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Coroutine
 from functools import partial
+from math import inf
 from typing import Any, Protocol
 
 from composer.model import Port
 from composer.runtime.core import Core
 from composer.runtime.ports.callback import Callback
+from composer.runtime.ports.queue import Queue, queue_of
 from composer.runtime.statistics import CallbackStatistics
 from composer.runtime.strand import Direct
+
+#: The queue and the turn of a mailbox, and objects that are used when a message is handled.
+Needed = tuple[Queue, Callable[[], object], object, object, object, object, object, object, object]
 
 
 class Keeper(Protocol):
@@ -45,6 +49,7 @@ class Mailbox(Callback):
         "_keeper",
         "_loop",
         "_messages",
+        "_needed",
         "_turn",
         "count",
     )
@@ -68,25 +73,28 @@ class Mailbox(Callback):
         self._gate = core.gate
         #: How many messages were given to the handler.
         self.count = 0
-        self._depth = depth
+        self._depth = inf if depth is None else depth
         self._keeper = keeper
-        self._messages: deque[Any] = deque(maxlen=depth)
+        self._messages = queue_of(self._depth)
         # Popping is atomic: there is one extra turn at a time, whichever thread wants it.
         self._has_no_extra = [True]
         self._is_awaiting = False
         self._turn = self._one_at_a_time(self._take_turn)
         self._extra_turn = self._one_at_a_time(self._take_extra_turn)
+        self._needed = self._what_is_needed()
 
     def put(self, message: Any) -> None:
         """Have the message worked on soon, from any thread."""
-        messages = self._messages
-        if len(messages) == self._depth:
-            self._keeper.count_drop()
+        # Most of these are used later only. What was not used for some milliseconds has to be
+        # fetched from far away; when it is asked for all at once, the fetching overlaps.
+        messages, turn, _, _, _, _, _, _, _ = self._needed
+        if len(messages) >= self._depth:
+            self._make_room()
             messages.append(message)
             self._ask_for_extra()
         else:
             messages.append(message)
-            self._loop.call_soon(self._turn)
+            self._loop.call_soon(turn)
 
     def receive(self, message: Any) -> None:
         """Have the message worked on, at once where nothing waits. To be called on the loop."""
@@ -100,6 +108,7 @@ class Mailbox(Callback):
 
     def begin_anew(self) -> None:
         """Let go of what has come since the gate was shut, and waits for what was begun before."""
+        self._needed = self._what_is_needed()
         if self._is_awaiting:
             self.clear()
 
@@ -107,7 +116,7 @@ class Mailbox(Callback):
         """Let go of everything that waits."""
         while self._messages:
             try:
-                message = self._messages.popleft()
+                message = self._messages.pop(0)
             except IndexError:
                 return  # a turn was faster
             self._keeper.hold(message)
@@ -118,6 +127,19 @@ class Mailbox(Callback):
         self._keeper = _Nobody()
         self._messages.clear()
 
+    def _make_room(self) -> None:
+        while len(self._messages) >= self._depth:
+            try:
+                self._messages.pop(0)
+            except IndexError:
+                return  # a turn was faster, or another thread
+            self._keeper.count_drop()
+
+    def _what_is_needed(self) -> Needed:
+        first, second, third, fourth, *_ = (*self._core.used, None, None, None, None)
+        mine = (self._messages, self._turn, self._gate, self._handle, self._waiting)
+        return (*mine, first, second, third, fourth)
+
     def _one_at_a_time(self, take: Callable[[], object]) -> Callable[[], object]:
         strand = self._core.strand
         # On a loop of one thread it is that anyway.
@@ -127,7 +149,7 @@ class Mailbox(Callback):
         if self._is_awaiting:
             return  # an extra turn comes after it
         try:
-            message = self._messages.popleft()
+            message = self._messages.pop(0)
         except IndexError:
             return  # cleared meanwhile, or pushed out
         if not self._gate.incoming:
