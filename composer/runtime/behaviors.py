@@ -116,8 +116,9 @@ class Named:
 
 def named_ports(kind: str, entries: Mapping[str, Any]) -> Named:
     """Return ports by name: there are never others, so that most are attributes, found at once."""
-    # A slot with a leading underscore might be of another name, or one of ours.
-    plain = tuple(name for name in entries if not name.startswith("_"))
+    # A slot with a leading underscore might be of another name, or one of ours; and a port that has
+    # a topic of its own may be called as it likes, but attributes are identifiers.
+    plain = tuple(name for name in entries if name.isidentifier() and not name.startswith("_"))
     ports = _ports_type(plain)(kind, entries)
     for name in plain:
         setattr(ports, name, entries[name])

@@ -132,6 +132,8 @@ nodes:
       _hidden: {type: std_msgs/msg/Int64, topic: /b}
       __entries: {type: std_msgs/msg/Int64, topic: /c}
       class: {type: std_msgs/msg/Int64, topic: /d}
+      no identifier: {type: std_msgs/msg/Int64, topic: /e}
+      "": {type: std_msgs/msg/Int64, topic: /f}
 """
 PORTS_MODULE = """
 class Talker(dict):  # any class will do
@@ -148,7 +150,7 @@ class Talker(dict):  # any class will do
 
 def test_ports_are_attributes_of_what_a_behavior_has(tmp_path: Path) -> None:
     with running(PORTS, tmp_path, talker=PORTS_MODULE) as system:
-        names = ["__entries", "_hidden", "class", "plain"]
+        names = ["", "__entries", "_hidden", "class", "no identifier", "plain"]
         assert system.log() == [*names, f"no publisher 'plan'; there is: {', '.join(names)}"]
 
 
