@@ -113,6 +113,8 @@ def test_every_outcome_of_a_call_is_the_same_either_way(
         ask(system)
         assert outcomes(system, 3)[-1] == REFUSED
         system.change("server", "cleanup")
+        # By DDS it is known some milliseconds later, and until then it is waited for.
+        wait_until(lambda: not client.clients.ask._has_server(), "the end of the server")
         ask(system, timeout_ms=300.0)
         assert outcomes(system, 4)[-1] == "ServerUnavailable"
 
