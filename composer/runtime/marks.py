@@ -41,7 +41,10 @@ class Matches:
 
     def begin_period(self) -> None:
         """To be called when the mark is zero."""
-        MARK[0] = 1  # first: a change that comes now has to end the period that begins
+        # Before the mark, for other threads: they see it at once, and this one may have to wait for
+        # the interpreter in between. After it, for a change that came before the mark was made.
+        self.period = object()
+        MARK[0] = 1
         self.period = object()
 
 

@@ -120,7 +120,11 @@ class Outlet(Sender):
         with self._looking:
             # Before the look: who matches in between is seen next time.
             self._period = MATCHES.period if self._match_event.is_told else None
-            self._has_outsiders = self._count_matched() > len(self._inlets)
+            inlets = self._inlets
+            has_others = self._count_matched() > len(inlets)
+            # Whoever joins or leaves at this very moment may be counted on one side only; he has it
+            # looked again, and until then nobody outside is to miss anything.
+            self._has_outsiders = has_others or inlets is not self._inlets
 
 
 class LatchingOutlet(Outlet):
