@@ -35,7 +35,7 @@ class Simulator:
             wait_until(lambda time_s=time_s: self._is(node, time_s), f"{time_s} at {node}")
 
     def _is(self, node: str, time_s: float) -> bool:
-        if self._system.host._crew.nodes[node].now_s() == time_s:
+        if self._system.node(node).now_s() == time_s:
             return True
         self._publisher.publish(message_of(time_s))
         return False

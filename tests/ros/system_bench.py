@@ -31,6 +31,7 @@ from composer.plan import bring_up, tear_down
 from composer.resolve import resolve
 from composer.runtime.events import BroughtUp, Event, Logged, NodeSummary, Outcome, StateChanged
 from composer.runtime.host import Host, HostOptions
+from composer.runtime.node import RunningNode
 from composer.runtime.shared_memory import remove_half_made_ports
 
 PATIENCE_S = 20.0
@@ -105,9 +106,17 @@ class RunningSystem:
         changes = [str(event) for event in self.told(StateChanged)]
         return changes if node is None else [text for text in changes if text.startswith(node)]
 
+    def node(self, name: str) -> RunningNode:
+        """Return the node of that name in the system, whatever state it is in."""
+        return self.host._crew.nodes[name]
+
+    def behavior(self, name: str) -> Any:
+        """Return the object of user code that the node has: it lives from configure to cleanup."""
+        return self.node(name)._behavior
+
     def change(self, node: str, *transitions: str) -> None:
         """Let a node go through transitions, one after the other."""
-        running_node = self.host._crew.nodes[node]
+        running_node = self.node(node)
         for transition in transitions:
             # Told when all is done: the state is there before entities are given back.
             made = running_node.loop.run_task(running_node.change(transition))
@@ -117,7 +126,7 @@ class RunningSystem:
 
     def wait_for_listener(self, node: str, publisher: str) -> None:
         """Wait until a publisher knows who listens outside: what it sends before is lost."""
-        port: Any = self.host._crew.nodes[node]._assembly.publishers[publisher]
+        port: Any = self.node(node)._assembly.publishers[publisher]
         wait_until(port._publisher.get_subscription_count, f"a listener to {publisher} of {node}")
 
     def log(self) -> list[str]:

@@ -51,7 +51,7 @@ def test_data_is_followed_from_the_first_publisher_to_the_last(more: str, tmp_pa
         wait_until(lambda: stop.times.count > 10)
         counted = stop.times.count  # first: both grow
         # What is sent again without anything new having been heard does not count.
-        assert counted <= system.host._crew.nodes["lidar"].sent("scan")
+        assert counted <= system.node("lidar").sent("scan")
     assert stop.late == stop.times.count
     assert see.late == 0
     assert see.times.mean_s > 0.003

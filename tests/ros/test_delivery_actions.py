@@ -81,7 +81,7 @@ connections:
 
 def go(system: RunningSystem, max_velocity: float) -> Any:
     """Have the client send a goal and return its behaviour; 0 m/s never arrives."""
-    client = system.host._crew.nodes["client"]
+    client = system.node("client")
     client._behavior.feedback.clear()
     client._behavior.sent = None
     client._core.spawn(client._behavior.go(max_velocity))
@@ -95,7 +95,7 @@ def test_every_outcome_of_a_goal_is_the_same_either_way(
 ) -> None:
     text = TEXT.replace("KIND", kind).replace("DELIVERY", delivery)
     with running(text, tmp_path, going=MODULE) as system:
-        server = system.host._crew.nodes["server"]._behavior
+        server = system.behavior("server")
         client = go(system, 1.0)
         wait_until(lambda: client.outcomes)
         assert client.outcomes[-1] == ("succeeded", "arrived")
@@ -110,7 +110,7 @@ def test_every_outcome_of_a_goal_is_the_same_either_way(
 
         go(system, 0.0)
         wait_until(lambda: client.feedback and client.sent)  # feedback may be the first to come
-        system.host._crew.nodes["client"]._core.spawn(client.turn_back())
+        system.node("client")._core.spawn(client.turn_back())
         wait_until(lambda: len(client.outcomes) == 3)
         assert client.outcomes[-1] == ("canceled", "turned back")
 
@@ -129,7 +129,7 @@ def test_every_outcome_of_a_goal_is_the_same_either_way(
         system.change("client", "deactivate")
         wait_until(lambda: len(client.outcomes) == 6)
         assert client.outcomes[-1] == "CallCancelled"
-        goals = system.host._crew.nodes["server"]._assembly.action_servers["go"]._goals
+        goals = system.node("server")._assembly.action_servers["go"]._goals
         wait_until(lambda: not goals, "the end of the goal nobody waits for")
 
 
@@ -155,7 +155,7 @@ def test_the_ends_hold_the_same_objects_unless_copies_are_asked_for(
 ) -> None:
     text = TEXT.replace("KIND", kind).replace("DELIVERY", "auto") + (COPIED if copied else "")
     with running(text, tmp_path, going=MODULE) as system:
-        server = system.host._crew.nodes["server"]._behavior
+        server = system.behavior("server")
         client = go(system, 1.0)
         wait_until(lambda: client.outcomes)
         assert client.outcomes == [("succeeded", "arrived")]

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 from std_msgs.msg import Int64
 
 from composer.model import LogLevel
 from composer.runtime.host import HostOptions
-from tests.ros.system_bench import RunningSystem, running, wait_until
+from tests.ros.system_bench import running, wait_until
 
 SENT = 30
 #: Offered, requested, and which of the 30 messages sent in one callback are received.
@@ -74,26 +73,22 @@ def text_of(delivery: str, executor: str) -> str:
     )
 
 
-def behavior(system: RunningSystem, node: str) -> Any:
-    return system.host._crew.nodes[node]._behavior
-
-
 @pytest.mark.parametrize("delivery", ["auto", "dds"])
 @pytest.mark.parametrize("executor", ["events", "single_threaded"])
 def test_every_combination_of_qos_delivers_the_same_either_way(
     tmp_path: Path, executor: str, delivery: str
 ) -> None:
     with running(text_of(delivery, executor), tmp_path, table=MODULE) as system:
-        source = system.host._crew.nodes["source"]
+        source = system.node("source")
         source.loop.run(lambda: source._behavior.send(TABLE, SENT))
         for name, (_, _, wanted) in TABLE.items():
-            sink = behavior(system, name)
+            sink = system.behavior(name)
             wait_until(lambda sink=sink, wanted=wanted: len(sink.heard) >= len(wanted), name)
         # Whatever came too late or too often would have come by now: this goes the same way.
         source.loop.run(lambda: source._behavior.send(["deep"], 1))
-        deep = behavior(system, "deep")
+        deep = system.behavior("deep")
         wait_until(lambda: len(deep.heard) == SENT + 1)
-        heard = {name: [item.data for item in behavior(system, name).heard] for name in TABLE}
+        heard = {name: [item.data for item in system.behavior(name).heard] for name in TABLE}
         assert heard == {
             name: [*wanted, 0] if name == "deep" else list(wanted)
             for name, (_, _, wanted) in TABLE.items()
@@ -124,9 +119,9 @@ connections:
 def test_a_connection_may_ask_for_copies_or_for_dds(tmp_path: Path) -> None:
     options = HostOptions(log_level=LogLevel.DEBUG)
     with running(COPIED, tmp_path, options=options, table=MODULE) as system:
-        source = system.host._crew.nodes["source"]
+        source = system.node("source")
         publishers = source._assembly.senders
-        sinks = {name: behavior(system, name) for name in ("shared", "copied", "by_dds")}
+        sinks = {name: system.behavior(name) for name in ("shared", "copied", "by_dds")}
 
         def publish_and_change() -> None:
             for name in sinks:
@@ -186,12 +181,12 @@ class Changer(Behavior):
 
 def test_each_receiver_has_a_copy_of_its_own_also_of_what_is_latched(tmp_path: Path) -> None:
     with running(OF_THEIR_OWN, tmp_path, own=CHANGERS) as system:
-        source = system.host._crew.nodes["source"]
+        source = system.node("source")
         source.loop.run(source._behavior.send)
         system.change("late", "configure", "activate")
         names = ("first", "second", "late")
-        wait_until(lambda: all(behavior(system, name).heard for name in names))
-        assert [behavior(system, name).heard for name in names] == [[1], [1], [1]]
+        wait_until(lambda: all(system.behavior(name).heard for name in names))
+        assert [system.behavior(name).heard for name in names] == [[1], [1], [1]]
 
 
 OVERRIDDEN = """
@@ -215,9 +210,9 @@ def test_what_a_connection_says_goes_before_the_system(
 ) -> None:
     text = OVERRIDDEN.format(whole=whole, one=one)
     with running(text, tmp_path, table=MODULE) as system:
-        source = system.host._crew.nodes["source"]
+        source = system.node("source")
         source.loop.run(lambda: source._behavior.send(["one", "two"], 1))
-        sinks = [behavior(system, name) for name in ("one", "two")]
+        sinks = [system.behavior(name) for name in ("one", "two")]
         wait_until(lambda: all(sink.heard for sink in sinks))
         same = [
             sink.heard[0] is sent for sink, sent in zip(sinks, source._behavior.sent, strict=True)

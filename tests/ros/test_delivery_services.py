@@ -82,13 +82,13 @@ REFUSED = (False, "/server is inactive, not active")
 
 
 def ask(system: RunningSystem, data: bool = True, timeout_ms: float | None = None) -> None:
-    client = system.host._crew.nodes["client"]
+    client = system.node("client")
     client._core.spawn(client._behavior.ask(data, timeout_ms))
 
 
 def outcomes(system: RunningSystem, count: int) -> list[Any]:
     """Wait for so many outcomes and return them."""
-    known: list[Any] = system.host._crew.nodes["client"]._behavior.outcomes
+    known: list[Any] = system.behavior("client").outcomes
     wait_until(lambda: len(known) == count, f"{count} outcomes")
     return known
 
@@ -100,7 +100,7 @@ def test_every_outcome_of_a_call_is_the_same_either_way(
 ) -> None:
     text = TEXT.replace("KIND", kind).replace("DELIVERY", delivery)
     with running(text, tmp_path, asking=MODULE) as system:
-        client, server = (system.host._crew.nodes[name]._behavior for name in ("client", "server"))
+        client, server = (system.behavior(name) for name in ("client", "server"))
         ask(system)
         assert outcomes(system, 1)[-1] == (True, "request 1")
         assert (server.asked[0] is client.requests[0]) is (delivery == "auto")
@@ -121,7 +121,7 @@ def test_every_outcome_of_a_call_is_the_same_either_way(
         system.change("server", "configure")
         system.change("server", "activate")
         ask(system, data=False)
-        server = system.host._crew.nodes["server"]._behavior
+        server = system.behavior("server")
         wait_until(lambda: server.asked)
         system.change("client", "deactivate")
         assert outcomes(system, 5)[-1] == "CallCancelled"
@@ -141,7 +141,7 @@ def test_a_server_that_ends_with_a_request_open_says_so_and_outsiders_are_served
             peer.close()
         assert (answer.success, answer.message) == (True, "request 1")
         ask(system, data=False)
-        server = system.host._crew.nodes["server"]._behavior
+        server = system.behavior("server")
         wait_until(lambda: len(server.asked) == 2)
         system.change("server", "deactivate")
         (success, message), *_ = outcomes(system, 1)
@@ -154,7 +154,7 @@ def test_calls_of_one_moment_end_each_in_its_time(tmp_path: Path) -> None:
     with running(
         text.replace("asking:Server}", "asking:Server, reentrant: true}"), tmp_path, asking=MODULE
     ) as system:
-        client = system.host._crew.nodes["client"]
+        client = system.node("client")
         client._core.spawn(client._behavior.ask_at_once((90.0, 30.0, 60.0)))
         told = outcomes(system, 3)
         assert told == [
@@ -168,7 +168,7 @@ def test_calls_of_one_moment_end_each_in_its_time(tmp_path: Path) -> None:
 def test_a_failed_call_that_nobody_awaits_is_told_of(tmp_path: Path, delivery: str) -> None:
     text = TEXT.replace("KIND", "events").replace("DELIVERY", delivery)
     with running(text, tmp_path, asking=MODULE) as system:
-        client = system.host._crew.nodes["client"]
+        client = system.node("client")
         client.loop.run(client._behavior.ask_and_go)
         line = system.wait_for_log("did not answer")
         counted = system.summary("/client").errors
@@ -183,7 +183,7 @@ def test_the_ends_hold_the_same_objects_unless_copies_are_asked_for(
 ) -> None:
     text = TEXT.replace("KIND", kind).replace("DELIVERY", "auto") + (COPIED if copied else "")
     with running(text, tmp_path, asking=MODULE) as system:
-        client, server = (system.host._crew.nodes[name]._behavior for name in ("client", "server"))
+        client, server = (system.behavior(name) for name in ("client", "server"))
         ask(system)
         wait_until(lambda: client.answers)
         assert server.asked == client.requests
@@ -195,7 +195,7 @@ def test_the_ends_hold_the_same_objects_unless_copies_are_asked_for(
 def test_a_copied_request_is_what_it_was_when_it_was_sent(tmp_path: Path) -> None:
     text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto") + COPIED
     with running(text, tmp_path, asking=MODULE) as system:
-        client, server = (system.host._crew.nodes[name] for name in ("client", "server"))
+        client, server = (system.node(name) for name in ("client", "server"))
         client._core.spawn(client._behavior.ask_and_change())
         wait_until(lambda: client._behavior.answers)
         assert [request.data for request in server._behavior.asked] == [True]

@@ -148,7 +148,7 @@ class Reader(Behavior):
 
 
 def behaviors(system: RunningSystem, *names: str) -> list[Any]:
-    return [system.host._crew.nodes[name]._behavior for name in names]
+    return [system.behavior(name) for name in names]
 
 
 class Stress:
@@ -234,14 +234,14 @@ class Stress:
 
     def _is_alone(self) -> bool:
         """Say whether the publishers of the stream have matched nobody but the three inside."""
-        nodes = [self._system.host._crew.nodes[name] for name in WRITERS]
+        nodes = [self._system.node(name) for name in WRITERS]
         ports = [node._assembly.publishers["stream"] for node in nodes]
         return all(port._publisher.get_subscription_count() == 3 for port in ports)
 
     def _sent_by(self, name: str) -> dict[int, int]:
         """End a node that writes; return the last of each of its writers."""
         (behavior,) = behaviors(self._system, name)
-        self._system.host._crew.nodes[name].loop.run(behavior.end)
+        self._system.node(name).loop.run(behavior.end)
         assert len(behavior.next) == 3
         return {writer: count - 1 for writer, count in behavior.next.items()}
 
@@ -251,7 +251,7 @@ class Stress:
         wait_until(lambda: wanted.items() <= seen.last.items(), f"all for {name}")
         assert seen.disordered == []
         assert not seen.missing.keys() & wanted.keys()
-        assert self._system.host._crew.nodes[name].statistics.queue_drops == 0
+        assert self._system.node(name).statistics.queue_drops == 0
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from std_msgs.msg import Int64
 from composer.model import LogLevel
 from composer.runtime import marks
 from composer.runtime.host import HostOptions
+from tests.ros.counting import MODULE, NUMBERS, numbers, send
 from tests.ros.system_bench import Peer, RunningSystem, running, wait_until
 
 NUMBERING_LISTENER = Path(__file__).with_name("numbering_listener.py")
@@ -39,64 +40,12 @@ def outsider() -> Iterator[Callable[[], Peer]]:
         peer.close()
 
 
-NUMBERS = """
-system: numbers
-executors: {other: {kind: KIND}}
-nodes:
-  source:
-    behavior: counting:Source
-    publishers:
-      numbers: {type: std_msgs/msg/Int64, qos: {depth: 100}}
-  near:
-    behavior: counting:Listener
-    subscriptions:
-      numbers: {type: std_msgs/msg/Int64, qos: {depth: 100}}
-  far:
-    executor: other
-    behavior: counting:Listener
-    subscriptions:
-      numbers: {type: std_msgs/msg/Int64, qos: {depth: 100}}
-"""
-MODULE = """
-from composer.behavior import Behavior
-from std_msgs.msg import Int64
-
-class Source(Behavior):
-    def on_configure(self):
-        self.next = 0
-        self.sent = []
-
-    def send(self, count):
-        for _ in range(count):
-            self.sent.append(Int64(data=self.next))
-            self.publishers.numbers.publish(self.sent[-1])
-            self.next += 1
-
-class Listener(Behavior):
-    def on_configure(self):
-        self.heard = []
-
-    def on_numbers(self, message):
-        self.heard.append(message)
-"""
-
-
-def behavior(system: RunningSystem, node: str) -> Any:
-    return system.host._crew.nodes[node]._behavior
-
-
-def send(system: RunningSystem, count: int) -> None:
-    """Have the source publish so many at once, in a callback of its loop."""
-    source = system.host._crew.nodes["source"]
-    source.loop.run(lambda: source._behavior.send(count))
-
-
 def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -> None:
     """Wait until as many subscriptions as that have matched the source, and it was told to look.
 
     The middleware counts first, and tells then.
     """
-    port = system.host._crew.nodes["source"]._assembly.publishers["numbers"]
+    port = system.node("source")._assembly.publishers["numbers"]
     outlet = port.sender
 
     def knows() -> bool:
@@ -108,16 +57,12 @@ def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -
     wait_until(knows, "so many subscriptions")
 
 
-def numbers(messages: list[Any]) -> list[int]:
-    return [message.data for message in messages]
-
-
 @pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
 def test_what_is_published_is_what_is_received_and_outsiders_hear_it_too(
     tmp_path: Path, outsider: Callable[[], Peer], kind: str
 ) -> None:
     with running(NUMBERS.replace("KIND", kind), tmp_path, counting=MODULE) as system:
-        near, far, source = (behavior(system, name) for name in ("near", "far", "source"))
+        near, far, source = (system.behavior(name) for name in ("near", "far", "source"))
         send(system, 50)
         wait_until(lambda: len(near.heard) == len(far.heard) == 50)
         # By reference: nothing of it went through DDS.
@@ -155,7 +100,7 @@ def test_every_outsider_is_seen_to_come(
     apart = NUMBERS.replace("KIND", "events").replace("executors:", "namespace: /apart\nexecutors:")
     options = HostOptions(log_level=LogLevel(level))
     with running(apart, tmp_path, options=options, counting=MODULE) as system:
-        source = system.host._crew.nodes["source"]
+        source = system.node("source")
         publisher = source._assembly.publishers["numbers"]._publisher
         for turn in range(5):
             send(system, 10)
@@ -168,7 +113,7 @@ def test_every_outsider_is_seen_to_come(
             node.destroy_subscription(subscription)
             # Or its end would hide that the next one begins.
             wait_until(lambda: source._core.node.count_subscribers("/apart/numbers") == 2)
-        near = behavior(system, "near")
+        near = system.behavior("near")
         wait_until(lambda: numbers(near.heard) == list(range(100)))
     node.destroy_node()
     context.try_shutdown()
@@ -192,7 +137,7 @@ def test_what_is_under_way_when_its_reader_leaves_active_is_dropped(tmp_path: Pa
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
         system.change("near", "deactivate")
         send(system, 3)
-        near = system.host._crew.nodes["near"]
+        near = system.node("near")
         wait_until(lambda: near.statistics.dropped == 3)
         system.change("near", "activate")
         send(system, 2)
@@ -201,83 +146,15 @@ def test_what_is_under_way_when_its_reader_leaves_active_is_dropped(tmp_path: Pa
         # A node that is cleaned up has no subscription: nothing is kept for it.
         system.change("near", "deactivate", "cleanup")
         send(system, 2)
-        wait_until(lambda: len(behavior(system, "far").heard) == 7)
+        wait_until(lambda: len(system.behavior("far").heard) == 7)
         system.change("near", "configure", "activate")
         send(system, 1)
         wait_until(lambda: len(near._behavior.heard) == 1)
         assert numbers(near._behavior.heard) == [7]
         assert near.statistics.dropped == 3
-        far = behavior(system, "far")
+        far = system.behavior("far")
         wait_until(lambda: len(far.heard) == 8)
         assert numbers(far.heard) == list(range(8))
-
-
-@pytest.mark.parametrize("depth", [1, 100, 500])
-def test_a_flood_leaves_what_the_depth_allows_and_the_rest_is_counted(
-    tmp_path: Path, depth: int
-) -> None:
-    text = NUMBERS.replace("KIND", "events").replace("100", str(depth))
-    with running(text, tmp_path, counting=MODULE) as system:
-        send(system, 1000)
-        near = system.host._crew.nodes["near"]
-        wait_until(lambda: len(near._behavior.heard) == depth)
-        assert numbers(near._behavior.heard) == list(range(1000 - depth, 1000))
-        assert near.statistics.dropped == 1000 - depth
-
-
-def test_without_a_depth_nothing_of_a_flood_is_dropped(tmp_path: Path) -> None:
-    text = NUMBERS.replace("KIND", "events").replace("depth: 100", "history: keep_all")
-    with running(text, tmp_path, counting=MODULE) as system:
-        send(system, 5000)
-        near = system.host._crew.nodes["near"]
-        wait_until(lambda: len(near._behavior.heard) == 5000)
-        assert numbers(near._behavior.heard) == list(range(5000))
-        assert near.statistics.dropped == 0
-
-
-@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
-@pytest.mark.parametrize("depth", [1, 3, 500])
-def test_threads_that_push_each_other_out_lose_nothing_that_is_not_counted(
-    tmp_path: Path, kind: str, depth: int
-) -> None:
-    text = NUMBERS.replace("KIND", kind).replace("100", str(depth))
-    with running(text, tmp_path, counting=MODULE) as system:
-        far, publish = system.host._crew.nodes["far"], behavior(system, "source").publishers.numbers
-
-        def write(first: int) -> None:
-            for number in range(first, first + 5000):
-                publish.publish(Int64(data=number))
-
-        writers = [threading.Thread(target=write, args=(k * 5000,)) for k in range(4)]
-        for writer in writers:
-            writer.start()
-        for writer in writers:
-            writer.join()
-        wait_until(lambda: len(far._behavior.heard) + far.statistics.dropped == 20_000)
-        heard = numbers(far._behavior.heard)
-        for k in range(4):
-            from_one = [number for number in heard if number // 5000 == k]
-            assert from_one == sorted(from_one)
-        assert {number % 5000 for number in heard} & {4999}  # the very last comes
-
-
-@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
-def test_a_flood_fills_no_loop_and_delays_nothing_that_comes_after(
-    tmp_path: Path, kind: str
-) -> None:
-    with running(NUMBERS.replace("KIND", kind), tmp_path, counting=MODULE) as system:
-        far, release = system.host._crew.nodes["far"], threading.Event()
-        for _ in range(8):  # as many as it can have threads
-            far.loop.call_soon(release.wait)
-        for _ in range(20):
-            send(system, 500)  # from the thread of another loop
-        assert len(far.loop._calls) < 120  # its depth, and little else
-        release.set()
-        wait_until(lambda: len(far._behavior.heard) + far.statistics.dropped == 10_000)
-        assert numbers(far._behavior.heard)[-100:] == list(range(9_900, 10_000))
-        for number in range(10_000, 10_003):
-            send(system, 1)
-            wait_until(lambda n=number: numbers(far._behavior.heard)[-1] == n)
 
 
 LATCHED = """
@@ -338,8 +215,8 @@ def test_dds_is_used_only_while_somebody_outside_has_matched(tmp_path: Path) -> 
             (told,) = [line for line in printed.splitlines() if line.startswith("[[")]
             assert json.loads(told) == [[first + step, visit * 5 + step + 1] for step in range(5)]
             wait_for_matches(system, lambda count: count == 2)
-        wait_until(lambda: len(behavior(system, "near").heard) == 50)
-        assert numbers(behavior(system, "near").heard) == list(range(50))
+        wait_until(lambda: len(system.behavior("near").heard) == 50)
+        assert numbers(system.behavior("near").heard) == list(range(50))
 
 
 def test_a_publisher_that_is_not_active_reaches_nobody_inside(tmp_path: Path) -> None:
@@ -349,16 +226,16 @@ def test_a_publisher_that_is_not_active_reaches_nobody_inside(tmp_path: Path) ->
         send(system, 3)
         system.change("source", "activate")
         send(system, 1)
-        near = behavior(system, "near")
+        near = system.behavior("near")
         wait_until(lambda: 5 in numbers(near.heard))
         assert numbers(near.heard) == [0, 1, 5]
-        assert system.host._crew.nodes["source"].statistics.sent == 3
+        assert system.node("source").statistics.sent == 3
 
 
 def test_a_look_that_is_overtaken_does_not_hide_who_has_come(tmp_path: Path) -> None:
     """Two threads publish when somebody matches: the one looks before that, the other after it."""
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
-        port = system.host._crew.nodes["source"]._assembly.publishers["numbers"]
+        port = system.node("source")._assembly.publishers["numbers"]
         outlet = port.sender
         overtaking = threading.Thread(target=outlet._look_outside)
 
@@ -373,6 +250,45 @@ def test_a_look_that_is_overtaken_does_not_hide_who_has_come(tmp_path: Path) -> 
         outlet._look_outside()
         overtaking.join()
         assert outlet._has_outsiders
+
+
+def test_who_joins_inside_during_a_look_is_not_taken_for_the_one_outside(tmp_path: Path) -> None:
+    """It is counted who has matched before somebody joins, and who is of the process after it."""
+    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
+        outlet = system.node("source")._assembly.publishers["numbers"].sender
+        near, far = outlet._inlets
+        outlet.leave(far)
+        joining, is_checked = threading.Thread(target=outlet.join, args=(far,)), threading.Event()
+
+        def count_matched() -> int:
+            if threading.current_thread() is joining:
+                is_checked.wait()  # what the look of before has led to
+                return 3
+            joining.start()
+            wait_until(lambda: outlet._inlets == (near, far))
+            return 2  # near, and one outside
+
+        outlet._count_matched = count_matched
+        outlet._look_outside()
+        has_outsiders = outlet._has_outsiders
+        is_checked.set()
+        joining.join()
+        assert has_outsiders
+        assert outlet._has_outsiders
+
+
+def test_nobody_goes_by_a_period_that_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The mark says that all is seen to: from then on the old period must not be found."""
+    matches = marks.Matches()
+    periods = [matches.period]
+
+    class Mark(bytearray):
+        def __setitem__(self, *_: Any) -> None:
+            periods.append(matches.period)
+
+    monkeypatch.setattr(marks, "MARK", Mark(1))
+    matches.begin_period()
+    assert len({*periods, matches.period}) == 3
 
 
 REMAPPED = """
@@ -397,7 +313,7 @@ nodes:
 
 def test_ports_meet_by_the_names_that_remapping_gives_them(tmp_path: Path, peer: Peer) -> None:
     with running(REMAPPED, tmp_path, counting=MODULE) as system:
-        source, near, far = (behavior(system, name) for name in ("source", "near", "far"))
+        source, near, far = (system.behavior(name) for name in ("source", "near", "far"))
         intruder = peer.publisher(Int64, "/left/numbers")
         outside = peer.listen(Int64, "/lane/numbers")
         wait_for_matches(system, lambda count: count == 2)

@@ -215,4 +215,4 @@ def test_nobody_has_to_know_whom_a_command_asks(system: RunningSystem) -> None:
     said("lifecycle", "set", "--system", "lean", "--to", "active")
     said("param", "set", "talker", "speed", "3.5")
     assert "3.5" in said("param", "get", "talker", "speed")
-    assert system.host._crew.nodes["talker"].state == "active"
+    assert system.node("talker").state == "active"

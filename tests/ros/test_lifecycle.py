@@ -109,7 +109,7 @@ def test_what_interrupts_a_transition_too_late_leaves_no_coroutine_behind(
     gc.collect()
     recwarn.clear()  # what other tests have left behind is not told here
     with running(SUBJECT, tmp_path, subject=failing) as system:
-        node = system.host._crew.nodes["subject"]
+        node = system.node("subject")
         loop = node.loop
         run_task = loop.run_task
 
@@ -267,7 +267,7 @@ def test_cycles_leave_nothing_behind(tmp_path: Path, peer: Peer) -> None:
         timers: {tick: {period_ms: 1000, log: x}}
     """
     with running(text, tmp_path) as system:
-        node = system.host._crew.nodes["cycled"]
+        node = system.node("cycled")
         ros = node._ros
 
         def entities() -> int:

@@ -64,7 +64,7 @@ def test_who_changes_a_message_is_named_and_nobody_else(tmp_path: Path) -> None:
     with running(TEXT, tmp_path, options=options, changing=MODULE) as system:
         system.wait_for_log(FORGERY)
         system.wait_for_log(USED_AGAIN)
-        reader = system.host._crew.nodes["reader"]._behavior
+        reader = system.behavior("reader")
         wait_until(lambda: reader.heard > 10)
         errors = {entry.node: entry.errors for entry in system.stop().nodes}
     assert errors["/forger"]
@@ -76,7 +76,7 @@ def test_who_changes_a_message_is_named_and_nobody_else(tmp_path: Path) -> None:
 
 def test_without_the_check_nobody_looks(tmp_path: Path) -> None:
     with running(TEXT, tmp_path, changing=MODULE) as system:
-        reader = system.host._crew.nodes["reader"]._behavior
+        reader = system.behavior("reader")
         wait_until(lambda: reader.heard > 10)
         assert not any(entry.errors for entry in system.stop().nodes)
     assert "has changed" not in system.log_text()

@@ -33,7 +33,7 @@ def test_a_timer_follows_its_parameter_and_stands_when_the_node_is_not_active(
         assert peer.set_parameter("/timed", "rate_hz", 100.0) == ""
         wait_until(lambda: len(heard) >= 10)
         assert peer.change("/timed", "deactivate")
-        statistics = system.host._crew.nodes["timed"].statistics
+        statistics = system.node("timed").statistics
         sent = statistics.sent
         assert peer.set_parameter("/timed", "rate_hz", 500.0) == ""
         assert peer.change("/timed", "activate")
@@ -66,7 +66,7 @@ def test_a_call_that_is_due_while_the_one_before_awaits_is_left_out(tmp_path: Pa
             await self.clock.sleep(60.0)
     """
     with running(text, tmp_path, late=module) as system:
-        statistics = system.host._crew.nodes["late"].statistics
+        statistics = system.node("late").statistics
         wait_until(lambda: statistics.skipped > 10)
         assert system.log() == ["begin"]
 

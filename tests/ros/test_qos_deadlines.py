@@ -20,7 +20,7 @@ KINDS = [str(kind) for kind in ExecutorKind]
 
 
 def counts(system: RunningSystem, node: str) -> dict[str, int]:
-    return dict(system.host._crew.nodes[node].statistics.qos_events)
+    return dict(system.node(node).statistics.qos_events)
 
 
 def lines(system: RunningSystem, part: str) -> list[str]:
@@ -119,7 +119,7 @@ def test_a_deadline_that_somebody_outside_misses_is_told_with_his_name(
     with running(LISTENER, tmp_path) as system:
         qos = QoSProfile(depth=10, deadline=Duration(nanoseconds=200_000_000))
         publisher = peer.publisher(String, "/beat", qos)
-        node = system.host._crew.nodes["listener"]._core.node
+        node = system.node("listener")._core.node
         wait_until(lambda: publishers(node, "/beat") == [peer.node.get_name()], "its name")
         publisher.publish(String())
         system.wait_for_log("heard")

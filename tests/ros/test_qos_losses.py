@@ -22,7 +22,7 @@ from tests.ros.system_bench import PATIENCE_S, Peer, RunningSystem, running, wai
 
 
 def counts(system: RunningSystem) -> dict[str, int]:
-    return dict(system.host._crew.nodes["listener"].statistics.qos_events)
+    return dict(system.node("listener").statistics.qos_events)
 
 
 LOSSES = """
@@ -51,7 +51,7 @@ def test_messages_that_are_lost_are_counted_one_by_one(tmp_path: Path) -> None:
         hand_written("hand_written_flood.py"),
         running(LOSSES, tmp_path, numbers=NUMBERS) as system,
     ):
-        seen: list[int] = system.host._crew.nodes["listener"]._behavior.seen
+        seen: list[int] = system.behavior("listener").seen
         wait_until(lambda: seen)
         losses: defaultdict[int, set[int]] = defaultdict(set)
 
@@ -84,7 +84,7 @@ def test_a_publisher_that_falls_silent_is_told_and_one_that_leaves_is_not(
         leaving = peer.publisher(String, "/alive", qos)
         with hand_written("hand_written_flood.py", "500", "0") as flood:
             system.wait_for_log("heard")
-            node = system.host._crew.nodes["listener"]._core.node
+            node = system.node("listener")._core.node
             wait_until(lambda: "flood" in node.get_node_names(), "its name")
             peer.node.destroy_publisher(leaving)
             flood.kill()

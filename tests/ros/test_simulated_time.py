@@ -46,7 +46,7 @@ def wait_for_ticks(system: RunningSystem, *times_s: float) -> None:
 
 def wait_for_timer(system: RunningSystem) -> None:
     """Wait until the timer in simulated time waits: what jumps before that it does not see."""
-    clock = system.host._crew.nodes["a"]._core.clock
+    clock = system.node("a")._core.clock
     wait_until(lambda: clock._calls._waiting, "a timer that waits")
 
 
@@ -62,7 +62,7 @@ def test_timers_stand_start_pause_and_jump_with_the_clock(
 ) -> None:
     with running(SYSTEM.format(kind=kind), tmp_path) as system:
         let_real_time_pass(system)
-        assert system.host._crew.nodes["a"].now_s() == 0.0
+        assert system.node("a").now_s() == 0.0
         simulator = Simulator(peer, system)
         simulator.tell(1000.0)  # the first time there is: the first period begins
         let_real_time_pass(system)
@@ -223,14 +223,14 @@ def test_one_subscription_serves_all_nodes_and_goes_with_the_last(
         simulator = Simulator(peer, system)
         for number in range(4):
             simulator.tell(100.0 + number, node=f"for_{number}")
-        assert system.host._crew.nodes["real"].now_s() > 1e9
+        assert system.node("real").now_s() > 1e9
         for number in range(4):
             assert listeners(peer) != []
             assert peer.set_parameter(f"/for_{number}", "use_sim_time", False) == ""
         wait_until(lambda: listeners(peer) == [])
         assert peer.set_parameter("/real", "use_sim_time", True) == ""
         simulator = Simulator(peer, system)
-        assert system.host._crew.nodes["real"].now_s() == 0.0  # what it was is long ago
+        assert system.node("real").now_s() == 0.0  # what it was is long ago
         simulator.tell(200.0, node="real")
 
 
@@ -352,7 +352,7 @@ def test_a_node_that_holds_up_its_loop_holds_up_nobody_s_time(tmp_path: Path, pe
     """
     with running(text, tmp_path, holding=module) as system:
         system.wait_for_log("holding")
-        let_go = system.host._crew.nodes["b"]._behavior.on_hold.__globals__["LET_GO"]
+        let_go = system.behavior("b").on_hold.__globals__["LET_GO"]
         assert isinstance(let_go, threading.Event)
         try:
             Simulator(peer, system).tell(1.0, 2.0)

@@ -59,7 +59,7 @@ class Server:
 
 
 def counted(system: RunningSystem, node: str) -> dict[str, CallbackStatistics]:
-    callbacks = system.host._crew.nodes[node].statistics.callbacks
+    callbacks = system.node(node).statistics.callbacks
     return {kind: callback for (kind, _), callback in callbacks.items()}
 
 
@@ -97,7 +97,7 @@ def test_without_tracing_only_what_has_a_budget_is_timed(tmp_path: Path) -> None
       quick: {timers: {tick: {period_ms: 5, set: {}}, tock: {period_ms: 5, budget_ms: 50, set: {}}}}
     """
     with running(text, tmp_path, options=HostOptions(tracing=False)) as system:
-        callbacks = system.host._crew.nodes["quick"].statistics.callbacks
+        callbacks = system.node("quick").statistics.callbacks
         wait_until(lambda: callbacks["timer", "tock"].times.count > 20, "calls")
     assert callbacks["timer", "tick"].times.count == 0
     assert callbacks["timer", "tick"].lateness.count == 0
@@ -138,7 +138,7 @@ class Sink:
 def test_of_what_comes_often_each_call_counts_once_also_where_it_awaits(tmp_path: Path) -> None:
     """While they come often, one of sixteen is timed and stands for them, where none awaits."""
     with running(FLOOD, tmp_path, flood=SOURCE_AND_SINK) as system:
-        node = system.host._crew.nodes["sink"]
+        node = system.node("sink")
         wait_until(lambda: node.statistics.received == 4100, "all are there")
         times = node.statistics.callbacks["subscription", "number"].times
         wait_until(lambda: abs(times.count - 4100) < 32, f"{times.count} counted")
