@@ -121,6 +121,16 @@ def asked_until(fits: Callable[[str], bool], *arguments: str) -> str:
             return text
 
 
+def errors(*commands: tuple[object, ...]) -> list[str]:
+    """Run commands that have to fail at the same time, for most of theirs is spent waiting."""
+    processes = [start(*map(str, arguments)) for arguments in commands]
+    ends = [process.communicate(timeout=PATIENCE_S) for process in processes]
+    for process, (output, told) in zip(processes, ends, strict=True):
+        assert process.returncode == 1, told
+        assert output == ""
+    return [told for _, told in ends]
+
+
 def error(*arguments: str) -> str:
     """Run a command that has to fail and return what it says, having printed nothing."""
     done = compose(*arguments)

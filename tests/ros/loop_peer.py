@@ -49,14 +49,17 @@ def wait_until_known(node: Node) -> None:
 
 
 def flood(node: Node, topic: str, count: str, depth: str) -> object:
-    """Publish ``count`` numbers as fast as they go, as soon as someone listens."""
+    """Publish ``count`` numbers as fast as they go, as soon as someone listens.
+
+    Stays until standard input closes, to send again what is lost.
+    """
     publisher = node.create_publisher(Int64, topic, int(depth))
     until = time.monotonic() + PATIENCE_S
     while publisher.get_subscription_count() == 0 and time.monotonic() < until:
         time.sleep(0.01)
     for number in range(int(count)):
         publisher.publish(Int64(data=number))
-    publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=PATIENCE_S))
+    sys.stdin.read()
     return int(count)
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from composer.runtime.claim import claims
-from tests.ros.commands import COMPOSE, PATIENCE_S, asked_until, compose, said
+from tests.ros.commands import COMPOSE, PATIENCE_S, asked_until, compose, errors, said
 from tests.ros.system_bench import wait_until
 
 ROBOT = """
@@ -268,16 +268,21 @@ def test_a_system_that_was_killed_is_said_not_to_run(robot: Robot) -> None:
     began_s = time.monotonic()
     assert said("ps") == "nothing is running\n"
     assert said("lifecycle", "nodes") == ""
-    assert "there is no running system 'robot'" in refused("ps", "robot")
-    assert "no system is running: start one with" in refused("ps", robot.path)
-    assert "did you mean" in refused("ps", robot.path.with_name("robt.yaml"))
-    for command in ("up", "down", "pause", "resume", "reset"):
-        assert "there is no running system 'robot'" in refused(command, "robot")
-    for arguments in (("set", "planner", "deactivate"), ("get", "/fleet/planner")):
-        assert "there is no lifecycle node " in refused("lifecycle", *arguments)
-    assert "there is no running system" in refused(
-        "lifecycle", "set", "--system", "robot", "cleanup"
+    commands = ("ps", "up", "down", "pause", "resume", "reset")
+    for told in errors(*((command, "robot") for command in commands)):
+        assert "there is no running system 'robot'" in told
+    by_path, misspelt, by_name, in_a_system, asked = errors(
+        ("ps", robot.path),
+        ("ps", robot.path.with_name("robt.yaml")),
+        ("lifecycle", "set", "planner", "deactivate"),
+        ("lifecycle", "set", "--system", "robot", "cleanup"),
+        ("lifecycle", "get", "/fleet/planner"),
     )
+    assert "no system is running: start one with" in by_path
+    assert "did you mean" in misspelt
+    assert "there is no running system" in in_a_system
+    for told in (by_name, asked):
+        assert "there is no lifecycle node " in told
     assert time.monotonic() - began_s < 11 * 5.0
 
 
@@ -300,8 +305,8 @@ def test_a_command_does_not_wait_for_a_process_that_has_ended(robot: Robot) -> N
 
 def test_a_list_that_lacks_the_nodes_of_a_system_says_so(robot: Robot) -> None:
     robot.kill(signal.SIGSTOP)
-    for arguments in (("nodes",), ("get", "planner"), ("set", "/fleet/*", "cleanup")):
-        refusal = refused("lifecycle", *arguments)
+    asking = (("nodes",), ("get", "planner"), ("set", "/fleet/*", "cleanup"))
+    for refusal in errors(*(("lifecycle", *arguments) for arguments in asking)):
         assert "system '/fleet/robot' does not answer, so its nodes are not known" in refusal
         assert f"its process {robot.pid} may be busy or stopped" in refusal
 

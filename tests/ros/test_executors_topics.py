@@ -26,8 +26,7 @@ def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
 def test_messages_of_another_process_arrive_in_order(on: Bench) -> None:
     seen: list[int] = []
     on.subscribe(Int64, "numbers", lambda message: seen.append(message.data), depth=300)
-    with peer("flood", "numbers", 200, 300) as process:
-        assert json.loads(last_line(process)) == 200
+    with peer("flood", "numbers", 200, 300):
         wait_until(lambda: len(seen) == 200)
     assert sorted(seen) == list(range(200))
     assert on.reports == []
@@ -85,8 +84,7 @@ def test_keep_all_loses_nothing_of_a_burst(on: Bench) -> None:
     on.subscribe(
         Int64, "burst", lambda message: seen.append(message.data), history=HistoryPolicy.KEEP_ALL
     )
-    with peer("flood", "burst", 3000, 3000) as process:
-        assert json.loads(last_line(process)) == 3000
+    with peer("flood", "burst", 3000, 3000):
         wait_until(lambda: len(seen) == 3000)
     assert sorted(seen) == list(range(3000))
 
@@ -139,12 +137,11 @@ def test_a_slow_subscription_does_not_hold_up_a_timer(on: Bench) -> None:
 
     on.subscribe(Int64, "flood", work, depth=5000)
     on.loop.call_every(0.01, lambda: ticks.append(time.monotonic()))
-    with peer("flood", "flood", 1500, 5000) as process:
+    with peer("flood", "flood", 1500, 5000):
         wait_until(lambda: len(flood) > 10)
         before = len(ticks)
         wait_until(lambda: len(flood) > 1000)
         meanwhile = ticks[before:]
-        last_line(process)
     # The median: all may stand still for a moment on a busy machine.
     assert median(later - earlier for earlier, later in pairwise(meanwhile)) < 0.02
 
@@ -181,7 +178,7 @@ def test_entities_come_and_go_in_a_flood(on: Bench) -> None:
                 on.loop.remove(subscription)
                 on.node.destroy_subscription(subscription)
 
-    with peer("flood", "flood", 4000, 10) as process:
+    with peer("flood", "flood", 20_000, 10) as process:
         steady: list[int] = []
         on.subscribe(Int64, "flood", lambda message: steady.append(message.data))
         threads = [threading.Thread(target=churn) for _ in range(2)]

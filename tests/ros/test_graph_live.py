@@ -47,7 +47,7 @@ def all_drawn() -> dict[str, Any]:
 
 
 def drawn() -> dict[str, Any]:
-    done = compose("graph", "--live", "-f", "json", "--measure", "3")
+    done = compose("graph", "--live", "-f", "json", "--measure", "1.5")
     assert (done.returncode, done.stderr) == (0, "")
     found: dict[str, Any] = json.loads(done.stdout)
     return found

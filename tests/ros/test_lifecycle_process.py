@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import subprocess
-import sys
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -17,6 +15,7 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
+from tests.ros import commands
 from tests.ros.system_bench import Peer, finished, wait_until
 from tests.ros.systems.running import RunningSystem
 
@@ -172,12 +171,8 @@ class Usage:
 
 def lists_of_an_outsider() -> dict[str, str]:
     """What somebody sees who has just come: he knows nothing of what was there before."""
-    return {words: _said(*words.split()) for words in LISTS}
-
-
-def _said(*words: str) -> str:
-    command = [sys.executable, "-m", "composer", *words]
-    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=30.0).stdout
+    processes = {words: commands.start(*words.split()) for words in LISTS}
+    return {words: commands.finished(process) for words, process in processes.items()}
 
 
 @pytest.mark.parametrize(
