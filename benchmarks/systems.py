@@ -138,7 +138,7 @@ def calls(*, long: bool) -> list[Row]:
 def outside(*, long: bool) -> list[Row]:
     """Measure messages between two processes, one in flight: the CPU of one of them."""
     rounds, seconds = (7, 3.0) if long else (3, 1.0)
-    ways = (COMPOSED, SINGLE, EVENTS) if long else (COMPOSED, EVENTS)
+    ways = (COMPOSED, SINGLE, EVENTS, BARE) if long else (COMPOSED, EVENTS, BARE)
     turns = take_turns(ways, Case("ring", 2, seconds, rounds, apart=True))
     return rows("DDS to another process", CPU, turns, cpu_us)
 

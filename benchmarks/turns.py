@@ -73,7 +73,7 @@ def _run(way: str, case: Case) -> Mapping[str, Any] | None:
     program, executor, *more = {
         COMPOSED: ("composed", "events"),
         UNTRACED: ("composed", "events", "--no-tracing"),
-        BARE: ("bare", "none"),
+        BARE: ("bare_outside" if case.apart else "bare", "none"),
     }.get(way, ("hand_written", way))
     command = (program, executor, *case.arguments, *more)
     try:
