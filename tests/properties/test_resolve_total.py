@@ -67,7 +67,7 @@ def files(draw: st.DrawFn) -> Mapping:
     return Mapping((first, nodes, *kept), SPAN)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(tree=files(), text=st.sampled_from(TEXTS) | st.text(max_size=12))
 def test_every_tree_has_a_model_and_a_plan(tree: Mapping, text: str) -> None:
     overrides, _ = read_overrides(CommandLine((f"a.b={text}", text), text))
