@@ -38,7 +38,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--soak", action="store_true", help="run what takes many minutes, too")
 
 
-def pytest_configure() -> None:
+def pytest_configure(config: pytest.Config) -> None:
+    # Hundreds of commands would compile the composer hundreds of times where nobody may keep what
+    # they compile.
+    if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
+        folder = tempfile.TemporaryDirectory(prefix="bytecode-")
+        config.add_cleanup(folder.cleanup)
+        os.environ["PYTHONPYCACHEPREFIX"] = folder.name
     # What is started in the background of a script ignores SIGINT, and so would all that the
     # tests start: nobody could see whether they end at Ctrl-C.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
