@@ -16,6 +16,7 @@ import ctypes
 import os
 import resource
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol
 
 import rclpy  # noqa: F401  loads librcl, whichever ROS it is of
@@ -80,6 +81,9 @@ class Signal:
     def __init__(self) -> None:
         self.fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         _leave_room_above(self.fd)
+        #: Returns how many things were announced since the last time; raises BlockingIOError for
+        #: none. Not a method: this is called for each message.
+        self.read: Callable[[], int] = partial(os.eventfd_read, self.fd)
         self._attached: list[tuple[Handle, tuple[Announcement, ...]]] = []
 
     def attach(self, handle: Handle, *announcements: Announcement) -> None:
@@ -109,7 +113,7 @@ class Signal:
     def count(self) -> int:
         """Return how many things were announced since the last time."""
         try:
-            return os.eventfd_read(self.fd)
+            return self.read()
         except BlockingIOError:
             return 0
 

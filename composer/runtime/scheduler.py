@@ -174,7 +174,7 @@ class Scheduler:
         self._wind_up()
 
     def _take_turns(self) -> None:
-        timers, calls, ready = self._timers, self._calls, self._ready
+        timers, calls, ready, poller = self._timers, self._calls, self._ready, self._poller
         rest_at_s = inf  # not known yet
         while not self._stopping:
             now_s = monotonic()
@@ -188,14 +188,15 @@ class Scheduler:
                     rest_at_s = inf
                 if rest_at_s == inf:
                     rest_at_s = now_s + BUSY_S
-                announced = self._poller.ready()
+                self._serve_round(poller.ready())
             else:
-                announced = self._wait()
                 rest_at_s = inf
-            if announced:
-                self._gather(announced)
-            if ready:
-                self._serve_round()
+                self._sleeping = True
+                # Calls may have been put there while nobody thought us asleep.
+                is_free = not (calls or self._stopping)
+                announced = poller.wait(timers.next_due_s()) if is_free else poller.ready()
+                self._sleeping = False
+                self._serve_round(announced)
 
     def _run_timers(self, now_s: float) -> None:
         timers = self._timers
@@ -221,29 +222,27 @@ class Scheduler:
                 break
         self._running = None
 
-    def _wait(self) -> Announced:
-        self._sleeping = True
-        try:
-            if self._calls or self._stopping:  # put there while nobody thought us asleep
-                return self._poller.ready()
-            return self._poller.wait(self._timers.next_due_s())
-        finally:
-            self._sleeping = False
-
-    def _gather(self, announced: Announced) -> None:
+    def _serve_round(self, announced: Announced) -> None:
+        ready, timers = self._ready, self._timers
         for fd, _ in announced:
             slot = self._slots.get(fd)
-            if slot is not None:
-                if not slot.due:
-                    self._ready.append(slot)
-                slot.due += slot.signal.count()
-
-    def _serve_round(self) -> None:
-        ready, timers = self._ready, self._timers
-        until_s = monotonic() + _ROUND_S
-        while True:
+            if slot is None:
+                continue
+            try:
+                count = slot.signal.read()
+            except BlockingIOError:
+                continue  # it is another slot's by now, and nothing was announced there yet
+            if not slot.due:
+                ready.append(slot)
+            slot.due += count
+        until_s = 0.0
+        while ready:
             self._serve(ready.popleft())
-            if not ready or (now_s := monotonic()) >= timers.next_s or now_s >= until_s:
+            if not ready:
+                break
+            now_s = monotonic()
+            until_s = until_s or now_s + _ROUND_S
+            if now_s >= timers.next_s or now_s >= until_s:
                 break
 
     def _serve(self, slot: Slot) -> None:
@@ -265,6 +264,9 @@ class Scheduler:
             except BaseException as error:
                 self._report(source.name, error)
         self._running = None
+        if brought == slot.due:  # as most often
+            slot.due = 0
+            return
         slot.note_round(brought)
         if slot.due:
             self._ready.append(slot)

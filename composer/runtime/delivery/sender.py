@@ -21,7 +21,7 @@ class Target(Protocol):
 
 
 class Several:
-    """Puts messages to each of some targets, or to none."""
+    """Puts messages to each of some targets."""
 
     __slots__ = ("_targets",)
 
@@ -34,8 +34,10 @@ class Several:
             target.put(message)
 
 
-def as_one(targets: Sequence[Target]) -> Target:
+def as_one(targets: Sequence[Target]) -> Target | None:
     """Return what puts messages to all of ``targets``: where there is one, as most often, that."""
+    if not targets:
+        return None
     return targets[0] if len(targets) == 1 else Several(targets)
 
 
@@ -74,7 +76,9 @@ class Sender:
     def __init__(self, publisher: Publisher, origin: Origin) -> None:
         self._gate = origin.gate
         self._refuse = origin.refuse
-        self._publish: Callable[[Any], None] = publisher.publish
+        # Not rclpy's own ``publish``, which looks at the type once more. The interpreter's lock is
+        # held all along, so nobody destroys the publisher meanwhile.
+        self._publish: Callable[[Any], None] = publisher.handle.publish
         #: How many messages were sent.
         self.count = 0
         #: The message class of the topic.
@@ -93,7 +97,8 @@ class Sender:
             return
         if type(message) is not self.message_type:
             message = self._converted(message)
-        self._target.put(message)
+        if self._target is not None:
+            self._target.put(message)
         if not MARK[0]:
             MATCHES.begin_period()
         if self._period is not MATCHES.period:

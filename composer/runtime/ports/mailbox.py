@@ -46,6 +46,7 @@ class Mailbox(Callback):
         "_gate",
         "_has_no_extra",
         "_is_awaiting",
+        "_is_direct",
         "_keeper",
         "_loop",
         "_messages",
@@ -79,6 +80,8 @@ class Mailbox(Callback):
         # Popping is atomic: there is one extra turn at a time, whichever thread wants it.
         self._has_no_extra = [True]
         self._is_awaiting = False
+        # On a loop of one thread one is at a time anyway.
+        self._is_direct = self._overlaps or isinstance(core.strand, Direct)
         self._turn = self._one_at_a_time(self._take_turn)
         self._extra_turn = self._one_at_a_time(self._take_extra_turn)
         self._needed = self._what_is_needed()
@@ -100,8 +103,13 @@ class Mailbox(Callback):
         """Have the message worked on, at once where nothing waits. To be called on the loop."""
         if not self._gate.incoming:
             self._keeper.hold(message)
-        elif self._messages:
+        elif self._messages or self._is_awaiting:
             self.put(message)
+        elif self._is_direct:  # as in _take_turn: nobody else can take it out of turn
+            self.count += 1
+            rest = self._call(message)
+            if rest is not None:
+                self._wait_for(rest)
         else:
             self._messages.append(message)
             self._turn()
@@ -141,9 +149,7 @@ class Mailbox(Callback):
         return (*mine, first, second, third, fourth)
 
     def _one_at_a_time(self, take: Callable[[], object]) -> Callable[[], object]:
-        strand = self._core.strand
-        # On a loop of one thread it is that anyway.
-        return take if self._overlaps or isinstance(strand, Direct) else partial(strand.post, take)
+        return take if self._is_direct else partial(self._core.strand.post, take)
 
     def _take_turn(self) -> None:
         if self._is_awaiting:
