@@ -36,6 +36,17 @@ def environment() -> Mapping[str, str]:
     }
 
 
+@contextmanager
+def on_one_processor() -> Iterator[None]:
+    """Let all that is started in the block share one processor."""
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(allowed)})  # not the first, which as a rule serves devices
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, allowed)
+
+
 def wall_time_s(*arguments: str, folder: Path) -> float:
     """Return how long this Python takes with ``arguments``. Raises CalledProcessError.
 

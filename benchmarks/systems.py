@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 from benchmarks.figures import Row, percentile
+from benchmarks.processes import on_one_processor
 from benchmarks.turns import (
     BARE,
     COMPOSED,
@@ -137,10 +138,14 @@ def calls(*, long: bool) -> list[Row]:
 
 def outside(*, long: bool) -> list[Row]:
     """Measure messages between two processes, one in flight: the CPU of one of them."""
-    rounds, seconds = (7, 3.0) if long else (3, 1.0)
+    rounds, seconds = (9, 3.0) if long else (5, 1.0)
     ways = (COMPOSED, SINGLE, EVENTS, BARE) if long else (COMPOSED, EVENTS, BARE)
-    turns = take_turns(ways, Case("ring", 2, seconds, rounds, apart=True))
-    return rows("DDS to another process", CPU, turns, cpu_us)
+    case = Case("ring", 2, seconds, rounds, apart=True)
+    with on_one_processor():
+        near = take_turns(ways, case)
+    far = take_turns(ways, case)
+    found = rows("DDS to another process, one processor", CPU, near, cpu_us)
+    return found + rows("DDS to another process, all processors", CPU, far, cpu_us)
 
 
 def tracing(*, long: bool) -> list[Row]:

@@ -30,7 +30,7 @@ TARGETS = (
     Target("ring, N=300", _CPU, "the composer, N=10", 1.3),
     Target("hop 1000 Hz p50, N=100", "latency us", EVENTS, 1 / 15),
     Target("timer 500 Hz p50, N=100", "jitter us", EVENTS, 1.5),
-    Target("DDS to another process", _CPU, EVENTS, 0.8),
+    Target("DDS to another process, one processor", _CPU, EVENTS, 0.8),
     Target("service, N=10, p50", "round trip us", EVENTS, 1 / 5),
     Target("pipeline.yaml", "CPU ms/s", "rclpy, SingleThreadedExecutor", 1 / 4),
     Target(f"start, N=300, {large_systems.COMPOSED}", "s", large_systems.BY_HAND, 1.1),
