@@ -15,7 +15,7 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 
 from composer.runtime import actions, sources
-from composer.runtime.loop import ExceptionHandler, Reply
+from composer.runtime.loop import ExceptionHandler, Reply, Taken
 from composer.runtime.node_executor import NodeExecutor
 from composer.runtime.scheduler import Scheduler
 from composer.runtime.slots import Slot
@@ -49,8 +49,10 @@ class EventLoop(Scheduler):
             for entity in _entities_of(node):
                 self.remove(entity)
 
-    def add_subscription(self, subscription: Subscription, callback: Callable[[Any], None]) -> None:
-        """Call ``callback(message)`` for each message."""
+    def add_subscription(
+        self, subscription: Subscription, callback: Callable[[Taken], None]
+    ) -> None:
+        """Call ``callback((message, information))`` for each message."""
         self._add(subscription, sources.SubscriptionSource(subscription, callback))
 
     def add_service(self, service: Service, callback: Callable[[Any, Reply], None]) -> None:

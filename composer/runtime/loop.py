@@ -24,6 +24,8 @@ T = TypeVar("T")
 ExceptionHandler = Callable[[str, BaseException], None]
 
 Reply = Callable[[Any], None]
+#: A message, and what the middleware tells about its way.
+Taken = tuple[Any, Any]
 
 
 def never_called(_: Any, response: Any) -> Any:
@@ -64,8 +66,10 @@ class Loop(Protocol):
     def remove_node(self, node: Node) -> None:
         """Stop serving the node and everything of it. To be called before it is destroyed."""
 
-    def add_subscription(self, subscription: Subscription, callback: Callable[[Any], None]) -> None:
-        """Call ``callback(message)`` for each message."""
+    def add_subscription(
+        self, subscription: Subscription, callback: Callable[[Taken], None]
+    ) -> None:
+        """Call ``callback((message, information))`` for each message."""
 
     def add_service(self, service: Service, callback: Callable[[Any, Reply], None]) -> None:
         """Call ``callback(request, reply)``; ``reply(response)`` answers, now or later.

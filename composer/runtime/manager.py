@@ -35,7 +35,7 @@ from composer.runtime.deputy import Deputy
 from composer.runtime.event_loop import EventLoop
 from composer.runtime.executors import log_exception
 from composer.runtime.figures import CallbackFigures, ChainFigures
-from composer.runtime.loop import Reply, never_called
+from composer.runtime.loop import Reply, Taken, never_called
 from composer.runtime.manager_interface import (
     CALLBACKS_QOS,
     CALLBACKS_TOPIC,
@@ -206,8 +206,9 @@ class Manager:
         self._due.release()
         self._publish()
 
-    def _look_at_rival(self, message: DiagnosticArray) -> None:
+    def _look_at_rival(self, taken: Taken) -> None:
         """See whether another composer runs the same system, and for how long."""
+        message: DiagnosticArray = taken[0]
         values = {item.key: item.value for item in message.status[0].values}
         rival = (values["host"], values["pid"])
         status = self._board.without_nodes

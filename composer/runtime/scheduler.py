@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from composer.runtime.handover import Handover
 from composer.runtime.loop import ExceptionHandler
-from composer.runtime.poller import Announced, Poller, wake_in_time
+from composer.runtime.poller import Poller, wake_in_time
 from composer.runtime.slots import Slot
 from composer.runtime.sources import Source
 from composer.runtime.stacks import where
@@ -174,7 +174,8 @@ class Scheduler:
         self._wind_up()
 
     def _take_turns(self) -> None:
-        timers, calls, ready, poller = self._timers, self._calls, self._ready, self._poller
+        timers, calls, poller = self._timers, self._calls, self._poller
+        slots, ready = self._slots, self._ready
         rest_at_s = inf  # not known yet
         while not self._stopping:
             now_s = monotonic()
@@ -183,12 +184,8 @@ class Scheduler:
             if calls:
                 self._run_calls()
             if calls or ready:
-                if now_s > rest_at_s:
-                    sleep(MOMENT_S)
-                    rest_at_s = inf
-                if rest_at_s == inf:
-                    rest_at_s = now_s + BUSY_S
-                self._serve_round(poller.ready())
+                rest_at_s = _rest(rest_at_s, now_s)
+                announced = poller.ready()
             else:
                 rest_at_s = inf
                 self._sleeping = True
@@ -196,7 +193,19 @@ class Scheduler:
                 is_free = not (calls or self._stopping)
                 announced = poller.wait(timers.next_due_s()) if is_free else poller.ready()
                 self._sleeping = False
-                self._serve_round(announced)
+            for fd, _ in announced:
+                slot = slots.get(fd)
+                if slot is None:
+                    continue
+                try:
+                    count = slot.signal.read()
+                except BlockingIOError:
+                    continue  # it is another slot's by now, and nothing was announced there yet
+                if not slot.due:
+                    ready.append(slot)
+                slot.due += count
+            if ready:
+                self._serve_round()
 
     def _run_timers(self, now_s: float) -> None:
         timers = self._timers
@@ -222,54 +231,38 @@ class Scheduler:
                 break
         self._running = None
 
-    def _serve_round(self, announced: Announced) -> None:
+    def _serve_round(self) -> None:
+        # Few functions from here to the handler: after a sleep each is fetched from far away.
         ready, timers = self._ready, self._timers
-        for fd, _ in announced:
-            slot = self._slots.get(fd)
-            if slot is None:
-                continue
-            try:
-                count = slot.signal.read()
-            except BlockingIOError:
-                continue  # it is another slot's by now, and nothing was announced there yet
-            if not slot.due:
-                ready.append(slot)
-            slot.due += count
-        until_s = 0.0
-        while ready:
-            self._serve(ready.popleft())
-            if not ready:
-                break
-            now_s = monotonic()
-            until_s = until_s or now_s + _ROUND_S
-            if now_s >= timers.next_s or now_s >= until_s:
-                break
-
-    def _serve(self, slot: Slot) -> None:
-        brought = 0
-        for source in slot.sources:
-            self._running = source
-            try:
-                taken = source.take()
-            except BaseException as error:
-                if source in slot.sources:  # not removed meanwhile
+        until_s = monotonic() + _ROUND_S
+        while True:
+            slot = ready.popleft()
+            brought = 0
+            for source in slot.sources:
+                self._running = source
+                try:
+                    taken = source.take()
+                except BaseException as error:
+                    if source in slot.sources:  # not removed meanwhile
+                        self._report(source.name, error)
+                        brought += 1
+                    continue
+                if taken is None:
+                    continue
+                brought += 1
+                try:
+                    source.call(taken)
+                except BaseException as error:
                     self._report(source.name, error)
-                    brought += 1
-                continue
-            if taken is None:
-                continue
-            brought += 1
-            try:
-                source.call(taken)
-            except BaseException as error:
-                self._report(source.name, error)
-        self._running = None
-        if brought == slot.due:  # as most often
-            slot.due = 0
-            return
-        slot.note_round(brought)
-        if slot.due:
-            self._ready.append(slot)
+            self._running = None
+            if brought == slot.due:  # as most often
+                slot.due = 0
+            else:
+                slot.note_round(brought)
+                if slot.due:
+                    ready.append(slot)
+            if not ready or (now_s := monotonic()) >= timers.next_s or now_s >= until_s:
+                break
 
     def _call(self, callback: Callable[[], object]) -> None:
         self._running = callback
@@ -304,3 +297,12 @@ class Scheduler:
         for slot in list(self._slots.values()):
             self.close_slot(slot)
         self._ready.clear()
+
+
+def _rest(rest_at_s: float, now_s: float) -> float:
+    """Sleep for a moment if it is time to; return when it will be, which infinity leaves open."""
+    if now_s > rest_at_s:
+        sleep(MOMENT_S)
+    elif rest_at_s != inf:
+        return rest_at_s
+    return now_s + BUSY_S

@@ -18,7 +18,7 @@ from rclpy.time import Time
 from rclpy.time_source import CLOCK_TOPIC
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from composer.runtime.loop import Loop
+from composer.runtime.loop import Loop, Taken
 
 #: As rclpy and rclcpp subscribe: only the latest time matters.
 _QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -69,7 +69,8 @@ class SimulatedTime:
             self._node.destroy_subscription(self._subscription)
             self._subscription = None
 
-    def _take(self, message: ClockMessage) -> None:
+    def _take(self, taken: Taken) -> None:
+        message: ClockMessage = taken[0]
         now = Time.from_msg(message.clock)
         with self._changing:
             self._now = now

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Coroutine
-from functools import partial
+from functools import partial, wraps
 from typing import Any, Protocol
 
 from rclpy.client import Client
@@ -19,10 +19,10 @@ from rclpy.subscription import Subscription
 from rclpy.time_source import TimeSource
 
 from composer.runtime import readiness
+from composer.runtime.loop import Reply, Taken
 from composer.runtime.readiness import Signal
 from composer.runtime.tasks import name_of
 
-Reply = Callable[[Any], None]
 RunTask = Callable[[Coroutine[Any, Any, Any]], object]
 
 # rclpy's own type hints are in part wrong (a service's type has no Request): hence Any below.
@@ -52,28 +52,28 @@ class Source(Protocol):
     def take(self) -> Any:
         """Return what is there next, or None."""
 
-    def call(self, taken: Any) -> None:
+    def call(self, taken: Any, /) -> object:
         """Give what was taken to whom it is for."""
 
 
 class SubscriptionSource:
-    """Calls ``callback(message)`` for each message."""
+    """Calls ``callback((message, information))`` for each message."""
 
-    __slots__ = ("_callback", "_subscription", "take")
+    __slots__ = ("_subscription", "call", "take")
     passes_over = False
 
-    def __init__(self, subscription: Subscription, callback: Callable[[Any], object]) -> None:
+    def __init__(self, subscription: Subscription, callback: Callable[[Taken], object]) -> None:
         self._subscription = subscription
-        self._callback = callback
-        #: Returns a message and its information. Not a method: this is called for each message.
-        self.take: Callable[[], Any] = partial(
+        # Neither is a method: they are called for each message.
+        self.call: Callable[[Taken], object] = callback
+        self.take: Callable[[], Taken | None] = partial(
             subscription.handle.take_message, subscription.msg_type, subscription.raw
         )
 
     @property
     def name(self) -> str:
         """The topic and the callback."""
-        return f"subscription '{self._subscription.topic}' ({name_of(self._callback)})"
+        return f"subscription '{self._subscription.topic}' ({name_of(self.call)})"
 
     def attach(self, signal: Signal) -> None:
         """Have messages announced."""
@@ -82,10 +82,6 @@ class SubscriptionSource:
     def detach(self, signal: Signal) -> None:
         """End that."""
         signal.detach(self._subscription.handle)
-
-    def call(self, taken: Any) -> None:
-        """Call with the message."""
-        self._callback(taken[0])
 
 
 class ServiceSource:
@@ -260,7 +256,7 @@ def source_of(entity: object, executor: object, run_task: RunTask) -> Source | N
     """
     match entity:
         case Subscription():
-            return SubscriptionSource(entity, entity.callback)
+            return SubscriptionSource(entity, _with_message_alone(entity.callback))
         case Service():
             return ServiceSource(entity, answer_with_own_callback(entity, run_task))
         case Client():
@@ -268,6 +264,14 @@ def source_of(entity: object, executor: object, run_task: RunTask) -> Source | N
         case EventHandler():
             return EventSource(entity)
     return None
+
+
+def _with_message_alone(callback: Callable[[Any], object]) -> Callable[[Taken], object]:
+    @wraps(callback)  # for the name
+    def call(taken: Taken) -> object:
+        return callback(taken[0])
+
+    return call
 
 
 def comes_by_itself(entity: object) -> bool:

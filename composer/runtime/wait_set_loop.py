@@ -18,7 +18,7 @@ from rclpy.subscription import Subscription
 
 from composer.runtime import actions
 from composer.runtime.handover import Handover
-from composer.runtime.loop import ExceptionHandler, Reply
+from composer.runtime.loop import ExceptionHandler, Reply, Taken
 from composer.runtime.sources import ServiceSource, SubscriptionSource
 from composer.runtime.stacks import where
 from composer.runtime.tasks import Future, Task, name_of
@@ -74,8 +74,10 @@ class WaitSetLoop:
         node.executor = None
         self._executor.wake()
 
-    def add_subscription(self, subscription: Subscription, callback: Callable[[Any], None]) -> None:
-        """Call ``callback(message)`` for each message."""
+    def add_subscription(
+        self, subscription: Subscription, callback: Callable[[Taken], None]
+    ) -> None:
+        """Call ``callback((message, information))`` for each message."""
         self._executor.serve(subscription, SubscriptionSource(subscription, callback))
 
     def add_service(self, service: Service, callback: Callable[[Any, Reply], None]) -> None:

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from rclpy.lifecycle import LifecycleNode
 
 from composer.model import Executor, ExecutorKind
 from composer.runtime.executors import make_loop
-from composer.runtime.loop import Loop
+from composer.runtime.loop import Loop, Taken
 from composer.source import Located, SourceFile, Span
 
 PEER = Path(__file__).with_name("loop_peer.py")
@@ -51,7 +52,12 @@ class Bench:
     def subscribe(self, kind: Any, topic: str, callback: Callable[[Any], None], **qos: Any) -> Any:
         profile = rclpy.qos.QoSProfile(**{"depth": 10, **qos})
         subscription = self.node.create_subscription(kind, topic, callback, profile)
-        self.loop.add_subscription(subscription, callback)
+
+        @wraps(callback)
+        def call(taken: Taken) -> None:
+            callback(taken[0])
+
+        self.loop.add_subscription(subscription, call)
         return subscription
 
     def serve(self, kind: Any, name: str, callback: Callable[[Any, Any], None]) -> Any:

@@ -75,7 +75,7 @@ def _publish_before_adding(on: Bench) -> list[int]:
     wait_until(publisher.get_subscription_count)
     for number in range(3):
         publisher.publish(Int64(data=number))
-    on.loop.add_subscription(subscription, lambda message: arrived.append(message.data))
+    on.loop.add_subscription(subscription, lambda taken: arrived.append(taken[0].data))
     return arrived
 
 

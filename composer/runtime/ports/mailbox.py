@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from composer.model import Port
 from composer.runtime.core import Core
+from composer.runtime.loop import Taken
 from composer.runtime.ports.callback import Callback
 from composer.runtime.ports.queue import Queue, queue_of
 from composer.runtime.statistics import CallbackStatistics
@@ -99,8 +100,9 @@ class Mailbox(Callback):
             messages.append(message)
             self._loop.call_soon(turn)
 
-    def receive(self, message: Any) -> None:
+    def receive(self, taken: Taken) -> None:
         """Have the message worked on, at once where nothing waits. To be called on the loop."""
+        message, _ = taken
         if not self._gate.incoming:
             self._keeper.hold(message)
         elif self._messages or self._is_awaiting:

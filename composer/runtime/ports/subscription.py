@@ -93,7 +93,7 @@ class SubscriptionPort:
         while self._latched:
             came_s, message = self._latched.popleft()
             if came_s >= since_s:
-                self._mailbox.receive(message)
+                self._mailbox.put(message)
 
     def deactivate(self) -> None:
         """Let go of what waits."""
