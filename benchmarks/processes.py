@@ -16,6 +16,7 @@ from typing import Any
 
 ROOT = Path(__file__).parents[1]
 RESULT_MARK = "RESULT "  # begins the one line of a program's output that is its result
+BEGUN_LINE = "BEGUN"  # of a program that will be told when to end: what counts begins
 _LOWEST_DOMAIN_ID, _DOMAIN_IDS = 30, 70  # above 101 the ports may meet those that Linux gives out
 
 _domain_ids = itertools.cycle(
@@ -65,7 +66,7 @@ def wall_time_s(*arguments: str, folder: Path) -> float:
 def started(name: str, *arguments: str, variables: Mapping[str, str]) -> Iterator[None]:
     """Let ``benchmarks.programs.<name>`` run for the length of the block."""
     with subprocess.Popen(
-        _command(name, *arguments),
+        command(name, *arguments),
         cwd=ROOT,
         env=variables,
         stdout=subprocess.DEVNULL,
@@ -90,7 +91,7 @@ def run_program(
     """
     try:
         done = subprocess.run(
-            _command(name, *arguments, python=python),
+            command(name, *arguments, python=python),
             cwd=ROOT,
             env=environment() if variables is None else variables,
             capture_output=True,
@@ -100,13 +101,24 @@ def run_program(
         )
     except subprocess.TimeoutExpired as error:
         raise ProgramFailed(f"no result within {timeout_s:g} s") from error
-    for line in done.stdout.splitlines():
+    return result_in(done.stdout, done.stderr, done.returncode)
+
+
+def result_in(output: str, errors: str, exit_code: int) -> dict[str, Any]:
+    """Return the result that a program printed. Raises ProgramFailed when there is none."""
+    for line in output.splitlines():
         if line.startswith(RESULT_MARK):
             result: dict[str, Any] = json.loads(line.removeprefix(RESULT_MARK))
             return result
-    last = (done.stderr.strip().splitlines() or ["nothing on stderr"])[-1]
-    raise ProgramFailed(f"exit code {done.returncode}: {last}")
+    raise no_result(errors, exit_code)
 
 
-def _command(name: str, *arguments: str, python: str = sys.executable) -> list[str]:
+def no_result(errors: str, exit_code: int) -> ProgramFailed:
+    """Return what to raise for a program that has ended without a result."""
+    last = (errors.strip().splitlines() or ["nothing on stderr"])[-1]
+    return ProgramFailed(f"exit code {exit_code}: {last}")
+
+
+def command(name: str, *arguments: str, python: str = sys.executable) -> list[str]:
+    """Return the command line of ``benchmarks.programs.<name>``."""
     return [python, "-m", f"benchmarks.programs.{name}", *arguments]

@@ -18,6 +18,7 @@ from benchmarks.turns import (
     Case,
     Figure,
     rows,
+    take_short_turns,
     take_turns,
 )
 
@@ -136,20 +137,20 @@ def calls(*, long: bool) -> list[Row]:
 
 def outside(*, long: bool) -> list[Row]:
     """Measure messages between two processes, one in flight: the CPU of one of them."""
-    rounds, seconds = (9, 3.0) if long else (5, 1.0)
+    rounds, seconds = (9, 3.0) if long else (5, 2.0)
     ways = (COMPOSED, SINGLE, EVENTS, BARE) if long else (COMPOSED, EVENTS, BARE)
     case = Case("ring", 2, seconds, rounds, apart=True)
     with on_one_processor():
-        near = take_turns(ways, case)
-    far = take_turns(ways, case)
+        near = take_short_turns(ways, case)
+    far = take_short_turns(ways, case)
     found = rows("DDS to another process, one processor", CPU, near, cpu_us)
     return found + rows("DDS to another process, all processors", CPU, far, cpu_us)
 
 
 def tracing(*, long: bool) -> list[Row]:
     """Measure what it costs to take the times of callbacks."""
-    rounds, seconds = (9, 2.0) if long else (5, 0.6)
-    turns = take_turns((COMPOSED, UNTRACED), Case("ring", 10, seconds, rounds))
+    rounds, seconds = (15, 2.0) if long else (9, 1.0)
+    turns = take_short_turns((COMPOSED, UNTRACED), Case("ring", 10, seconds, rounds))
     return rows("ring, N=10", CPU, turns, cpu_us)
 
 

@@ -17,7 +17,8 @@ class Task:
     node sends at ``rate_hz``, and the others pass it on or hear it; in a *hop* the second node
     alone hears it; a *timer* ticks in the first node; the first node asks the second by *service*
     or *action*. What has no part in it is there and idle. ``part`` is the index of
-    the one node of a ring that this process has, when the others are other processes.
+    the one node of a ring that this process has, when the others are other processes. ``seconds``
+    do not count when it is to last until a line comes on standard input.
     """
 
     executor: str
@@ -28,6 +29,7 @@ class Task:
     message: str
     part: int | None
     tracing: bool
+    until_told: bool = False
 
     @property
     def is_timed(self) -> bool:
@@ -82,5 +84,6 @@ def task_from_arguments() -> Task:
     parser.add_argument("--message", default="String")
     parser.add_argument("--part", type=int)
     parser.add_argument("--no-tracing", dest="tracing", action="store_false")
+    parser.add_argument("--until-told", action="store_true")
     given = vars(parser.parse_args())
     return Task(**{field.name: given[field.name] for field in fields(Task)})

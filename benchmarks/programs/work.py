@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.processes import RESULT_MARK
+from benchmarks.processes import BEGUN_LINE, RESULT_MARK
 from benchmarks.programs.task import Task
 
 KICK_PERIOD_S = 0.2
@@ -69,7 +69,7 @@ def measure(
     time.sleep(WARM_UP_S)  # caches are cold, and the first messages wait for each other
     delivered, ticks, took = COUNTS.delivered, len(COUNTS.ticks_ns), len(COUNTS.took_ns)
     cpu_s, wall_s = time.process_time(), time.perf_counter()
-    time.sleep(task.seconds)
+    _wait_for_the_end(task)
     figures["cpu_s"] = time.process_time() - cpu_s
     figures["wall_s"] = time.perf_counter() - wall_s
     figures["delivered"] = COUNTS.delivered - delivered
@@ -83,6 +83,14 @@ def hand_over(figures: dict[str, Any]) -> None:
     print(RESULT_MARK + json.dumps(figures), flush=True)
     sys.stderr.flush()
     os._exit(0)
+
+
+def _wait_for_the_end(task: Task) -> None:
+    if task.until_told:
+        print(BEGUN_LINE, flush=True)
+        sys.stdin.readline()
+    else:
+        time.sleep(task.seconds)
 
 
 def _wait_for_work(kick: Callable[[], None], patience_s: float) -> None:
