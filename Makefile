@@ -41,9 +41,10 @@ run: $(STAMPS)/composer $(STAMPS)/interfaces
 	@exec $(PYTHON) tools/run_in_foreground.py $(BIN)/compose run $(SYSTEM)
 
 # Two at a time: tests on ROS wait more than they work. A file stays together, with what it shares.
+# Where one of the two dies that is the end: xdist would wait for ever for what it had to do.
 test: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks
 	@echo "==> pytest"
-	@$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+	@$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --max-worker-restart 0
 
 # What shows only after hundreds of starts, ends and transitions.
 soak: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks

@@ -20,6 +20,7 @@ from hypothesis import HealthCheck, settings
 from composer.runtime.participants import participants_here
 
 TESTS_WITH_ROS = Path(__file__).parent / "ros"
+PROFILE_OF_FAST_DDS = Path(__file__).with_name("udp_on_this_computer.xml")
 NO_ROS = "rclpy cannot be imported"
 # Domain 0 is where people's robots are; above 101 the ports meet Linux' ephemeral ones.
 DOMAIN_IDS = range(1, 102)
@@ -71,6 +72,12 @@ def pytest_pycollect_makemodule(
     return None
 
 
+def pytest_collection_finish() -> None:
+    """Have the garbage collector look no more at thousands of tests and what they import."""
+    gc.collect()
+    gc.freeze()
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if not config.getoption("--soak"):
         _leave_out(config, items, "soak")
@@ -96,8 +103,8 @@ _visited: set[int] = set()
 def pytest_runtest_logfinish() -> None:
     """Have what a test has left in cycles of references leave the ROS graph, and free its sockets.
 
-    A lifecycle node of rclpy is one, with its participant. This is the first moment at which nobody
-    holds what the fixtures have made.
+    A lifecycle node of rclpy is one, with its participant; so is whatever an exception was raised
+    in. This is the first moment at which nobody holds what the fixtures have made.
     """
     if any(participants_here(domain_id) for domain_id in _visited):
         gc.collect()
@@ -150,14 +157,17 @@ def _environment_given_back() -> Iterator[None]:
 def _domain() -> Iterator[int]:
     """Have a domain id, set for this process and for every process it starts.
 
-    What a host of this process chooses meanwhile, such as a profile of Fast DDS, goes with it.
+    Nobody on another computer is met, and there is no shared memory. What a host of this process
+    chooses meanwhile goes with the domain.
     """
     domain_id, lock = _hold_domain_id()
     with _environment_given_back(), pytest.MonkeyPatch.context() as environment, lock:
         environment.setenv("ROS_DOMAIN_ID", str(domain_id))
-        environment.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        # Shared memory outlives killed processes: the next ones stumble over it, and say so.
-        environment.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+        # Shared memory is that of all domains, and outlives killed processes. A participant that
+        # is destroyed right after one was killed may crash there, or wait for ever: Fast DDS locks
+        # what its own listener is about to replace (SharedMemManager::Listener::close).
+        environment.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(PROFILE_OF_FAST_DDS))
+        environment.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SYSTEM_DEFAULT")
         if "AMENT_PREFIX_PATH" not in os.environ:  # the wheels do not set it, a sourced ROS does
             environment.setenv("AMENT_PREFIX_PATH", sys.prefix)
         yield domain_id

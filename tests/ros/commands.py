@@ -12,7 +12,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-COMPOSE = [sys.executable, "-m", "composer"]
+#: Python, with the settings of Fast DDS that people have who choose nothing: those of the tests are
+#: gone, and with that the composer chooses its own.
+PYTHON = (
+    *("env", "-u", "FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"),
+    sys.executable,
+)
+COMPOSE = (*PYTHON, "-m", "composer")
 PATIENCE_S = 30.0
 
 

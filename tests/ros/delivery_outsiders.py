@@ -19,22 +19,11 @@ ROOT = Path(__file__).parents[2]
 STREAM, CONTROL = TOPICS = ("/stream", "/control")
 
 #: Who is killed is missed after 3 s, and not after 20 s.
-PROFILES_OF_FAST_DDS = """<?xml version="1.0" encoding="UTF-8"?>
-<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
-  <profiles>
-    <participant profile_name="outsider" is_default_profile="true">
-      <rtps>
-        <builtin>
+SOON_MISSED = """<builtin>
           <discovery_config>
             <leaseDuration><sec>3</sec></leaseDuration>
             <leaseAnnouncement><sec>0</sec><nanosec>300000000</nanosec></leaseAnnouncement>
-          </discovery_config>
-        </builtin>
-      </rtps>
-    </participant>
-  </profiles>
-</dds>
-"""
+          </discovery_config>"""
 
 
 class Outsider:
@@ -44,8 +33,10 @@ class Outsider:
     """
 
     def __init__(self, what: str, profile: tuple[str, int], writer: int, folder: Path) -> None:
+        profile_of_tests = Path(os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"])
         profiles = folder / "outsider.xml"
-        profiles.write_text(PROFILES_OF_FAST_DDS, encoding="utf-8")
+        text = profile_of_tests.read_text(encoding="utf-8").replace("<builtin>", SOON_MISSED)
+        profiles.write_text(text, encoding="utf-8")
         self._process = subprocess.Popen(
             [sys.executable, "-m", PEER, what, *map(str, (*profile, writer, *TOPICS))],
             stdin=subprocess.PIPE,

@@ -14,7 +14,7 @@ from typing import Any
 import rclpy
 from action_msgs.msg import GoalStatus
 from composer_interfaces.action import Navigate
-from lifecycle_msgs.srv import GetState
+from rcl_interfaces.srv import GetParameters
 from rclpy.action import ActionClient, ActionServer
 from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.node import Node
@@ -37,15 +37,15 @@ def wait_until_known(node: Node) -> None:
     Servers are found at once, but lose answers and feedback for whom they have not met. What a
     participant has is announced in order, so who answers a client made last has met all before.
     """
-    client = node.create_client(GetState, "bench/get_state")
+    client = node.create_client(GetParameters, "bench/get_parameters")
     assert client.wait_for_service(PATIENCE_S)
     until = time.monotonic() + PATIENCE_S
-    answer = client.call_async(GetState.Request())
+    answer = client.call_async(GetParameters.Request())
     while not answer.done():
         assert time.monotonic() < until, "never met"
         rclpy.spin_until_future_complete(node, answer, timeout_sec=1.0)
         if not answer.done():
-            answer = client.call_async(GetState.Request())
+            answer = client.call_async(GetParameters.Request())
 
 
 def flood(node: Node, topic: str, count: str, depth: str) -> object:

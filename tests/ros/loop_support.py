@@ -15,12 +15,13 @@ from typing import Any
 
 import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.lifecycle import LifecycleNode
+from rclpy.node import Node
 
 from composer.model import Executor, ExecutorKind
 from composer.runtime.executors import make_loop
 from composer.runtime.loop import Loop, Taken
 from composer.source import Located, SourceFile, Span
+from tests.ros.leaving import leave
 
 PEER = Path(__file__).with_name("loop_peer.py")
 PATIENCE_S = 20.0
@@ -40,7 +41,7 @@ class Bench:
     """A running loop, a node of it, and what was reported."""
 
     loop: Loop
-    node: LifecycleNode
+    node: Node
     reports: list[tuple[str, BaseException]]
 
     def errors(self) -> list[type[BaseException]]:
@@ -84,7 +85,7 @@ def bench(kind: ExecutorKind, name: str = "bench") -> Iterator[Bench]:
     try:
         reports: list[tuple[str, BaseException]] = []
         loop = make_loop(executor_of(kind), lambda *report: reports.append(report))
-        node = LifecycleNode(name, enable_logger_service=True)
+        node = Node(name, enable_logger_service=True)
         loop.add_node(node)
         loop.start()
         try:
@@ -92,7 +93,7 @@ def bench(kind: ExecutorKind, name: str = "bench") -> Iterator[Bench]:
         finally:
             loop.remove_node(node)
             stopped = loop.stop(5.0)
-            node.destroy_node()
+            leave(node)
         assert stopped, "the loop did not stop"
     finally:
         rclpy.shutdown()

@@ -33,6 +33,7 @@ from composer.runtime.events import BroughtUp, Event, Logged, NodeSummary, Outco
 from composer.runtime.host import Host, HostOptions
 from composer.runtime.node import RunningNode
 from composer.runtime.shared_memory import remove_half_made_ports
+from tests.ros.leaving import leave
 
 PATIENCE_S = 20.0
 _ENDS_WITHIN_S = 6.0
@@ -195,7 +196,7 @@ class Peer:
         self._executor.shutdown()
         self.context.try_shutdown()
         self._thread.join(PATIENCE_S)
-        self.node.destroy_node()
+        leave(self.node)
 
     def join(self, name: str) -> Node:
         """Return one more node of the same participant."""

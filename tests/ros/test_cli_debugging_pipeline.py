@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 import yaml
 
-from tests.ros.commands import PATIENCE_S, running, said
+from tests.ros.commands import PATIENCE_S, listed, running, said
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -49,13 +49,11 @@ def test_every_command_that_looks_answers() -> None:
 
 
 def answer(arguments: tuple[str, ...]) -> str:
-    """Ask again for what is listed: on a busy machine discovery outlasts a command."""
-    until_s = time.monotonic() + PATIENCE_S
-    lists = "list" in arguments or "info" in arguments
-    while True:
-        text = said(*arguments)
-        if not lists or ANSWERS[arguments] in text or time.monotonic() > until_s:
-            return text
+    """Ask, and ask again for what is listed: on a busy machine discovery outlasts a command."""
+    patient = (*arguments, "--timeout", "20")
+    if "list" not in arguments and "info" not in arguments:
+        return said(*patient)
+    return listed((ANSWERS[arguments],), *patient)
 
 
 def test_a_goal_is_reached() -> None:

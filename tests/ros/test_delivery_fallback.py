@@ -6,7 +6,6 @@ import ctypes
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +15,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Int64
 
 from composer.runtime.delivery.own_publications import _Options, _Subscription
+from tests.ros.commands import COMPOSE
 from tests.ros.sequences import Sequences
 from tests.ros.system_bench import Peer, wait_until
 from tests.ros.systems.running import RunningSystem
@@ -173,7 +173,7 @@ def test_every_message_comes_once_whatever_the_middleware_returns(
 @pytest.mark.parametrize("middleware", [None, *REASONS])
 def test_the_doctor_tells_beforehand(middleware: str | None, tmp_path: Path) -> None:
     with in_front_of_rmw(middleware, tmp_path):
-        command = [sys.executable, "-m", "composer", "doctor", "--json"]
+        command = [*COMPOSE, "doctor", "--json"]
         done = subprocess.run(command, capture_output=True, check=False, text=True, timeout=30.0)
     (found,) = [item for item in json.loads(done.stdout) if item["area"] == "delivery"]
     if middleware is None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import signal
 import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
@@ -15,6 +14,7 @@ import yaml
 from std_srvs.srv import Trigger
 
 from composer.runtime.shared_memory import SHARED_MEMORY
+from tests.ros.commands import COMPOSE
 from tests.ros.system_bench import PATIENCE_S, Peer, running, wait_until
 
 NODES = 24
@@ -57,7 +57,7 @@ def test_a_large_system_is_gone_for_others_as_soon_as_it_ends(tmp_path: Path, pe
 def is_gone_at_once(path: Path, peer: Peer) -> bool:
     """Run the system, end it, and say whether the peer heard of that before it had to miss it."""
     before = set(SHARED_MEMORY.iterdir())
-    command = [sys.executable, "-m", "composer", "run", str(path)]
+    command = [*COMPOSE, "run", str(path)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         said = []

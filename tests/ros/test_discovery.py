@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 import time
 
 from std_msgs.msg import Empty
 
 from composer.runtime.participants import participants_here
+from tests.ros.commands import PYTHON
 from tests.ros.system_bench import Peer, wait_until
 
 #: Who is not met at once is met 1 to 3 s later; without the profile that is every second one. So
@@ -61,7 +61,7 @@ def test_a_process_that_joins_is_met_at_once_with_all_its_topics(peer: Peer) -> 
     for topic in TOPICS:
         peer.node.create_publisher(Empty, topic, 1)
     done = subprocess.run(
-        [sys.executable, "-c", JOIN], check=True, capture_output=True, text=True, timeout=50.0
+        [*PYTHON, "-c", JOIN], check=True, capture_output=True, text=True, timeout=50.0
     )
     assert "XML" not in done.stderr + done.stdout  # Fast DDS says so if it cannot read the profile
     took_s, missing = json.loads(done.stdout.splitlines()[-1])
@@ -85,7 +85,7 @@ def test_a_command_meets_others_without_shared_memory_and_stays_on_this_computer
     peer: Peer,
 ) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", LOOK], check=True, capture_output=True, text=True, timeout=50.0
+        [*PYTHON, "-c", LOOK], check=True, capture_output=True, text=True, timeout=50.0
     )
     others, ports, shared = json.loads(done.stdout.splitlines()[-1])
     assert [peer.node.get_name(), peer.node.get_namespace()] in others
@@ -101,7 +101,7 @@ def test_a_command_is_soon_forgotten(peer: Peer) -> None:
 
     before = participants()
     for _ in range(3):  # most of their goodbyes are lost
-        subprocess.run([sys.executable, "-c", LOOK], check=True, capture_output=True, timeout=50.0)
+        subprocess.run([*PYTHON, "-c", LOOK], check=True, capture_output=True, timeout=50.0)
     ended_s = time.monotonic()
     wait_until(lambda: participants() <= before, "they are gone")
     assert time.monotonic() - ended_s < FORGOTTEN_WITHIN_S

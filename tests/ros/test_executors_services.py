@@ -13,6 +13,7 @@ from builtin_interfaces.msg import Time
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetLoggerLevels, SetParameters
+from rclpy.lifecycle import LifecycleNode
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from type_description_interfaces.srv import GetTypeDescription
@@ -180,24 +181,37 @@ def test_a_hundred_calls_at_once_are_all_answered(on: Bench) -> None:
     assert outcome.result() == 100
 
 
-class TestWhatEveryNodeBringsAlong:
+@pytest.fixture
+def managed(on: Bench) -> Iterator[None]:
+    """A lifecycle node of rclpy, ``/managed``, on the same loop."""
+    node = LifecycleNode("managed")
+    on.loop.add_node(node)
+    yield
+    on.loop.remove_node(node)
+    node.destroy_node()
+
+
+@pytest.mark.usefixtures("managed")
+class TestWhatALifecycleNodeBringsAlong:
     def test_lifecycle_services_answer(self, on: Bench) -> None:
-        client = on.client(GetState, "bench/get_state")
+        client = on.client(GetState, "managed/get_state")
         assert call(on, client, GetState.Request()).current_state.label == "unconfigured"
 
     @pytest.mark.parametrize("transition_id", [3, 250])
     def test_an_illegal_transition_is_refused_and_ends_nothing(
         self, on: Bench, transition_id: int
     ) -> None:
-        client = on.client(ChangeState, "bench/change_state")
+        client = on.client(ChangeState, "managed/change_state")
         request = ChangeState.Request()
         request.transition.id = transition_id
         assert not call(on, client, request).success
         wait_until(lambda: on.reports)  # on several threads the answer may be faster
         assert len(on.reports) == 1
-        state = call(on, on.client(GetState, "bench/get_state"), GetState.Request())
+        state = call(on, on.client(GetState, "managed/get_state"), GetState.Request())
         assert state.current_state.label == "unconfigured"
 
+
+class TestWhatEveryNodeBringsAlong:
     def test_parameters_can_be_set(self, on: Bench) -> None:
         on.node.declare_parameter("speed", 1.0)
         client = on.client(SetParameters, "bench/set_parameters")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 
+from tests.ros.commands import PYTHON
 from tests.ros.loop_support import peer
 
 MESSAGES = 4000
@@ -45,7 +45,7 @@ os._exit(0)
 def test_no_thread_wakes_after_each_message() -> None:
     with peer("collect", "/texts", 10 * MESSAGES):
         done = subprocess.run(
-            [sys.executable, "-c", PUBLISH, "/texts"],
+            [*PYTHON, "-c", PUBLISH, "/texts"],
             check=True,
             capture_output=True,
             text=True,

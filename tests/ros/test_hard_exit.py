@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from textwrap import dedent
 
 import pytest
 
-COMPOSE = [sys.executable, "-m", "composer"]
+from tests.ros.commands import COMPOSE
+
 PATIENCE_S = 30.0
 #: rcl's functions, and those that never return when a variable names them: they hold the GIL then.
 HANGING_RCL = """

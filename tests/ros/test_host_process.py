@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -16,9 +15,9 @@ import pytest
 
 from composer.resources import systems_folder
 from composer.runtime.shared_memory import SHARED_MEMORY
+from tests.ros.commands import COMPOSE
 from tests.ros.system_bench import end_limit_s
 
-COMPOSE = [sys.executable, "-m", "composer"]
 PATIENCE_S = 20.0
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any
@@ -28,6 +27,7 @@ from composer.runtime.control import Control, TransitionRefused
 from composer.runtime.inspect_parameters import ParameterRefused, Parameters, names_by_node
 from composer.runtime.session import Deadline, Session
 from composer.runtime.snapshot import Observer
+from tests.ros.commands import COMPOSE
 from tests.ros.system_bench import Peer, RunningSystem, running, wait_until
 
 LEAN = """
@@ -203,7 +203,7 @@ def test_a_whole_node_has_what_any_lifecycle_node_has_and_nothing_twice(
 
 def test_nobody_has_to_know_whom_a_command_asks(system: RunningSystem) -> None:
     def said(*arguments: str) -> str:
-        command = [sys.executable, "-m", "composer", *arguments]
+        command = [*COMPOSE, *arguments]
         done = subprocess.run(command, capture_output=True, check=False, text=True, timeout=30.0)
         assert done.returncode == 0, done.stderr
         return done.stdout

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Int64, String
 
 from composer.model import ExecutorKind
+from tests.ros.commands import COMPOSE
 from tests.ros.system_bench import Peer, RunningSystem, running, wait_until
 
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -137,7 +137,7 @@ def test_ps_tells_the_counts(tmp_path: Path, peer: Peer) -> None:
         system.wait_for_log("subscription 'input'")
         wait_until(lambda: "incompatible=1" in qos_events_of(told))
         listed = subprocess.run(
-            [sys.executable, "-m", "composer", "ps", "ends", "--json", "--timeout", "20"],
+            [*COMPOSE, "ps", "ends", "--json", "--timeout", "20"],
             check=True,
             capture_output=True,
             text=True,

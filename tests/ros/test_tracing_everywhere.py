@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import re
 import subprocess
-import sys
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
+from tests.ros.commands import COMPOSE
 from tests.ros.system_bench import Peer, wait_until
 from tests.ros.systems.running import RunningSystem
 
@@ -61,7 +61,7 @@ ENOUGH = 25
 
 def compose(*arguments: str) -> dict[str, Any]:
     """Return the last line that a command prints, which is JSON."""
-    command = [sys.executable, "-m", "composer", *arguments, "--timeout", "20"]
+    command = [*COMPOSE, *arguments, "--timeout", "20"]
     done = subprocess.run(command, capture_output=True, check=True, text=True, timeout=40.0)
     found: dict[str, Any] = json.loads(done.stdout)
     return found

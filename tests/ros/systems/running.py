@@ -6,7 +6,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -20,11 +19,12 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from tests.ros.commands import COMPOSE
+
 T = TypeVar("T")
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 PATIENCE_S = 20.0
-COMPOSE = (sys.executable, "-m", "composer")
 
 
 class RunningSystem:
