@@ -49,7 +49,7 @@ test: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks
 # What shows only after hundreds of starts, ends and transitions.
 soak: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks
 	@echo "==> pytest -m soak (ten minutes)"
-	@$(BIN)/python -m pytest --soak -m soak
+	@$(BIN)/python -m pytest --soak -m soak --override-ini faulthandler_timeout=1860
 
 check: lint test
 

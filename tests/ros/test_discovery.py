@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import time
+from pathlib import Path
 
 from std_msgs.msg import Empty
 
@@ -55,6 +56,12 @@ with Session() as session:
     shared = re.findall("/dev/shm/fast.*", Path("/proc/self/maps").read_text())
     print(json.dumps([session.others(), ports, shared]))
 """
+
+
+def test_the_nodes_of_tests_keep_out_of_shared_memory(peer: Peer) -> None:
+    """Beside a process that was killed they would crash or hang now and then when destroyed."""
+    assert peer.node.get_node_names()
+    assert "/dev/shm/fast" not in Path("/proc/self/maps").read_text(encoding="utf-8")
 
 
 def test_a_process_that_joins_is_met_at_once_with_all_its_topics(peer: Peer) -> None:
