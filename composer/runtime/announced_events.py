@@ -6,6 +6,10 @@ those of missed deadlines of 2 ms froze in ``take_event`` within two seconds, wi
 interpreter held: rmw keeps the status that it has announced, and hands that out under a lock of its
 own; with that lock held it asks the reader where there is none, whose lock is held by who announces
 the next one and waits for rmw's. So a status is taken only where one is there for certain.
+
+To begin to watch is no better: rmw asks for the status with its lock held. It is safe as long as
+nothing else that is watched happens to the endpoint in that instant. So all of it is watched as
+soon as the endpoint is made, first what happens rarely, last what may happen all the time.
 """
 
 from __future__ import annotations

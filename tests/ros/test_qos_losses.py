@@ -123,6 +123,15 @@ def test_what_happens_all_the_time_freezes_nothing(tmp_path: Path) -> None:
         wait_until(lambda: counts(system)["liveliness_changed"] > before + 20)
 
 
+def test_nothing_is_watched_later_than_from_the_start(tmp_path: Path) -> None:
+    # To begin to watch asks for a status, too. rclpy's handlers were watched once their node's loop
+    # had found them, when messages could be lost already: once in hundreds of runs it froze.
+    with running(RESTLESS, tmp_path) as system:
+        subscriptions = list(system.node("listener")._core.node.subscriptions)
+        assert [ends.topic_name for ends in subscriptions] == ["/big", "/alive"]
+        assert [ends.event_handlers for ends in subscriptions] == [[], []]
+
+
 def test_statuses_taken_all_the_time_freeze_nothing(peer: Peer) -> None:
     # To ask for a status that is not there waits for who announces the next, and he for that: it
     # froze within two seconds.

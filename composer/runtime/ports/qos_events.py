@@ -28,7 +28,8 @@ from composer.runtime.topic_ends import topic_info
 
 _PUBLISHER = QoSPublisherEventType
 _SUBSCRIPTION = QoSSubscriptionEventType
-_KINDS = {
+#: Ends that do not fit, which are found when they meet.
+_MISFITS = {
     PortKind.PUBLISHER: (
         _PUBLISHER.RCL_PUBLISHER_OFFERED_INCOMPATIBLE_QOS,
         _PUBLISHER.RCL_PUBLISHER_INCOMPATIBLE_TYPE,
@@ -56,11 +57,11 @@ class _Event:
 class QosEvents:
     """What rclpy makes the event handlers of one port with: its ``event_callbacks``.
 
-    They are the same ones as rclpy itself makes. Deadlines and the own liveliness are counted as
-    they are announced (:mod:`composer.runtime.announced_events`); of lost messages and of the
-    liveliness of others the status is taken, which tells how many, and loss from return. That a
-    publisher has matched is for delivery to know (:class:`~composer.runtime.marks.MatchEvent`): rmw
-    tells one callback of each kind of event.
+    There are none: ends that do not fit, deadlines and the own liveliness are counted as they are
+    announced (:mod:`composer.runtime.announced_events`); of lost messages and of the liveliness of
+    others the status is taken, which tells how many, and loss from return. That a publisher has
+    matched is for delivery to know (:class:`~composer.runtime.marks.MatchEvent`): rmw tells one
+    callback of each kind of event.
 
     What goes on with a port of a node that is not active is nobody's concern: it is to be silent.
     """
@@ -73,25 +74,17 @@ class QosEvents:
         self._ends: list[Callable[[], None]] = []
 
     def create_event_handlers(
-        self, callback_group: CallbackGroup, endpoint: Any, _topic_name: str
+        self, _callback_group: CallbackGroup, endpoint: Any, _topic_name: str
     ) -> list[EventHandler]:
-        """Return handlers of what the middleware has, and begin to count what is announced."""
+        """Begin to count what is announced, of what the middleware has; lost messages last."""
+        for kind in _MISFITS[self._port.kind]:
+            with suppress(UnsupportedEventTypeError):
+                self._watch_misfits(endpoint, kind)
         is_publisher = self._port.kind is PortKind.PUBLISHER
         for event in self._of_publisher() if is_publisher else self._of_subscription():
             with suppress(UnsupportedEventTypeError):
                 self._watch(endpoint, event)
-        handlers = []
-        for kind in _KINDS[self._port.kind]:
-            with suppress(UnsupportedEventTypeError):
-                handlers.append(
-                    EventHandler(
-                        callback_group=callback_group,
-                        callback=self._take_misfit,
-                        event_type=kind,
-                        parent_impl=endpoint,
-                    )
-                )
-        return handlers
+        return []
 
     def close(self) -> None:
         """Tell nothing more. To be called before the endpoint is destroyed."""
@@ -140,6 +133,11 @@ class QosEvents:
             lambda status: status.total_count_change,
         )
 
+    def _watch_misfits(self, endpoint: Any, kind: IntEnum) -> None:
+        loop = self._core.loop
+        end = self._core.events.watch(endpoint, kind, lambda: loop.call_soon(self._take_misfit))
+        self._ends.append(end)
+
     def _watch(self, endpoint: Any, event: _Event) -> None:
         core, name = self._core, f"{self._port.kind} '{self._port.name}' on {self._port.full_name}"
 
@@ -169,6 +167,6 @@ class QosEvents:
         names = sorted({publisher.name for publisher in info.publishers})
         return f"; it is published by {', '.join(names)}" if names else "; nobody publishes it"
 
-    def _take_misfit(self, _: Any) -> None:
+    def _take_misfit(self) -> None:
         self._core.statistics.qos_events["incompatible"] += 1
         self._misfits.look()
