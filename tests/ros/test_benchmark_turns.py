@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -19,13 +20,17 @@ pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(60)]
 
 
 def states_of_children() -> dict[int, str]:
-    """Return the scheduler's state of each process that this one has started and that is there."""
-    tasks = Path("/proc/self/task").iterdir()
-    ids = [int(word) for task in tasks for word in (task / "children").read_text().split()]
-    return {
-        process: Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
-        for process in ids
-    }
+    """Return the scheduler's state of each process that this one has started and that is there.
+
+    See proc_pid_stat(5); any process may end between two looks.
+    """
+    states = {}
+    for file in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(FileNotFoundError, ProcessLookupError):
+            state, parent = file.read_text().rpartition(")")[2].split()[:2]
+            if int(parent) == os.getpid():
+                states[int(file.parent.name)] = state
+    return states
 
 
 def test_programs_work_in_their_turns_alone() -> None:
