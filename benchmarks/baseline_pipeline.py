@@ -99,7 +99,7 @@ class Planner(Node):
         self, request: PlanTrajectory.Request, response: PlanTrajectory.Response
     ) -> PlanTrajectory.Response:
         if self.odometry is None:
-            response.message = "no odometry yet: the frame of the path is not known"
+            response.message = "no odometry received yet: the frame of the path is unknown"
             return response
         response.path = self.path(request, self.odometry.header.frame_id)
         response.success = True

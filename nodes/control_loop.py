@@ -1,4 +1,4 @@
-"""A control cycle that is never run twice at once."""
+"""A control loop whose cycles never overlap."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from composer.behavior import Behavior
 
 
 class ControlLoop(Behavior):
-    """Publishes the name of its thread in every cycle: always the same one."""
+    """Publish the name of the thread in every cycle: it is always the same."""
 
     def on_cycle(self) -> None:
         """Run one cycle."""

@@ -1,4 +1,4 @@
-"""Work that gains from threads: zlib leaves Python's lock while it compresses."""
+"""Work that benefits from threads: zlib releases the GIL while it compresses."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from composer.behavior import Behavior
 
 
 class FrameProcessor(Behavior):
-    """Compresses a frame each time its timer fires; frames may overlap where threads allow."""
+    """Compress a frame each time the timer fires; callbacks may overlap on several threads."""
 
     def on_configure(self) -> None:
-        """Make a frame that is worth compressing: half noise, half nothing."""
+        """Create a frame that is half noise, half zeros."""
         size = self.parameters.frame_bytes
         self.frame = os.urandom(size // 2) + bytes(size - size // 2)
 

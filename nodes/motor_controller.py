@@ -1,4 +1,4 @@
-"""Follows planned paths in closed loop."""
+"""A closed-loop path follower."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from nav_msgs.msg import Odometry, Path
 
 from composer.behavior import Behavior, CallCancelled, CallError, Goal
 
-ODOMETRY_TIMEOUT_S = 2.0  # a goal may come before the first odometry does
-RETRY_S = 1.0  # pause before a planner that refused is asked again
+ODOMETRY_TIMEOUT_S = 2.0  # a goal may arrive before the first odometry
+RETRY_S = 1.0  # pause before the next request after the planner has refused one
 
 
 class MotorController(Behavior):
-    """Steers the robot to where the path wants it now: the path's velocity plus a correction."""
+    """Track a path: command the velocity of the path plus a position correction."""
 
     def on_activate(self) -> None:
-        """Begin with the first waypoint."""
+        """Start with the first waypoint."""
         self.position: Point | None = None
         self.reference: Reference | None = None
         self.navigating: Goal | None = None
@@ -28,21 +28,21 @@ class MotorController(Behavior):
         self.distance_traveled = 0.0
 
     def on_sensor_data(self, message: Odometry) -> None:
-        """Keep the position and count the way."""
+        """Store the position and add to the distance traveled."""
         position = message.pose.pose.position
         if self.position is not None:
             self.distance_traveled += _distance(self.position, position)
         self.position = position
 
     def on_control(self) -> None:
-        """Send the velocity that keeps the robot on the path; none when there is no path."""
+        """Publish the velocity that keeps the robot on the path, or zero without a path."""
         command = Twist()
         if self.reference is not None and self.position is not None:
             command.linear.x, command.linear.y = self._velocity(self.reference, self.position)
         self.publishers.motor_commands.publish(command)
 
     async def on_plan(self) -> None:
-        """Ask for a path to the next waypoint once the last one is reached."""
+        """Request a path to the next waypoint once the last one is reached."""
         waypoints = self.parameters.waypoints
         if self.navigating is not None or self.position is None or len(waypoints) < 2:
             return
@@ -54,7 +54,7 @@ class MotorController(Behavior):
         goal = Point(x=waypoints[2 * index], y=waypoints[2 * index + 1])
         reference, reason = await self._plan(goal, self.parameters.max_velocity)
         if self.navigating is not None:
-            return  # a goal came while the planner was thinking
+            return  # a goal was accepted while waiting for the planner
         self.reference = reference
         if reference is None:
             self.log.warn(f"no path to ({goal.x:.2f}, {goal.y:.2f}): {reason}")
@@ -63,13 +63,13 @@ class MotorController(Behavior):
             self.log.info(f"driving to ({goal.x:.2f}, {goal.y:.2f}): {reason}")
 
     def accept_navigate(self, request: Navigate.Goal) -> bool:
-        """Take one goal at a time, and only one that can be driven to."""
+        """Accept one goal at a time, if its target is finite and its velocity positive."""
         target = request.target
         finite = all(math.isfinite(value) for value in (target.x, target.y, target.z))
         return self.navigating is None and request.max_velocity > 0.0 and finite
 
     async def on_navigate(self, goal: Goal) -> Navigate.Result:
-        """Drive to the target, telling ten times a second how far along the robot is."""
+        """Drive to the target and publish feedback at 10 Hz."""
         self.navigating = goal
         try:
             return await self._navigate(goal)
@@ -101,7 +101,7 @@ class MotorController(Behavior):
         return Navigate.Result(success=True, message="arrived", distance_traveled=traveled)
 
     async def _plan(self, goal: Point, max_velocity: float) -> tuple[Reference | None, str]:
-        await self._hear_odometry()
+        await self._wait_for_odometry()
         if self.position is None:
             return None, f"no odometry within {ODOMETRY_TIMEOUT_S:g} s"
         limit = min(max_velocity, self.parameters.max_velocity)
@@ -110,23 +110,23 @@ class MotorController(Behavior):
         try:
             response = await self.clients.plan_trajectory.call(request)
         except CallCancelled:
-            raise  # this node is being deactivated: there is nothing left to do
+            raise  # this node is being deactivated
         except CallError as error:
             return None, str(error)
         if not response.success:
             return None, response.message
         return Reference(response.path, limit), response.message
 
-    async def _hear_odometry(self) -> None:
+    async def _wait_for_odometry(self) -> None:
         deadline_s = self.clock.now() + ODOMETRY_TIMEOUT_S
         while self.position is None and self.clock.now() < deadline_s:
             await self.clock.sleep(0.02)
 
     def _velocity(self, reference: Reference, position: Point) -> tuple[float, float]:
-        wanted, velocity_x, velocity_y = reference.at(self.clock.now())
+        target, velocity_x, velocity_y = reference.at(self.clock.now())
         gain = self.parameters.position_gain
-        velocity_x += gain * (wanted.x - position.x)
-        velocity_y += gain * (wanted.y - position.y)
+        velocity_x += gain * (target.x - position.x)
+        velocity_y += gain * (target.y - position.y)
         excess = math.hypot(velocity_x, velocity_y) / reference.max_velocity
         if excess > 1.0:
             velocity_x, velocity_y = velocity_x / excess, velocity_y / excess
@@ -137,7 +137,7 @@ class MotorController(Behavior):
 
 
 class Reference:
-    """Where the robot should be, and how fast, at any time of a planned path."""
+    """The position and velocity that a planned path prescribes at a given time."""
 
     def __init__(self, path: Path, max_velocity: float) -> None:
         self.points = [pose.pose.position for pose in path.poses]
@@ -148,7 +148,7 @@ class Reference:
         self.max_velocity = max_velocity
 
     def at(self, time_s: float) -> tuple[Point, float, float]:
-        """Return the wanted position and velocity (x, y, in m/s) at ``time_s``."""
+        """Return the target position and velocity (x, y, in m/s) at ``time_s``."""
         index = bisect_right(self.times_s, time_s)
         if index == 0:
             return self.points[0], 0.0, 0.0
@@ -158,8 +158,8 @@ class Reference:
         period_s = self.times_s[index] - self.times_s[index - 1]
         share = (time_s - self.times_s[index - 1]) / period_s
         step_x, step_y = after.x - before.x, after.y - before.y
-        wanted = Point(x=before.x + share * step_x, y=before.y + share * step_y)
-        return wanted, step_x / period_s, step_y / period_s
+        target = Point(x=before.x + share * step_x, y=before.y + share * step_y)
+        return target, step_x / period_s, step_y / period_s
 
 
 def _distance(first: Point, second: Point) -> float:

@@ -1,4 +1,4 @@
-"""An action client: goal, feedback, cancel, result, and what may go wrong."""
+"""An action client: goal, feedback, cancel, result and failures."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from composer.behavior import Behavior, CallError, GoalRejected, SentGoal
 
 
 class NavigateClient(Behavior):
-    """Sends one goal after each activation and publishes its outcome."""
+    """Send one goal after each activation and publish its outcome."""
 
     def on_activate(self) -> None:
-        """Nothing is sent yet."""
+        """Prepare to send the goal."""
         self.sent = False
         self.progress_percent = 0.0
 
     async def on_send(self) -> None:
-        """Send the goal and follow it to its end."""
+        """Send the goal once and wait for its outcome."""
         if self.sent:
             return
         self.sent = True
@@ -38,16 +38,16 @@ class NavigateClient(Behavior):
         sent = await self.action_clients.navigate.send_goal(goal, on_feedback=self._on_feedback)
         self.log.info(f"goal accepted: driving to ({x:.1f}, {y:.1f})")
         if self.parameters.cancel_at_percent > 0.0:
-            await self._cancel_half_way(sent)
+            await self._cancel_on_the_way(sent)
         ended = await sent.result()
         self.log.info(f"{ended.result.message} after {ended.result.distance_traveled:.2f} m")
         return str(ended.status)
 
-    async def _cancel_half_way(self, sent: SentGoal) -> None:
+    async def _cancel_on_the_way(self, sent: SentGoal) -> None:
         while self.progress_percent < self.parameters.cancel_at_percent:
             await self.clock.sleep(0.02)
         if not await sent.cancel():
-            self.log.warn("the server did not agree to cancel")
+            self.log.warn("the server rejected the cancel request")
 
     def _on_feedback(self, feedback: Navigate.Feedback) -> None:
         self.progress_percent = feedback.progress_percent

@@ -1,4 +1,4 @@
-"""An action server: a point that travels to where it is told."""
+"""An action server that moves a point to its target."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from composer.behavior import Behavior, Goal
 
 
 class Navigator(Behavior):
-    """Moves at the goal's velocity, says so after each step, and stops when told to."""
+    """Move at the goal's velocity, publish feedback after each step, and stop when canceled."""
 
     def on_activate(self) -> None:
-        """Stand at the origin."""
+        """Start at the origin."""
         self.position = Point()
 
     def accept_navigate(self, request: Navigate.Goal) -> bool:
-        """Take a goal that is near enough, at a velocity that leads there."""
+        """Accept a goal within the maximum distance if its velocity is positive."""
         distance = _distance(self.position, request.target)
         return request.max_velocity > 0.0 and distance <= self.parameters.max_distance
 
     async def on_navigate(self, goal: Goal) -> Navigate.Result:
-        """Travel in equal steps; the time they take follows from the velocity."""
+        """Move in equal steps; their duration follows from the velocity."""
         start, target = self.position, goal.request.target
         distance = _distance(start, target)
         steps = self.parameters.steps

@@ -15,20 +15,20 @@ NANOSECONDS = 1_000_000_000
 
 
 class Planner(Behavior):
-    """Samples the line from start to goal, evenly in time, at the highest velocity allowed."""
+    """Sample the line from start to goal, evenly in time, at the maximum velocity allowed."""
 
     def on_activate(self) -> None:
-        """Forget what was known of the robot before."""
+        """Discard odometry from before the activation."""
         self.odometry: Odometry | None = None
 
     def on_sensor_data(self, message: Odometry) -> None:
-        """Keep the latest odometry."""
+        """Store the latest odometry."""
         self.odometry = message
 
     def on_plan_trajectory(
         self, request: PlanTrajectory.Request, response: PlanTrajectory.Response
     ) -> PlanTrajectory.Response:
-        """Answer with a path, or with the reason why there is none."""
+        """Return a path, or the reason why there is none."""
         reason = self._refusal(request)
         if reason is None:
             response.path = self._path(request)
@@ -40,11 +40,11 @@ class Planner(Behavior):
 
     def _refusal(self, request: PlanTrajectory.Request) -> str | None:
         if self.odometry is None:
-            return "no odometry yet: the frame of the path is not known"
+            return "no odometry received yet: the frame of the path is unknown"
         if not request.max_velocity > 0.0:
             return f"max_velocity must be above 0 m/s, not {request.max_velocity}"
-        ends = (request.start, request.goal)
-        if not all(math.isfinite(value) for end in ends for value in (end.x, end.y, end.z)):
+        points = (request.start, request.goal)
+        if not all(math.isfinite(value) for p in points for value in (p.x, p.y, p.z)):
             return "start and goal must be finite"
         return None
 

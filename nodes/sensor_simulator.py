@@ -11,22 +11,22 @@ from composer.behavior import Behavior
 
 
 class SensorSimulator(Behavior):
-    """Integrates velocity under an acceleration limit, in steps of the time that really passed."""
+    """Integrate the commanded velocity under an acceleration limit."""
 
     def on_activate(self) -> None:
-        """Put the robot at its start, at rest."""
+        """Place the robot at its start position, at rest."""
         self.x, self.y = self.parameters.start
         self.velocity_x = self.velocity_y = 0.0
         self.command = Twist()
         self.commanded_at_s = self.stepped_at_s = self.clock.now()
 
     def on_motor_commands(self, message: Twist) -> None:
-        """Keep the velocity to reach for."""
+        """Store the commanded velocity."""
         self.command = message
         self.commanded_at_s = self.clock.now()
 
     def on_step(self) -> None:
-        """Move by the time since the last step and say where that led."""
+        """Integrate over the time since the last step and publish the odometry."""
         now_s = self.clock.now()
         elapsed_s, self.stepped_at_s = now_s - self.stepped_at_s, now_s
         self._accelerate(elapsed_s, now_s)
@@ -35,9 +35,9 @@ class SensorSimulator(Behavior):
         self.publishers.sensor_data.publish(self._odometry())
 
     def _accelerate(self, elapsed_s: float, now_s: float) -> None:
-        heard_lately = (now_s - self.commanded_at_s) * 1000.0 <= self.parameters.command_timeout_ms
-        wanted = self.command.linear if heard_lately else Twist().linear
-        change_x, change_y = wanted.x - self.velocity_x, wanted.y - self.velocity_y
+        is_fresh = (now_s - self.commanded_at_s) * 1000.0 <= self.parameters.command_timeout_ms
+        target = self.command.linear if is_fresh else Twist().linear
+        change_x, change_y = target.x - self.velocity_x, target.y - self.velocity_y
         change = math.hypot(change_x, change_y)
         possible = self.parameters.max_acceleration * elapsed_s
         share = 1.0 if change <= possible else possible / change

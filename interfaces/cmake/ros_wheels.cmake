@@ -1,7 +1,7 @@
-# What a build against the ros-* wheels of PyPI needs and a build against a sourced ROS does not.
+# Workarounds for building against the ros-* wheels from PyPI instead of a sourced ROS.
 
-# Make find_package and the ament index find the ROS packages that pip put beside this Python:
-# the wheels lay a whole ROS prefix into the environment, with ament_package in its site-packages.
+# Make find_package and the ament index use the ROS packages that pip has installed: the wheels
+# install a complete ROS prefix into the environment, with ament_package in its site-packages.
 function(ros_wheels_use_prefix)
   execute_process(
     COMMAND "${Python3_EXECUTABLE}" -c
@@ -15,13 +15,13 @@ function(ros_wheels_use_prefix)
   endif()
   message(STATUS "ROS prefix: ${prefix}")
   set(CMAKE_PREFIX_PATH "${prefix}" ${CMAKE_PREFIX_PATH} PARENT_SCOPE)
-  # Read by ament_cmake while configuring; a sourced ROS of another version must not mix in.
+  # Read by ament_cmake at configure time; excludes packages of a sourced ROS of another version.
   set(ENV{AMENT_PREFIX_PATH} "${prefix}")
 endfunction()
 
-# The wheels' Python generator targets carry include folders of the container in which the wheels
-# were built, and CMake refuses folders that do not exist. Drop those of the imported targets, and
-# keep ours from being exported in the same way.
+# The Python generator targets in the wheels refer to include directories of the container in which
+# they were built, and CMake rejects directories that do not exist. Remove them from the imported
+# targets, and do not export ours in the same way.
 function(ros_wheels_repair_include_directories package)
   get_property(imported_targets DIRECTORY PROPERTY IMPORTED_TARGETS)
   list(FILTER imported_targets INCLUDE REGEX "__rosidl_generator_py$")

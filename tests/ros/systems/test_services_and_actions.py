@@ -21,7 +21,7 @@ def test_a_client_gets_paths_refusals_and_silence(outsider: Outsider) -> None:
     with RunningSystem("systems/trajectory_service.yaml") as system:
         system.wait_for(r"client.*True: 51 points")
         system.wait_for(r"client.*False: max_velocity must be above 0 m/s, not 0.0")
-        system.wait_for(r"client.*nobody answered: ")
+        system.wait_for(r"client.*no response: ")
         assert outsider.state("/client") == "active"
 
 

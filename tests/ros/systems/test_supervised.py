@@ -1,4 +1,4 @@
-"""The supervised system: a sensor falls silent, and what needs it waits until it is back."""
+"""The supervised system: a sensor falls silent, and its dependents wait until it is restarted."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from std_srvs.srv import Trigger
 
 from tests.ros.systems.running import Outsider, RunningSystem
 
-#: It plans by each tenth scan it hears, and is up only after the sensor: some scans may be over.
+#: The planner uses every tenth scan and comes up after the sensor, so it may miss the first scans.
 IN_ORDER = (
-    r"\[planner\] plans by scan [12]\d$",
+    r"\[planner\] planning with scan [12]\d$",
     r"/sensor failed: silent for 1000 ms; restart 1 in 0\.5 s$",
     r"/planner inactive$",
     r"/sensor inactive$",
@@ -18,7 +18,7 @@ IN_ORDER = (
     r"/sensor active$",
     r"/planner active$",
     r"/sensor is up again, restart 1$",
-    r"\[planner\] plans by scan 1?\d$",
+    r"\[planner\] planning with scan 1?\d$",
 )
 
 
@@ -38,7 +38,7 @@ def test_a_silent_sensor_is_restarted_and_the_planner_waits(outsider: Outsider) 
     for expected in IN_ORDER:
         assert any(re.search(expected, line) for line in lines), expected
     camera = [line for line in system.lines if line.endswith("/camera inactive")]
-    assert len(camera) == 2, "once on its way up, once on its way down: it did not notice"
+    assert len(camera) == 2, "once during bring-up, once during tear-down"
 
 
 def is_active(outsider: Outsider, answers: list[Trigger.Response]) -> bool:
