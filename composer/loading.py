@@ -15,9 +15,6 @@ from typing import TypeAlias
 from composer.assembly import NodeTypeFile, assemble, inherited
 from composer.assembly.telling import once, with_includes
 from composer.catalog import Catalog, interface_folders
-from composer.checks import Context, all_checks, run_checks
-from composer.checks.ignores import without_ignored
-from composer.checks.unused_node_type import unused_node_types
 from composer.diagnostics import Diagnostic, Severity, has_errors, in_order, registered_rules
 from composer.document import parse_bytes, read_document
 from composer.expand import expand
@@ -26,6 +23,9 @@ from composer.model import System
 from composer.project import SETTINGS_FILE, Project, Settings
 from composer.project.choices import told, wrong_choices
 from composer.resolve import NOTHING_SAID, CommandLine, Overrides, read_overrides, resolve
+from composer.rules import Context, all_checks, run_checks
+from composer.rules.ignores import without_ignored
+from composer.rules.unused_node_type import unused_node_types
 from composer.schema import check_schema, kind_of, kinds
 from composer.schema.kinds import check_kind
 from composer.source import SourceFile, Span
@@ -33,7 +33,7 @@ from composer.tree import Mapping
 
 
 @dataclass(frozen=True, slots=True)
-class Loading:
+class LoadResult:
     """What came of a file. ``system`` is None when too little of it could be read.
 
     ``source`` is the text, ``project`` what it belongs to; ``catalog`` and ``interfaces`` are what
@@ -65,7 +65,7 @@ def load(
     shown: str | None = None,
     said: CommandLine = NOTHING_SAID,
     interfaces: Interfaces | None = None,
-) -> Loading:
+) -> LoadResult:
     """Read, resolve and check the system or node type in the file ``path``.
 
     ``shown`` is the file's name in findings, ``said`` what a command line says on top of the file.
@@ -77,7 +77,7 @@ def load(
     return _load_file(path, shown, known, overrides, found)
 
 
-def load_files(paths: Iterable[Path]) -> list[Loading]:
+def load_files(paths: Iterable[Path]) -> list[LoadResult]:
     """Load the files, each called as it is given; files of one project share its interfaces."""
     shared: dict[tuple[Path, ...], Interfaces] = {}
     by_folder: dict[Path, _Known] = {}
@@ -96,7 +96,7 @@ def _load_file(
     known: _Known,
     overrides: Overrides | None = None,
     found: Iterable[Diagnostic] = (),
-) -> Loading:
+) -> LoadResult:
     tree, source, findings = read_document(path, shown)
     if path.name == SETTINGS_FILE:  # what is wrong with it is told of its project
         tree, findings = None, []
@@ -105,7 +105,7 @@ def _load_file(
 
 def load_bytes(
     content: bytes, folder: Path, *, shown: str, interfaces: Interfaces | None = None
-) -> Loading:
+) -> LoadResult:
     """Do the same for what came from elsewhere, as if it were a file in ``folder``."""
     tree, source, findings = parse_bytes(content, shown)
     return _load(
@@ -113,7 +113,7 @@ def load_bytes(
     )
 
 
-def means_the_same(loading: Loading, text: str) -> bool:
+def means_the_same(loading: LoadResult, text: str) -> bool:
     """Say whether ``text`` in the place of the file that was loaded would give the same model."""
     again = load_bytes(
         text.encode(), Path.cwd(), shown=loading.source.path, interfaces=loading.interfaces
@@ -121,13 +121,13 @@ def means_the_same(loading: Loading, text: str) -> bool:
     return again.system == loading.system
 
 
-def findings_of(loadings: Collection[Loading]) -> list[Diagnostic]:
+def findings_of(loadings: Collection[LoadResult]) -> list[Diagnostic]:
     """Return what is to be said of all files together, and of each, everything once.
 
     What is found in a file that is itself among them is told of it alone, and not again of the
     systems that include or use it; in another file it is told of the first of these systems.
     """
-    teller: dict[_Told, Loading] = {}
+    teller: dict[_Told, LoadResult] = {}
     for loading in loadings:
         for finding in loading.diagnostics:
             if finding.primary.file == loading.source:
@@ -150,7 +150,7 @@ def _told(finding: Diagnostic) -> _Told:
     return (finding.rule.code, str(finding.primary))
 
 
-def project_findings(loadings: Collection[Loading]) -> list[Diagnostic]:
+def project_findings(loadings: Collection[LoadResult]) -> list[Diagnostic]:
     """Return what is to be said of files only when they are looked at together."""
     systems = [loading.system for loading in loadings if loading.system is not None]
     settings = {loading.source.path: loading.project.settings for loading in loadings}
@@ -194,7 +194,7 @@ def _load(
     found: list[Diagnostic],
     known: _Known,
     overrides: Overrides,
-) -> Loading:
+) -> LoadResult:
     resolved = _resolved(tree, source, known, overrides) if tree else _Resolved()
     system = resolved.system
     findings = [*found, *resolved.findings]
@@ -211,7 +211,7 @@ def _load(
     kept = without_ignored(findings, source, complete=judged)
     settings = known.project.settings
     chosen = [*told(kept, settings), *known.project.findings, *_wrong_choices(settings)]
-    return Loading(
+    return LoadResult(
         system,
         in_order(chosen),
         source,

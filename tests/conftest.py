@@ -17,7 +17,7 @@ from typing import TextIO
 import pytest
 from hypothesis import HealthCheck, settings
 
-from composer.runtime.participants import participants_here
+from composer.runtime.process.dds_participants import participants_here
 
 TESTS_WITH_ROS = Path(__file__).parent / "ros"
 PROFILE_OF_FAST_DDS = Path(__file__).with_name("udp_on_this_computer.xml")

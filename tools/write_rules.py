@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from composer.report.catalogue import all_rules, page
+from composer.report.rule_page import all_rules, page
 
 PAGE = Path(__file__).parents[1] / "docs" / "rules.md"
 

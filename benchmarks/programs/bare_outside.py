@@ -19,8 +19,8 @@ from benchmarks.programs.hand_written import QUEUE_DEPTH
 from benchmarks.programs.payloads import CLASSES, make
 from benchmarks.programs.task import places, task_from_arguments
 from benchmarks.programs.work import COUNTS, hand_over, measure, needs_kick
-from composer.runtime.discovery import complete_discovery
-from composer.runtime.readiness import MESSAGE, Signal
+from composer.runtime.executors.readiness import MESSAGE, Signal
+from composer.runtime.process.dds_profiles import complete_discovery
 
 
 def pass_on(subscription: Subscription, publisher: Publisher) -> None:

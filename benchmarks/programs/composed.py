@@ -18,8 +18,8 @@ from benchmarks.programs.task import Place, Task, places, task_from_arguments
 from benchmarks.programs.work import KICK_PERIOD_S, hand_over, measure
 from composer.loading import load
 from composer.plan import bring_up, tear_down
-from composer.runtime.events import BroughtUp, Event
 from composer.runtime.host import Host, HostOptions
+from composer.runtime.supervision.events import BroughtUp, Event
 
 _KICK = {"kick": {"period_ms": KICK_PERIOD_S * 1000.0}}
 _ASK = {"ask": {"type": "std_srvs/srv/Trigger", "service": "/ask"}}

@@ -20,9 +20,9 @@ from benchmarks.programs.task import Task
 from benchmarks.programs.work import COUNTS, hand_over, memory_mb
 from composer.loading import load
 from composer.plan import bring_up, tear_down
-from composer.runtime.events import BroughtUp, Event
 from composer.runtime.host import Host
-from composer.runtime.node import RunningNode
+from composer.runtime.node.node import RunningNode
+from composer.runtime.supervision.events import BroughtUp, Event
 
 #: A day's work in little.
 MESSAGES, TIMER_CHANGES, CYCLES = 10_000_000, 10_000, 1_000

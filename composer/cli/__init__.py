@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from composer.cli.failure import FINDINGS, Failure
+from composer.cli.support.failure import FINDINGS, Failure
 
 INTERNAL = 3
 INTERRUPTED = 128 + signal.SIGINT
@@ -105,7 +105,7 @@ def _internal_error(error: Exception) -> int:
 
 def _flush() -> None:
     """Write out what is buffered now: at interpreter exit a closed pipe would be a traceback."""
-    from composer.cli.terminal import drop_stdout
+    from composer.cli.support.terminal import drop_stdout
 
     try:
         sys.stdout.flush()

@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from composer.cli.help import examples
-from composer.cli.terminal import write
+from composer.cli.support.help import examples
+from composer.cli.support.terminal import write
 
 #: Each is a module here: with a function of its name and an EPILOG, or with an ``app`` of its own.
 COMMANDS = (
@@ -68,7 +68,7 @@ def application(arguments: Iterable[str] = ()) -> typer.Typer:
 
 
 def _add(app: typer.Typer, name: str) -> None:
-    module = import_module(f"composer.cli.{name}")
+    module = import_module(f"composer.cli.commands.{name}")
     if hasattr(module, "app"):
         app.add_typer(module.app, name=name)
     else:

@@ -11,11 +11,9 @@ from composer.graph.findings import Findings
 from composer.graph.labels import qos_label
 from composer.graph.rates import publishing_rates_hz
 from composer.graph.scene import Actor, End, ExecutorGroup, Scene, Wait
-from composer.model import Executor, ExecutorKind, Node, Port, System
+from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, System
 from composer.model.dependencies import dependency_edges
 from composer.plan import bring_up
-
-_DEFAULT = "default"
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +121,7 @@ def _groups(system: System, several: bool) -> Iterator[ExecutorGroup]:
 
 
 def _executor_name(node: Node) -> str:
-    return node.executor.value if node.executor is not None else _DEFAULT
+    return node.executor.value if node.executor is not None else DEFAULT_EXECUTOR
 
 
 def _executor_key(system: System, executor: str) -> str:

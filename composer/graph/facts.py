@@ -8,7 +8,7 @@ from composer.graph.labels import qos_facts
 from composer.graph.picture import Details
 from composer.graph.rates import timer_rate_hz
 from composer.graph.scene import Channel, Meeting
-from composer.model import ChannelKind, Node, Port
+from composer.model import DEFAULT_EXECUTOR, ChannelKind, Node, Port
 from composer.tree import Plain
 
 _SOURCES = {
@@ -32,7 +32,7 @@ def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
         "full_name": node.full_name,
         "type": node.type_name.value if node.type_name is not None else None,
         "behavior": node.behavior.text.value if node.behavior is not None else None,
-        "executor": node.executor.value if node.executor is not None else "default",
+        "executor": node.executor.value if node.executor is not None else DEFAULT_EXECUTOR,
         "description": node.description or None,
         "declared_at": str(node.span),
         "depends_on": [

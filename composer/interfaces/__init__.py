@@ -5,7 +5,6 @@ the installed ones (``AMENT_PREFIX_PATH``, then the prefix of this Python), and 
 Jazzy's own (``jazzy.json``, made by ``tools/bundle_interfaces.py``).
 """
 
-from composer.interfaces.catalogue import Interfaces, InvalidDefinition
 from composer.interfaces.definitions import (
     FLOATS,
     INTEGER_RANGES,
@@ -19,6 +18,7 @@ from composer.interfaces.definitions import (
     Message,
     Service,
 )
+from composer.interfaces.index import Interfaces, InvalidDefinition
 from composer.interfaces.parser import DefinitionError, parse_definition, split_name
 
 __all__ = [

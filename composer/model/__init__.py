@@ -33,6 +33,7 @@ from composer.model.supervision import (
     Watch,
 )
 from composer.model.system import (
+    DEFAULT_EXECUTOR,
     BehaviorReference,
     Chain,
     Channel,
@@ -53,6 +54,7 @@ from composer.model.system import (
 )
 
 __all__ = [
+    "DEFAULT_EXECUTOR",
     "DEFAULT_INTROSPECTION",
     "DEFAULT_SUPERVISION",
     "USE_SIM_TIME",

@@ -197,6 +197,10 @@ class ExecutorKind(StrEnum):
     MULTI_THREADED = "multi_threaded"
 
 
+#: The executor of nodes that name none; it need not be declared.
+DEFAULT_EXECUTOR = "default"
+
+
 @dataclass(frozen=True, slots=True)
 class Executor:
     """A group of nodes that share a loop. ``threads`` counts for multi_threaded only.

@@ -7,18 +7,26 @@ waits for what is told by :mod:`composer.model.dependencies`.
 """
 
 from composer.plan.reach import reach
+from composer.plan.reconciliation import (
+    Decision,
+    DesiredState,
+    Fault,
+    FaultKind,
+    judge,
+    mend,
+    wanted,
+)
 from composer.plan.steps import Plan, Step, TransitionName
-from composer.plan.upkeep import Fault, FaultKind, Upkeep, Verdict, judge, mend, wanted
 from composer.plan.whole import bring_up, start_causes, start_goals, tear_down
 
 __all__ = [
+    "Decision",
+    "DesiredState",
     "Fault",
     "FaultKind",
     "Plan",
     "Step",
     "TransitionName",
-    "Upkeep",
-    "Verdict",
     "bring_up",
     "judge",
     "mend",

@@ -3,17 +3,17 @@
 How a command uses it::
 
     from composer.runtime.host import Host, HostOptions
-    from composer.runtime.start_refused import StartRefused
+    from composer.runtime.process.errors import StartRefused
 
     host = Host(system, bring_up(system), tear_down(system), HostOptions(run_for_s=5.0), report)
     try:
         outcome = host.run()          # on the main thread: it owns SIGINT, SIGTERM and SIGHUP
     except StartRefused as refusal:   # nothing was started; str(refusal), refusal.hint
         ...
-    outcome.exit_code, outcome.reason, outcome.nodes   # see composer.runtime.events
+    outcome.exit_code, outcome.reason, outcome.nodes   # see composer.runtime.supervision.events
     if outcome.hung: os._exit(outcome.exit_code)       # after flushing
 
-``report`` is called with every :mod:`composer.runtime.events` event, from several threads, one
+``report`` is called with every ``events`` event, from several threads, one
 call at a time; ``str(event)`` is the line to show.
 """
 
@@ -33,24 +33,24 @@ from rclpy.utilities import try_shutdown
 from composer.model import LogLevel, PrimaryState, System
 from composer.model.dependencies import dependency_edges, in_dependency_order
 from composer.plan import Fault, FaultKind, Plan
-from composer.runtime import events
-from composer.runtime.board import Board
-from composer.runtime.claim import claimed, refusal
-from composer.runtime.commands import Commands
-from composer.runtime.crew import FINALIZED, CreationFailed, Crew, CrewOptions
-from composer.runtime.departure import can_leave_at_once, leave_at_once
-from composer.runtime.discovery import leave_discovery_alone
-from composer.runtime.environment import prepare_environment
-from composer.runtime.events import NodeSummary, Outcome, Report
-from composer.runtime.inbox import Inbox
-from composer.runtime.log import describe
-from composer.runtime.manager import Command, Manager, Office, manager_namespace
-from composer.runtime.node import Listener, RunningNode, Shared
-from composer.runtime.reporter import Reporter
-from composer.runtime.signals import stop_signals
-from composer.runtime.start_refused import StartRefused
-from composer.runtime.supervisor import Moved, Supervisor
-from composer.runtime.watch import Hanging, Returned, Watch
+from composer.runtime.callbacks.log import describe
+from composer.runtime.manager.node import Command, Manager, ManagerCallbacks, manager_namespace
+from composer.runtime.node.node import Listener, RunningNode, Shared
+from composer.runtime.process.dds_profiles import leave_discovery_alone
+from composer.runtime.process.environment import prepare_environment
+from composer.runtime.process.errors import StartRefused
+from composer.runtime.process.fast_exit import can_leave_at_once, leave_at_once
+from composer.runtime.process.instance_lock import claimed, refusal
+from composer.runtime.process.signals import stop_signals
+from composer.runtime.supervision import events
+from composer.runtime.supervision.commands import Commands
+from composer.runtime.supervision.events import NodeSummary, Outcome, Report
+from composer.runtime.supervision.health_monitor import Hanging, HealthMonitor, LoopRecovered
+from composer.runtime.supervision.main_queue import MainQueue
+from composer.runtime.supervision.node_set import FINALIZED, CreationFailed, NodeSet, NodeSetOptions
+from composer.runtime.supervision.reporter import Reporter
+from composer.runtime.supervision.status import Status
+from composer.runtime.supervision.supervisor import ExternalTransition, Supervisor
 
 #: Where a transition ends when all goes well.
 _GOALS = {
@@ -112,22 +112,24 @@ class Host:
         self._up = up
         self._down = down
         self._options = options or HostOptions()
-        self._inbox: Inbox[object] = Inbox()
+        self._main_queue: MainQueue[object] = MainQueue()
         self._reporter = Reporter(report)
         order = in_dependency_order(system, dependency_edges(system))
-        self._board = Board(system, order)
-        self._crew = Crew(
+        self._status = Status(system, order)
+        self._node_set = NodeSet(
             system,
             self._listener,
-            CrewOptions(
+            NodeSetOptions(
                 log_level=self._options.log_level,
                 transition_timeout_s=self._options.transition_timeout_s,
                 tracing=self._options.tracing,
                 check_mutation=self._options.check_mutation,
             ),
         )
-        self._supervisor = Supervisor(system, self._crew, self._inbox, self._board, self._reporter)
-        self._commands = Commands(system, self._crew, self._supervisor, self._board)
+        self._supervisor = Supervisor(
+            system, self._node_set, self._main_queue, self._status, self._reporter
+        )
+        self._commands = Commands(system, self._node_set, self._supervisor, self._status)
         self._failed = False
         self._ends = False  # the time to the end of the process is limited
         self._is_created = False
@@ -141,7 +143,7 @@ class Host:
     def stop(self, reason: str) -> None:
         """Ask for the end, from any thread or a signal handler. Asking again hurries."""
         self._limit_end()
-        self._inbox.ask(reason)
+        self._main_queue.ask(reason)
 
     def run(self) -> Outcome:
         """Bring the system up, keep it up until it is to stop, tear it down.
@@ -152,7 +154,9 @@ class Host:
         if self._leaves_at_once:
             leave_discovery_alone(os.environ)
         namespace = manager_namespace(self._system.namespace, self._system.name.value)
-        signals = stop_signals(self.stop, self._inbox.bell, ends_process=self._options.ends_process)
+        signals = stop_signals(
+            self.stop, self._main_queue.bell, ends_process=self._options.ends_process
+        )
         with claimed(namespace), signals:
             self._limit_start()
             _start_ros()
@@ -164,15 +168,15 @@ class Host:
         return self._outcome()
 
     def _run(self, namespace: str) -> None:
-        office = Office(
+        office = ManagerCallbacks(
             self._obey,
             self._measure,
-            self._crew.callbacks,
-            self._crew.chains,
+            self._node_set.callbacks,
+            self._node_set.chains,
             lambda host, pid: self._yield_to(namespace, host, pid),
-            lambda: {node.full_name: node for node in tuple(self._crew.nodes.values())},
+            lambda: {node.full_name: node for node in tuple(self._node_set.nodes.values())},
         )
-        manager = Manager(namespace, self._board, office, use_sim_time=self._system.use_sim_time)
+        manager = Manager(namespace, self._status, office, use_sim_time=self._system.use_sim_time)
         try:
             if self._create(manager.shared):
                 self._live()
@@ -194,20 +198,20 @@ class Host:
 
     def _create(self, shared: Shared) -> bool:
         try:
-            self._crew.create(shared, self._limit_start)
+            self._node_set.create(shared, self._limit_start)
             self._lift_limit()
         except CreationFailed as error:
             at_s = self._reporter.elapsed_s
             self._reporter.tell(events.RollingBack(at_s, error.node, str(error)))
             self._fail(f"{error.node} failed")
             return False
-        for refused in self._crew.refusals:
+        for refused in self._node_set.refusals:
             self._write_log(LogLevel.WARN, "composer", refused)
         self._is_created = True
         return True
 
     def _live(self) -> None:
-        watch = Watch(self._crew, self._inbox.put)
+        watch = HealthMonitor(self._node_set, self._main_queue.put)
         watch.start()
         try:
             if self._bring_up():
@@ -220,18 +224,20 @@ class Host:
         failed = self._supervisor.bring_up(self._up, self._options.bring_up_within_s)
         if failed is not None:
             self._fail(f"{failed.partition(':')[0]} failed")
-        if self._inbox.closing:
+        if self._main_queue.closing:
             return False
-        self._supervisor.want(self._crew.states())
-        self._board.set_activity("running")
+        self._supervisor.want(self._node_set.states())
+        self._status.set_activity("running")
         self._reporter.tell(
-            events.BroughtUp(self._reporter.elapsed_s, self._crew.active(), len(self._crew.nodes))
+            events.BroughtUp(
+                self._reporter.elapsed_s, self._node_set.active(), len(self._node_set.nodes)
+            )
         )
         return True
 
     def _fail(self, reason: str) -> None:
         self._failed = True
-        self._inbox.ask(reason)
+        self._main_queue.ask(reason)
 
     # --- up and running
 
@@ -239,26 +245,26 @@ class Host:
         """Deal with what happens until the end is asked for, or the time is over."""
         run_for_s = self._options.run_for_s
         end_s = None if run_for_s is None else time.monotonic() + run_for_s
-        while not self._inbox.closing:
+        while not self._main_queue.closing:
             now_s = time.monotonic()
             due_s = self._supervisor.next_restart_s()
             if end_s is not None and now_s >= end_s:
-                self._inbox.ask(f"{run_for_s:g} s are over")
+                self._main_queue.ask(f"{run_for_s:g} s are over")
             elif due_s is not None and now_s >= due_s:
                 self._supervisor.restart_due()
             else:
                 times = [at_s for at_s in (end_s, due_s) if at_s is not None]
-                self._deal_with(self._inbox.take(min(times, default=None)))
+                self._deal_with(self._main_queue.take(min(times, default=None)))
 
     def _deal_with(self, item: object) -> None:
         match item:
             case Fault():
                 self._supervisor.take_fault(item)
-            case Moved():
+            case ExternalTransition():
                 self._supervisor.take_move(item)
             case Hanging():
                 self._supervisor.take_hanging(item)
-            case Returned():
+            case LoopRecovered():
                 self._supervisor.take_return(item)
             case Command():
                 self._reporter.tell(events.Commanded(self._reporter.elapsed_s, item.what))
@@ -270,15 +276,15 @@ class Host:
             self._farewells.append(command)
             self.stop("shutdown, asked for from outside")
         else:
-            self._inbox.put(command)
+            self._main_queue.put(command)
 
     def _measure(self) -> None:
-        nodes = tuple(self._crew.nodes.items())
-        self._board.measure({name: node.statistics for name, node in nodes})
-        self._board.see_states({name: node.state for name, node in nodes})
+        nodes = tuple(self._node_set.nodes.items())
+        self._status.measure({name: node.statistics for name, node in nodes})
+        self._status.see_states({name: node.state for name, node in nodes})
 
     def _yield_to(self, namespace: str, host: str, pid: str) -> None:
-        if not self._inbox.closing:
+        if not self._main_queue.closing:
             self._fail(str(refusal(namespace, host, pid)))
 
     # --- down
@@ -290,37 +296,37 @@ class Host:
             self._options.end_within(self._options.grace_s)
 
     def _tear_down(self) -> None:
-        if not self._inbox.closing:
-            self._inbox.ask("it cannot go on")
+        if not self._main_queue.closing:
+            self._main_queue.ask("it cannot go on")
         self._failed = self._failed or self._supervisor.has_failed_nodes
-        self._board.set_activity("stopping")
+        self._status.set_activity("stopping")
         self._reporter.tell(events.Stopping(self._reporter.elapsed_s, self._reason))
         if self._leaves_at_once and can_leave_at_once():
-            self._crew.keep_entities()
+            self._node_set.keep_entities()
         stop_within_s = self._options.stop_within_s
         self._end_s = time.monotonic() + stop_within_s
         if self._is_created:
             share_s = _STEP_SHARE * stop_within_s
             if not self._supervisor.tear_down(self._down, self._end_s, share_s):
                 self._failed = True
-        self._summary = tuple(_summary(node) for node in self._crew.nodes.values())
+        self._summary = tuple(_summary(node) for node in self._node_set.nodes.values())
 
     def _close(self, manager: Manager) -> None:
-        for item in (*self._farewells, *self._inbox.rest()):
+        for item in (*self._farewells, *self._main_queue.rest()):
             if isinstance(item, Command):
                 item.answer(item.what == "shutdown", f"the system has stopped: {self._reason}")
             elif isinstance(item, Fault):
                 self._failed = True  # nobody has come to deal with it
-        self._board.set_activity("stopped")
+        self._status.set_activity("stopped")
         end_s = self._end_s
-        if self._inbox.hurry:
+        if self._main_queue.hurry:
             end_s = min(end_s, time.monotonic() + _HURRY_S)
-        self._crew.stop_loops(end_s)
-        self._remains = not self._crew.destroy(end_s)
-        self._failed = self._failed or bool(self._crew.hung)
+        self._node_set.stop_loops(end_s)
+        self._remains = not self._node_set.destroy(end_s)
+        self._failed = self._failed or bool(self._node_set.hung)
         manager.retire(linger=bool(self._farewells))
         # A thread that hangs may come back and use what is gone.
-        if self._remains and self._options.ends_process and not self._crew.hung:
+        if self._remains and self._options.ends_process and not self._node_set.hung:
             self._has_left = leave_at_once()
         if not self._has_left:
             manager.destroy()
@@ -332,13 +338,13 @@ class Host:
             elapsed_s=self._reporter.elapsed_s,
             nodes=self._summary,
             hung=self._remains,
-            callbacks=self._crew.callbacks(),
-            chains=self._crew.chains(),
+            callbacks=self._node_set.callbacks(),
+            chains=self._node_set.chains(),
         )
 
     @property
     def _reason(self) -> str:
-        return self._inbox.reason or ""
+        return self._main_queue.reason or ""
 
     # --- what nodes tell, on the threads of their loops
 
@@ -355,20 +361,20 @@ class Host:
         self, name: str, transition: str, state: str, cause: BaseException | None
     ) -> None:
         at_s = self._reporter.elapsed_s
-        self._board.set_state(name, state)
-        full_name = self._crew.nodes[name].full_name
+        self._status.set_state(name, state)
+        full_name = self._node_set.nodes[name].full_name
         self._reporter.tell(events.StateChanged(at_s, full_name, transition, state))
         if name in self._supervisor.moving:
             return
         if state == _GOALS[transition]:
-            self._inbox.put(Moved(name, state))
+            self._main_queue.put(ExternalTransition(name, state))
         elif state in _DOWN:
             text = f"{transition} ended in an error: {describe(cause)}" if cause else transition
-            self._inbox.put(Fault(name, FaultKind.TRANSITION, text, time.monotonic()))
+            self._main_queue.put(Fault(name, FaultKind.TRANSITION, text, time.monotonic()))
 
     def _take_fault(self, name: str, callback: str, text: str) -> None:
-        self._board.set_error(name, f"{callback}: {text}")
-        full_name = self._crew.nodes[name].full_name
+        self._status.set_error(name, f"{callback}: {text}")
+        full_name = self._node_set.nodes[name].full_name
         self._reporter.tell(events.Fault(self._reporter.elapsed_s, full_name, callback, text))
 
     def _write_log(self, level: LogLevel, logger: str, message: str) -> None:

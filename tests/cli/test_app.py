@@ -12,7 +12,7 @@ import typer
 
 from composer import cli
 from composer.cli.app import application
-from composer.cli.help import examples
+from composer.cli.support.help import examples
 from tests.cli.compose import compose
 
 COMPOSE = [sys.executable, "-m", "composer"]

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.cli.background import run_in_background
-from composer.cli.failure import Failure
+from composer.cli.support.background import run_in_background
+from composer.cli.support.failure import Failure
 
 
 def test_a_process_that_says_nothing_is_killed(

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.cli.loaded import complete_system
+from composer.cli.support.loaded import complete_system
 
 
 def complete(*words: str) -> list[str]:

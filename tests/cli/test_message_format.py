@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from composer.cli.failure import UsageFailure
-from composer.cli.message_format import MessageFormat
+from composer.cli.support.failure import UsageFailure
+from composer.cli.support.message_format import MessageFormat
 
 SCAN = {"frame": "laser, left", "ranges": [0.5, 1.5, 2.5], "pose": {"x": 1.0}}
 

@@ -67,7 +67,7 @@ def test_a_folder_is_not_run(tmp_path: Path) -> None:
 
 
 def test_without_rclpy_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("composer.cli.ros.find_spec", lambda name: None)
+    monkeypatch.setattr("composer.cli.support.ros.find_spec", lambda name: None)
     for command in (["run", "pipeline"], ["lifecycle", "nodes"]):
         done = compose(*command)
         assert (done.code, done.out) == (1, "")

@@ -7,7 +7,7 @@ import sys
 
 NOISY = """
 import os
-from composer.cli.terminal import keep_stdout_for_data, say, write
+from composer.cli.support.terminal import keep_stdout_for_data, say, write
 keep_stdout_for_data()
 keep_stdout_for_data()
 write("data")

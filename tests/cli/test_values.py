@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 import yaml
 
-from composer.cli.terminal import columns
-from composer.cli.values import as_yaml, cut
+from composer.cli.support.terminal import columns
+from composer.cli.support.values import as_yaml, cut
 
 
 @pytest.mark.parametrize("value", [1.5, "text", "ends with...", True, None, [1, 2], {"a": ["b"]}])

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from composer.checks import all_checks
 from composer.loading import load
 from composer.report.text import render
+from composer.rules import all_checks
 
 ROOT = Path(__file__).parents[2]
 ERRORS = Path("tests/golden/err")

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from composer.assembly.canonical import canonical
 from composer.document import parse_document
 from composer.document.writing import write_document
-from composer.loading import Loading, load, means_the_same
+from composer.loading import LoadResult, load, means_the_same
 from composer.resources import systems_folder
 from composer.source import SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, plain
@@ -60,7 +60,7 @@ def fleets(draw: st.DrawFn) -> dict[str, Any]:
     }
 
 
-def hold(loading: Loading) -> None:
+def hold(loading: LoadResult) -> None:
     """Write what was loaded as one file: it must say the same, and be written so again."""
     assert loading.tree is not None
     text = write_document(canonical(loading.tree))

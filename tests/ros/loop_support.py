@@ -18,8 +18,8 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 
 from composer.model import Executor, ExecutorKind
-from composer.runtime.executors import make_loop
-from composer.runtime.loop import Loop, Taken
+from composer.runtime.executors.factory import make_loop
+from composer.runtime.executors.loop import Loop, Taken
 from composer.source import Located, SourceFile, Span
 from tests.ros.leaving import leave
 

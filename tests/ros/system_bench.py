@@ -29,10 +29,17 @@ from composer.expand import expand
 from composer.model import PrimaryState, System
 from composer.plan import bring_up, tear_down
 from composer.resolve import resolve
-from composer.runtime.events import BroughtUp, Event, Logged, NodeSummary, Outcome, StateChanged
 from composer.runtime.host import Host, HostOptions
-from composer.runtime.node import RunningNode
-from composer.runtime.shared_memory import remove_half_made_ports
+from composer.runtime.node.node import RunningNode
+from composer.runtime.process.shared_memory import remove_half_made_ports
+from composer.runtime.supervision.events import (
+    BroughtUp,
+    Event,
+    Logged,
+    NodeSummary,
+    Outcome,
+    StateChanged,
+)
 from tests.ros.leaving import leave
 
 PATIENCE_S = 20.0
@@ -109,7 +116,7 @@ class RunningSystem:
 
     def node(self, name: str) -> RunningNode:
         """Return the node of that name in the system, whatever state it is in."""
-        return self.host._crew.nodes[name]
+        return self.host._node_set.nodes[name]
 
     def behavior(self, name: str) -> Any:
         """Return the object of user code that the node has: it lives from configure to cleanup."""

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from composer.model import BehaviorReference
-from composer.runtime.behaviors import behavior_class
+from composer.runtime.node.behavior_loader import behavior_class
 from composer.source import Located, SourceFile, Span
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.statistics import ChainStatistics
+from composer.runtime.metrics.statistics import ChainStatistics
 from tests.ros.system_bench import RunningSystem, running, wait_until
 
 BRAKE = """
@@ -41,7 +41,7 @@ class Detector:
 
 
 def chain(system: RunningSystem, name: str) -> ChainStatistics:
-    return next(item for item in system.host._crew._chains.statistics if item.name == name)
+    return next(item for item in system.host._node_set._chains.statistics if item.name == name)
 
 
 @pytest.mark.parametrize("more", ["", ", delivery: dds", ", isolation: copy"])

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from composer.runtime.doctor.finding import Level
-from composer.runtime.doctor.graph import unbuilt_types
+from composer.doctor.finding import Level
+from composer.doctor.graph import unbuilt_types
 from tests.ros.commands import PATIENCE_S, compose, hand_written, measured, start
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from composer.runtime.claim import claims
+from composer.runtime.process.instance_lock import claims
 from tests.ros.commands import COMPOSE, PATIENCE_S, asked_until, compose, errors, said
 from tests.ros.system_bench import wait_until
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from composer.runtime.control import Control, TransitionRefused
-from composer.runtime.finding import NotThere
-from composer.runtime.session import Deadline, NoAnswer, Session
+from composer.remote.lifecycle import Control, TransitionRefused
+from composer.remote.name_matching import NotThere
+from composer.remote.session import Deadline, NoAnswer, Session
 from tests.ros.commands import hand_written
 
 

@@ -14,7 +14,7 @@ import pytest
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Int64
 
-from composer.runtime.delivery.own_publications import _Options, _Subscription
+from composer.runtime.intra_process.ignore_local_publications import _Options, _Subscription
 from tests.ros.commands import COMPOSE
 from tests.ros.sequences import Sequences
 from tests.ros.system_bench import Peer, wait_until

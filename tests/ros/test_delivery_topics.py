@@ -18,8 +18,8 @@ from rclpy.subscription import Subscription
 from std_msgs.msg import Int64
 
 from composer.model import LogLevel
-from composer.runtime import marks
 from composer.runtime.host import HostOptions
+from composer.runtime.intra_process import match_flag as marks
 from tests.ros.counting import MODULE, NUMBERS, numbers, send
 from tests.ros.system_bench import Peer, RunningSystem, running, wait_until
 

@@ -13,7 +13,7 @@ import pytest
 import yaml
 from std_srvs.srv import Trigger
 
-from composer.runtime.shared_memory import SHARED_MEMORY
+from composer.runtime.process.shared_memory import SHARED_MEMORY
 from tests.ros.commands import COMPOSE
 from tests.ros.system_bench import PATIENCE_S, Peer, running, wait_until
 
@@ -89,11 +89,11 @@ def test_a_state_can_be_asked_for_while_the_node_is_destroyed(tmp_path: Path) ->
     states: set[str] = set()
     over = threading.Event()
     with running(text, tmp_path) as system:
-        crew = system.host._crew
+        node_set = system.host._node_set
 
         def look() -> None:
             while not over.wait(0.001):
-                states.update(node.state for node in tuple(crew.nodes.values()))
+                states.update(node.state for node in tuple(node_set.nodes.values()))
 
         looking = threading.Thread(target=look)
         looking.start()
@@ -102,7 +102,7 @@ def test_a_state_can_be_asked_for_while_the_node_is_destroyed(tmp_path: Path) ->
         over.set()
         looking.join(PATIENCE_S)
     assert (outcome.exit_code, outcome.hung) == (0, False)
-    assert {node.state for node in crew.nodes.values()} == {"finalized"}
+    assert {node.state for node in node_set.nodes.values()} == {"finalized"}
 
 
 def shared_memory_of(pid: int) -> set[Path]:

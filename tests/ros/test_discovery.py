@@ -10,7 +10,7 @@ from pathlib import Path
 
 from std_msgs.msg import Empty
 
-from composer.runtime.participants import participants_here
+from composer.runtime.process.dds_participants import participants_here
 from tests.ros.commands import PYTHON
 from tests.ros.system_bench import Peer, wait_until
 
@@ -24,10 +24,10 @@ FORGOTTEN_WITHIN_S = 10.0
 TOPICS = [f"/flood/topic_{number}" for number in range(250)]
 JOIN = f"""
 import json, time
-from composer.runtime.environment import prepare_environment
+from composer.runtime.process.environment import prepare_environment
 prepare_environment()
-from composer.runtime.inspect_names import Names
-from composer.runtime.session import Deadline, Session
+from composer.remote.graph_names import Names
+from composer.remote.session import Deadline, Session
 
 took_s, missing = [], []
 for _ in range({JOINS}):
@@ -43,9 +43,9 @@ print(json.dumps([took_s, missing]))
 LOOK = """
 import json, os, re
 from pathlib import Path
-from composer.runtime.environment import prepare_environment
+from composer.runtime.process.environment import prepare_environment
 prepare_environment()
-from composer.runtime.session import Deadline, Session, suit_commands
+from composer.remote.session import Deadline, Session, suit_commands
 
 suit_commands()
 with Session() as session:

@@ -12,8 +12,8 @@ import pytest
 import rclpy
 
 from composer.model import ExecutorKind
-from composer.runtime.executors import make_loop
-from composer.runtime.tasks import Future, sleep
+from composer.runtime.executors.factory import make_loop
+from composer.runtime.executors.tasks import Future, sleep
 from tests.ros.loop_support import KINDS, Bench, bench, executor_of, wait_until
 
 

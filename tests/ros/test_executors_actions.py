@@ -16,8 +16,8 @@ from rclpy.action import ActionClient, ActionServer
 from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 
-from composer.runtime import actions
-from composer.runtime.tasks import sleep
+from composer.runtime.executors import actions
+from composer.runtime.executors.tasks import sleep
 from tests.ros.loop_support import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
 
 ERRORS = [ValueError, SystemExit, KeyboardInterrupt]

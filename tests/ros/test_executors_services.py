@@ -18,7 +18,7 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from type_description_interfaces.srv import GetTypeDescription
 
-from composer.runtime.tasks import Future, sleep, within, wrap_future
+from composer.runtime.executors.tasks import Future, sleep, within, wrap_future
 from tests.ros.loop_support import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
 
 ERRORS = [ValueError, SystemExit, KeyboardInterrupt]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from composer.expressions import EvaluationError
 from composer.field_types import INTEGER, NUMBER, TEXT, Judge, Scope, type_of
 from composer.interfaces import Interfaces
-from composer.runtime.messages import MessageError, compile_message, interface_class
+from composer.runtime.ros.messages import MessageError, compile_message, interface_class
 from tests.unit.field_types_setting import template
 
 INTERFACES = Interfaces.load()

@@ -9,7 +9,8 @@ import pytest
 from std_srvs.srv import Trigger
 
 from composer.model import PrimaryState
-from composer.runtime.events import (
+from composer.runtime.host import HostOptions
+from composer.runtime.supervision.events import (
     BroughtUp,
     Fault,
     NodeFailed,
@@ -18,7 +19,6 @@ from composer.runtime.events import (
     Stuck,
     TransitionRefused,
 )
-from composer.runtime.host import HostOptions
 from tests.ros.system_bench import Peer, RunningSystem, end_limit_s, running, system_of, wait_until
 
 CHAIN = """

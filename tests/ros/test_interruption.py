@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from std_msgs.msg import String
 
-from composer.runtime.events import NodeFailed, Stuck
+from composer.runtime.supervision.events import NodeFailed, Stuck
 from tests.ros.faulty_system import write_faulty_system
 from tests.ros.system_bench import Peer, running, wait_until
 from tests.ros.systems.running import RunningSystem

@@ -23,10 +23,10 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter
 
 from composer.drift import NodeSeen
-from composer.runtime.control import Control, TransitionRefused
-from composer.runtime.inspect_parameters import ParameterRefused, Parameters, names_by_node
-from composer.runtime.session import Deadline, Session
-from composer.runtime.snapshot import Observer
+from composer.remote.lifecycle import Control, TransitionRefused
+from composer.remote.parameters import ParameterRefused, Parameters, names_by_node
+from composer.remote.session import Deadline, Session
+from composer.remote.snapshot import Observer
 from tests.ros.commands import COMPOSE
 from tests.ros.system_bench import Peer, RunningSystem, running, wait_until
 

@@ -13,8 +13,8 @@ from lifecycle_msgs.msg import Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions
 from std_srvs.srv import Trigger
 
-from composer.runtime.events import NodeFailed
-from composer.runtime.interruption import CallbackInterrupted
+from composer.runtime.supervision.events import NodeFailed
+from composer.runtime.supervision.interruption import CallbackInterrupted
 from tests.ros.system_bench import Peer, finished, running, wait_until
 
 SUBJECT = """
@@ -239,7 +239,7 @@ def test_requests_in_mid_transition_are_refused(tmp_path: Path, peer: Peer) -> N
 def test_a_handler_that_awaits_for_ever_is_an_error(tmp_path: Path, peer: Peer) -> None:
     module = """
     from composer.behavior import Behavior
-    from composer.runtime.tasks import Future
+    from composer.runtime.executors.tasks import Future
 
     class Subject(Behavior):
         async def on_configure(self):

@@ -17,7 +17,7 @@ from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Bool, Byte, Float64, Header, Int8, String, UInt64
 
 from composer.document import parse_bytes
-from composer.runtime.messages import (
+from composer.runtime.ros.messages import (
     MessageError,
     compile_message,
     convert_message,

@@ -195,7 +195,7 @@ def test_a_handler_that_does_not_end_its_goal_is_ended(tmp_path: Path, peer: Pee
                     await never(self)
 
     async def never(behavior):
-        from composer.runtime.tasks import Future
+        from composer.runtime.executors.tasks import Future
         await Future()
     """
     with running(handled(), tmp_path, handled=module) as system:

@@ -168,7 +168,7 @@ def test_the_callbacks_of_a_node_take_turns_on_several_threads(tmp_path: Path, p
     nodes:
       turns:
         executor: several
-        behavior: turns:Turns
+        behavior: turns:SerialStrand
         subscriptions:
           input: {type: std_msgs/msg/Int64, external: true}
         timers:
@@ -180,7 +180,7 @@ def test_the_callbacks_of_a_node_take_turns_on_several_threads(tmp_path: Path, p
     from time import sleep
     from composer.behavior import Behavior
 
-    class Turns(Behavior):
+    class SerialStrand(Behavior):
         def on_configure(self):
             self.inside = 0
             self.most = 0

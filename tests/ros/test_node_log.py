@@ -8,8 +8,8 @@ from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from composer.model import LogLevel
-from composer.runtime.events import Logged
 from composer.runtime.host import HostOptions
+from composer.runtime.supervision.events import Logged
 from tests.ros.system_bench import Peer, running, wait_until
 
 LOUD = """

@@ -8,8 +8,8 @@ import pytest
 from rcl_interfaces.srv import DescribeParameters, GetParameters
 from std_msgs.msg import Int64
 
-from composer.runtime.events import RollingBack
 from composer.runtime.host import HostOptions
+from composer.runtime.supervision.events import RollingBack
 from tests.ros.system_bench import Peer, RunningSystem, running, system_of, wait_until
 
 TIMED = """

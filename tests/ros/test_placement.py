@@ -10,8 +10,8 @@ import pytest
 import rclpy
 
 from composer.model import Executor, ExecutorKind
-from composer.runtime.executors import make_loop
-from composer.runtime.placement import place
+from composer.runtime.executors.factory import make_loop
+from composer.runtime.executors.thread_placement import place
 from composer.source import Located, SourceFile, Span
 from tests.ros.system_bench import running
 

@@ -13,7 +13,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from composer.model import ExecutorKind
-from composer.runtime import repeated
+from composer.runtime.ports import repeated
 from tests.ros.system_bench import Peer, RunningSystem, running, wait_until
 
 KINDS = [str(kind) for kind in ExecutorKind]

@@ -15,8 +15,8 @@ from rclpy.event_handler import QoSSubscriptionEventType
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from composer.runtime.announced_events import AnnouncedEvents
-from composer.runtime.event_loop import EventLoop
+from composer.runtime.executors.event_counts import AnnouncedEvents
+from composer.runtime.executors.event_loop import EventLoop
 from tests.ros.commands import hand_written
 from tests.ros.system_bench import PATIENCE_S, Peer, RunningSystem, running, wait_until
 

@@ -17,11 +17,11 @@ from std_msgs.msg import Int64, String
 from std_srvs.srv import Trigger
 
 from composer.model import ExecutorKind
-from composer.runtime import readiness
-from composer.runtime.event_loop import EventLoop
-from composer.runtime.slots import Slot
-from composer.runtime.sources import Source
-from composer.runtime.tasks import Future
+from composer.runtime.executors import readiness
+from composer.runtime.executors.entity_sources import Source
+from composer.runtime.executors.event_loop import EventLoop
+from composer.runtime.executors.source_group import Slot
+from composer.runtime.executors.tasks import Future
 from tests.ros.loop_support import Bench, bench, last_line, peer, wait_until
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from rclpy.task import Future as RclpyFuture
 
-from composer.runtime.strand import Strand, Turns
-from composer.runtime.tasks import Future, Task, wrap_future
+from composer.runtime.executors.strand import SerialStrand, Strand
+from composer.runtime.executors.tasks import Future, Task, wrap_future
 
 
 class Calls:
@@ -54,7 +54,7 @@ def test_an_rclpy_future_is_not_polled() -> None:
 def test_an_rclpy_future_is_not_polled_in_turns_either() -> None:
     calls = Calls()
     foreign = RclpyFuture()
-    outcome = start(calls, foreign, Turns(calls.waiting.append))
+    outcome = start(calls, foreign, SerialStrand(calls.waiting.append))
     called = calls.called
     calls.run()
     assert calls.called == called

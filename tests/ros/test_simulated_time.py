@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import Header, String
 
 from composer.model import ExecutorKind
-from composer.runtime.events import Fault
+from composer.runtime.supervision.events import Fault
 from tests.ros.simulator import NANOSECONDS, Simulator, listeners
 from tests.ros.system_bench import Peer, RunningSystem, running, wait_until
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from std_msgs.msg import String
 
-from composer.runtime.events import NodeFailed, Restarted, StateChanged, Stuck
+from composer.runtime.supervision.events import NodeFailed, Restarted, StateChanged, Stuck
 from tests.ros.system_bench import Peer, RunningSystem, end_limit_s, running, wait_until
 
 ROBOT = """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from composer.runtime.host import HostOptions
-from composer.runtime.statistics import CallbackStatistics
+from composer.runtime.metrics.statistics import CallbackStatistics
 from tests.ros.system_bench import RunningSystem, running, wait_until
 
 EVERY_KIND = """

@@ -1,4 +1,4 @@
-"""Loading a text as if it were a file, for the tests of checks."""
+"""LoadResult a text as if it were a file, for the tests of checks."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from composer.runtime.board import NodeStatus, SystemStatus
+from composer.runtime.supervision.status import NodeStatus, SystemStatus
 
 PLANNER = NodeStatus("/planner", "active", state="active")
 CAMERA = NodeStatus("/camera", "inactive", starts_active=False, state="inactive")

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from composer.checks import all_checks
 from composer.diagnostics import Diagnostic, Rule
 from composer.loading import load
-from composer.report.catalogue import all_rules
+from composer.report.rule_page import all_rules
 from composer.report.samples import files_of
+from composer.rules import all_checks
 
 # Examples of rules about what is not YAML of ours - a command line, bytes - are not run here.
 RULES = [rule for rule in all_rules() if files_of(rule.bad) and files_of(rule.good)]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.checks.ignores import ignores_in
+from composer.rules.ignores import ignores_in
 from composer.source import SourceFile
 from tests.unit.checking import findings_in, quoted, rules_broken
 

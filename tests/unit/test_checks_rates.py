@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.checks.context import Context
-from composer.checks.rates import rates
+from composer.analysis.context import Context
+from composer.analysis.rates import rates
 from composer.loading import load
 
 HEAD = "system: demo\nnodes:\n"

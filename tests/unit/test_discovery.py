@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from composer.runtime.discovery import (
+from composer.runtime.process.dds_profiles import (
     complete_discovery,
     leave_discovery_alone,
     suit_commands,

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from composer.doctor.environment import discovery_range, look_at_environment
+from composer.doctor.finding import Finding, Level
+from composer.doctor.interfaces import look_at_interfaces
+from composer.doctor.network import look_at_network
+from composer.doctor.versions import rclpy_finding
 from composer.interfaces import Interfaces
-from composer.runtime.doctor.environment import discovery_range, look_at_environment
-from composer.runtime.doctor.finding import Finding, Level
-from composer.runtime.doctor.interfaces import look_at_interfaces
-from composer.runtime.doctor.network import look_at_network
-from composer.runtime.doctor.versions import rclpy_finding
 
 
 def bad(findings: list[Finding]) -> list[tuple[str, str]]:

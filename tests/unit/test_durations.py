@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from composer.cli.callback_table import callback_table
-from composer.cli.top_table import Sorting, as_json, sorted_rates, table
-from composer.runtime.durations import BOUNDS_S, TOGETHER, Durations
-from composer.runtime.figures import CallbackFigures, figures, rates
-from composer.runtime.statistics import CallbackStatistics, Statistics
+from composer.cli.support.callback_table import callback_table
+from composer.cli.support.top_table import Sorting, as_json, sorted_rates, table
+from composer.runtime.metrics.figures import CallbackFigures, figures, rates
+from composer.runtime.metrics.histogram import BOUNDS_S, TOGETHER, Durations
+from composer.runtime.metrics.statistics import CallbackStatistics, Statistics
 
 
 def counted(*times_s: float) -> Durations:

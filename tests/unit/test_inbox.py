@@ -1,4 +1,4 @@
-"""The main thread's inbox: nothing is lost, nothing waits longer than it may."""
+"""The main thread's main_queue: nothing is lost, nothing waits longer than it may."""
 
 from __future__ import annotations
 
@@ -8,32 +8,32 @@ import time
 
 import pytest
 
-from composer.runtime import inbox as module
-from composer.runtime.inbox import Inbox
+from composer.runtime.supervision import main_queue as module
+from composer.runtime.supervision.main_queue import MainQueue
 
 
 def test_items_come_in_the_order_they_were_put() -> None:
-    inbox: Inbox[int] = Inbox()
+    main_queue: MainQueue[int] = MainQueue()
     for number in range(3):
-        inbox.put(number)
-    assert [inbox.take(), inbox.take(), inbox.take()] == [0, 1, 2]
-    assert inbox.take(time.monotonic()) is None
+        main_queue.put(number)
+    assert [main_queue.take(), main_queue.take(), main_queue.take()] == [0, 1, 2]
+    assert main_queue.take(time.monotonic()) is None
 
 
 def test_what_comes_while_something_else_is_waited_for_is_kept() -> None:
-    inbox: Inbox[str] = Inbox()
-    inbox.put("later")
+    main_queue: MainQueue[str] = MainQueue()
+    main_queue.put("later")
     done = []
-    threading.Thread(target=lambda: (done.append(True), inbox.wake())).start()
-    assert inbox.wait(lambda: bool(done), time.monotonic() + 20.0, stoppable=True)
-    assert inbox.take(time.monotonic()) == "later"
+    threading.Thread(target=lambda: (done.append(True), main_queue.wake())).start()
+    assert main_queue.wait(lambda: bool(done), time.monotonic() + 20.0, stoppable=True)
+    assert main_queue.take(time.monotonic()) == "later"
 
 
 def test_a_wait_ends_in_time() -> None:
-    inbox: Inbox[str] = Inbox()
+    main_queue: MainQueue[str] = MainQueue()
     began_s = time.monotonic()
-    assert not inbox.wait(lambda: False, began_s + 0.05, stoppable=True)
-    assert inbox.take(began_s + 0.1) is None
+    assert not main_queue.wait(lambda: False, began_s + 0.05, stoppable=True)
+    assert main_queue.take(began_s + 0.1) is None
     assert 0.1 <= time.monotonic() - began_s < 10.0
 
 
@@ -41,27 +41,27 @@ def test_a_request_to_stop_ends_what_may_be_stopped_and_a_second_one_hurries(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(module, "_TOGETHER_S", 60.0)
-    inbox: Inbox[str] = Inbox()
-    inbox.put("never dealt with")
-    inbox.ask("SIGINT")
-    assert inbox.closing
-    assert inbox.take() is None
-    assert not inbox.wait(lambda: False, time.monotonic() + 60.0, stoppable=True)
-    inbox.ask("SIGINT")  # forwarded by somebody who got the same one
-    assert (inbox.reason, inbox.hurry) == ("SIGINT", False)
+    main_queue: MainQueue[str] = MainQueue()
+    main_queue.put("never dealt with")
+    main_queue.ask("SIGINT")
+    assert main_queue.closing
+    assert main_queue.take() is None
+    assert not main_queue.wait(lambda: False, time.monotonic() + 60.0, stoppable=True)
+    main_queue.ask("SIGINT")  # forwarded by somebody who got the same one
+    assert (main_queue.reason, main_queue.hurry) == ("SIGINT", False)
     monkeypatch.setattr(module, "_TOGETHER_S", 0.1)
     until_s = time.monotonic() + 20.0
-    while not inbox.hurry and time.monotonic() < until_s:
-        inbox.ask("SIGTERM")
-    assert (inbox.reason, inbox.hurry) == ("SIGINT", True)
+    while not main_queue.hurry and time.monotonic() < until_s:
+        main_queue.ask("SIGTERM")
+    assert (main_queue.reason, main_queue.hurry) == ("SIGINT", True)
     began_s = time.monotonic()
-    assert not inbox.wait(lambda: False, began_s + 60.0, stoppable=False)
+    assert not main_queue.wait(lambda: False, began_s + 60.0, stoppable=False)
     assert time.monotonic() - began_s < 10.0
 
 
 @pytest.mark.parametrize("left_s", [1e9, math.inf])
 def test_an_end_may_be_years_away(left_s: float) -> None:
-    inbox: Inbox[str] = Inbox()
-    inbox.wake()
-    assert inbox.bell.wait(time.monotonic() + left_s)
-    assert not inbox.bell.wait(time.monotonic() + 0.01)
+    main_queue: MainQueue[str] = MainQueue()
+    main_queue.wake()
+    assert main_queue.bell.wait(time.monotonic() + left_s)
+    assert not main_queue.bell.wait(time.monotonic() + 0.01)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.diagnostics import Diagnostic
-from composer.loading import Loading, findings_of, load, load_files
+from composer.loading import LoadResult, findings_of, load, load_files
 from composer.model import System
 
 CAMERA = """\
@@ -45,13 +45,13 @@ def project(folder: Path, **files: str) -> Path:
     return paths[0]
 
 
-def included(folder: Path, include: str, rest: str = "", **files: str) -> Loading:
+def included(folder: Path, include: str, rest: str = "", **files: str) -> LoadResult:
     text = f"system: whole\ninclude:\n  - {include}\n{rest}"
     path = project(folder, **{"whole": text, "camera": CAMERA, **files})
     return load(path, shown="whole.yaml")
 
 
-def system_of(loading: Loading) -> System:
+def system_of(loading: LoadResult) -> System:
     assert [
         f"{item.primary}: {item.message}"
         for item in loading.diagnostics

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.runtime.inspect_rates import BandwidthWindow, DelayWindow, RateWindow
+from composer.remote.rates import BandwidthWindow, DelayWindow, RateWindow
 
 
 def test_the_rate_is_that_of_the_periods() -> None:

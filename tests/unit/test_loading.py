@@ -7,7 +7,7 @@ import pytest
 from composer.diagnostics import Severity
 from composer.files import find_files
 from composer.interfaces import Interfaces
-from composer.loading import Loading, load, load_bytes
+from composer.loading import LoadResult, load, load_bytes
 from composer.resolve import CommandLine
 from composer.resources import nodes_folder, systems_folder
 
@@ -28,7 +28,7 @@ def interfaces() -> Interfaces:
     return Interfaces.load()
 
 
-def errors(loading: Loading) -> list[str]:
+def errors(loading: LoadResult) -> list[str]:
     return [
         f"{finding.primary.file.path}:{finding.primary.line} {finding.rule.name}"
         for finding in loading.diagnostics

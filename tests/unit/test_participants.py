@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 from pathlib import Path
 
-from composer.runtime.participants import make_room_for_announcements, participants_here
+from composer.runtime.process.dds_participants import make_room_for_announcements, participants_here
 
 HEAD = "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  inode\n"
 

@@ -9,9 +9,9 @@ from time import monotonic
 
 import pytest
 
-from composer.runtime import pending as module
-from composer.runtime.pending import Pending
-from composer.runtime.tasks import Future
+from composer.runtime.executors.tasks import Future
+from composer.runtime.intra_process import pending as module
+from composer.runtime.intra_process.pending import Pending
 
 
 class Clock:

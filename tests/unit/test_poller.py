@@ -10,8 +10,8 @@ from time import monotonic
 
 import pytest
 
-from composer.runtime import poller as module
-from composer.runtime.poller import Poller
+from composer.runtime.executors import poller as module
+from composer.runtime.executors.poller import Poller
 
 _LONG_S = 30.0
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.diagnostics import Rule
-from composer.report.catalogue import BANDS, all_rules, explain, find_rule, page
+from composer.report.rule_page import BANDS, all_rules, explain, find_rule, page
 from composer.report.samples import files_of
 
 PAGE = Path(__file__).parents[2] / "docs" / "rules.md"

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.shared_memory import remove_half_made_ports
-from composer.runtime.start_refused import StartRefused
+from composer.runtime.process.errors import StartRefused
+from composer.runtime.process.shared_memory import remove_half_made_ports
 
 READY, INITIALIZING = b"\x02\0\0\0 the rest", b"\x01\0\0\0 the rest"
 LONG_AGO_S = time.time() - 3600.0

@@ -13,21 +13,21 @@ while os.read(0, 1):
 """
 RECEIVER = f"""
 import os, random, subprocess, sys, time
-from composer.runtime.inbox import Inbox
-from composer.runtime.signals import stop_signals
+from composer.runtime.supervision.main_queue import MainQueue
+from composer.runtime.process.signals import stop_signals
 
-inbox = Inbox()
+main_queue = MainQueue()
 sender = subprocess.Popen([sys.executable, "-c", '''{SENDER}'''], stdin=subprocess.PIPE)
-with stop_signals(inbox.ask, inbox.bell, ends_process=True):
+with stop_signals(main_queue.ask, main_queue.bell, ends_process=True):
     for _ in range({ROUNDS}):
         os.write(sender.stdin.fileno(), b"!")
         until_s = time.perf_counter() + random.uniform(0.0, 100e-6)  # the signal is on its way
         while time.perf_counter() < until_s:
             pass
-        while not inbox.closing:
-            inbox.take()
-        print(inbox.reason)
-        inbox.reason = None
+        while not main_queue.closing:
+            main_queue.take()
+        print(main_queue.reason)
+        main_queue.reason = None
 """
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from composer.runtime.simulated_calls import NANOSECONDS, SimulatedCalls
+from composer.runtime.clock.sim_timers import NANOSECONDS, SimulatedCalls
 
 
 class Loop:

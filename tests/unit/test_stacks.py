@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from composer.runtime.stacks import shown, stacks_of, undisturbed
+from composer.runtime.executors.stacks import shown, stacks_of, undisturbed
 
 
 @pytest.fixture

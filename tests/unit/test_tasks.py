@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from composer.runtime.tasks import (
+from composer.runtime.executors.tasks import (
     Cancelled,
     Future,
     Task,

@@ -7,7 +7,7 @@ from time import monotonic
 
 import pytest
 
-from composer.runtime.timers import ScheduledCall, Timetable
+from composer.runtime.executors.timer_queue import ScheduledCall, Timetable
 
 
 def call(due_s: float, period_s: float | None = None) -> ScheduledCall:

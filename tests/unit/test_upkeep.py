@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from composer.model import OnFailure, PrimaryState, System
-from composer.plan import Fault, FaultKind, Upkeep, Verdict, judge, mend, wanted
+from composer.plan import Decision, DesiredState, Fault, FaultKind, judge, mend, wanted
 from tests.unit.resolving import system_of
 
 ACTIVE = PrimaryState.ACTIVE
@@ -49,12 +49,12 @@ def fault(node: str, at_s: float = 100.0, kind: FaultKind = FaultKind.SILENCE) -
     ],
 )
 def test_where_nodes_are_wanted_while_some_are_held_down(down: tuple[str, ...], goals: str) -> None:
-    upkeep = Upkeep(states("aaaaa"), dict.fromkeys(down, "silent"))
+    upkeep = DesiredState(states("aaaaa"), dict.fromkeys(down, "silent"))
     assert wanted(robot(), upkeep) == states(goals)
 
 
 def test_nobody_is_wanted_further_up_because_another_one_fails() -> None:
-    upkeep = Upkeep(states("aiuii"), {"sensor": "silent"})
+    upkeep = DesiredState(states("aiuii"), {"sensor": "silent"})
     assert wanted(robot(), upkeep) == states("uiuii")
 
 
@@ -74,9 +74,9 @@ UP = [
 
 def test_dependents_pause_before_a_restart_and_resume_behind_it() -> None:
     system = robot()
-    upkeep = Upkeep(states("aaaaa"))
+    upkeep = DesiredState(states("aaaaa"))
     verdict = judge(system, upkeep, fault("sensor"))
-    assert verdict == Verdict(OnFailure.RESTART, "silent for 300 ms", wait_s=0.5, attempt=1)
+    assert verdict == Decision(OnFailure.RESTART, "silent for 300 ms", wait_s=0.5, attempt=1)
 
     upkeep = upkeep.fail(fault("sensor"))
     assert str(mend(system, upkeep, states("aaaaa"), "")).splitlines() == DOWN
@@ -89,7 +89,9 @@ def test_dependents_pause_before_a_restart_and_resume_behind_it() -> None:
 
 def test_what_somebody_has_paused_by_hand_stays_paused() -> None:
     system = robot()
-    upkeep = Upkeep(states("aaaaa")).want({"motor": PrimaryState.INACTIVE}).fail(fault("sensor"))
+    upkeep = (
+        DesiredState(states("aaaaa")).want({"motor": PrimaryState.INACTIVE}).fail(fault("sensor"))
+    )
     down = mend(system, upkeep, states("aaiaa"), "")
     assert [step.node for step in down.steps] == ["planner", "sensor", "sensor"]
     up = mend(system, upkeep.restart("sensor", 100.5), states("uiiaa"), "restart")
@@ -98,7 +100,7 @@ def test_what_somebody_has_paused_by_hand_stays_paused() -> None:
 
 def test_nobody_is_sent_up_before_what_somebody_keeps_low_by_hand() -> None:
     system = robot()
-    upkeep = Upkeep(states("aiaaa"))
+    upkeep = DesiredState(states("aiaaa"))
     assert mend(system, upkeep, states("aiaaa"), "").steps == (), "nor is anybody taken down"
     plan = mend(system, upkeep, states("aiuua"), "")
     assert [f"{step.transition} {step.node}" for step in plan.steps] == [
@@ -109,7 +111,7 @@ def test_nobody_is_sent_up_before_what_somebody_keeps_low_by_hand() -> None:
 
 
 def test_a_second_fault_of_a_node_that_is_held_down_is_none() -> None:
-    upkeep = Upkeep(states("aaaaa")).fail(fault("sensor"))
+    upkeep = DesiredState(states("aaaaa")).fail(fault("sensor"))
     assert judge(robot(), upkeep, fault("sensor")) is None
     assert judge(robot(), upkeep, fault("camera")) is not None
     assert judge(robot(), upkeep, fault("nobody")) is None
@@ -117,7 +119,7 @@ def test_a_second_fault_of_a_node_that_is_held_down_is_none() -> None:
 
 def test_two_nodes_that_fail_one_after_the_other_come_back_one_after_the_other() -> None:
     system = robot()
-    upkeep = Upkeep(states("aaaaa")).fail(fault("sensor")).fail(fault("planner"))
+    upkeep = DesiredState(states("aaaaa")).fail(fault("sensor")).fail(fault("planner"))
     down = mend(system, upkeep, states("aaaaa"), "")
     assert [f"{step.transition} {step.node}" for step in down.steps] == [
         "deactivate motor",
@@ -158,7 +160,7 @@ BUDGET = "{on_failure: restart, restart: {max_attempts: 3, window_ms: 10000, bac
 def test_the_budget(
     restarts: tuple[float, ...], action: OnFailure, wait_s: float, attempt: int
 ) -> None:
-    upkeep = Upkeep(states("aaaaa"), restarts={"sensor": restarts})
+    upkeep = DesiredState(states("aaaaa"), restarts={"sensor": restarts})
     verdict = judge(robot(BUDGET), upkeep, fault("sensor"))
     assert verdict is not None
     assert (verdict.action, verdict.wait_s, verdict.attempt) == (action, wait_s, attempt)
@@ -180,14 +182,14 @@ def test_the_budget(
 )  # fmt: skip
 def test_policies(policy: str, kind: FaultKind, action: OnFailure, reason: str) -> None:
     system = robot(f"{{on_failure: {policy}}}")
-    verdict = judge(system, Upkeep(states("aaaaa")), fault("sensor", kind=kind))
+    verdict = judge(system, DesiredState(states("aaaaa")), fault("sensor", kind=kind))
     assert verdict is not None
     assert (verdict.action, verdict.reason) == (action, reason)
 
 
 def test_an_isolated_node_stays_down_and_the_others_go_on() -> None:
     system = robot("{on_failure: isolate}")
-    upkeep = Upkeep(states("aaaaa")).fail(fault("planner"))
+    upkeep = DesiredState(states("aaaaa")).fail(fault("planner"))
     plan = mend(system, upkeep, states("auaaa"), "")
     assert str(plan).splitlines() == [
         "#1 deactivate /motor: it needs planner, which is down",

@@ -12,15 +12,15 @@ from rclpy.action.client import ActionClient
 
 from composer.behavior import CallCancelled, CallError, GoalRejected
 from composer.model import Event, Port
-from composer.runtime.core import Core
-from composer.runtime.line import line_for
-from composer.runtime.messages import interface_class
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.callbacks.queue import line_for
+from composer.runtime.callbacks.reactions import RunningReaction
+from composer.runtime.callbacks.timing import CallbackTimer
+from composer.runtime.executors.tasks import Future
 from composer.runtime.ports.client import DEFAULT_TIMEOUT_MS
-from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.ports.waiting import Waiting
-from composer.runtime.reactions import RunningReaction
-from composer.runtime.tasks import Future
-from composer.runtime.tracing import CallbackTimer
+from composer.runtime.ros.messages import interface_class
+from composer.runtime.ros.qos_profiles import rclpy_profile
 
 OnFeedback = Callable[[Any], Any]
 
@@ -63,7 +63,7 @@ class ActionClientPort:
     their end.
     """
 
-    def __init__(self, core: Core, port: Port) -> None:
+    def __init__(self, core: NodeContext, port: Port) -> None:
         self._core = core
         self._find_server = core.delivery.find_action_server(port)
         self._name = port.name.value

@@ -10,17 +10,17 @@ from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, Serv
 
 from composer.behavior import CallCancelled
 from composer.model import FeedbackSteps, Port
-from composer.runtime.core import Core
-from composer.runtime.delivery.action import LocalActionServer
-from composer.runtime.line import line_for
-from composer.runtime.messages import Build, compile_message, interface_class
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.callbacks.queue import line_for
+from composer.runtime.callbacks.reactions import RunningReaction
+from composer.runtime.callbacks.timing import CallbackTimer
+from composer.runtime.executors.tasks import Cancelled, Future, sleep, within
+from composer.runtime.executors.user_code import calls_user_code
+from composer.runtime.intra_process.action import LocalActionServer
 from composer.runtime.ports.goal import RunningGoal
 from composer.runtime.ports.port import callback_group
-from composer.runtime.ports.profiles import rclpy_profile
-from composer.runtime.reactions import RunningReaction
-from composer.runtime.tasks import Cancelled, Future, sleep, within
-from composer.runtime.tracing import CallbackTimer
-from composer.runtime.user_code import calls_user_code
+from composer.runtime.ros.messages import Build, compile_message, interface_class
+from composer.runtime.ros.qos_profiles import rclpy_profile
 
 #: How long handlers may take to end their goals once the node leaves *active*.
 CANCEL_LIMIT_S = 1.0
@@ -42,7 +42,7 @@ class ActionServerPort:
     """
 
     def __init__(
-        self, core: Core, port: Port, reaction: RunningReaction | None, handlers: Handlers
+        self, core: NodeContext, port: Port, reaction: RunningReaction | None, handlers: Handlers
     ) -> None:
         """Join the action. Raises MessageError."""
         self._core = core

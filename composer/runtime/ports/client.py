@@ -6,14 +6,14 @@ from typing import Any
 
 from composer.behavior import CallCancelled, CallError
 from composer.model import Event, Port
-from composer.runtime.core import Core
-from composer.runtime.delivery.server import Server
-from composer.runtime.messages import interface_class
-from composer.runtime.ports.profiles import rclpy_profile
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.callbacks.reactions import RunningReaction
+from composer.runtime.callbacks.timing import CallbackTimer
+from composer.runtime.executors.tasks import Future, wrap_future
+from composer.runtime.intra_process.service import Server
 from composer.runtime.ports.waiting import Waiting
-from composer.runtime.reactions import RunningReaction
-from composer.runtime.tasks import Future, wrap_future
-from composer.runtime.tracing import CallbackTimer
+from composer.runtime.ros.messages import interface_class
+from composer.runtime.ros.qos_profiles import rclpy_profile
 
 #: The limit of a call when the YAML names none.
 DEFAULT_TIMEOUT_MS = 5000.0
@@ -22,7 +22,7 @@ DEFAULT_TIMEOUT_MS = 5000.0
 class ClientPort:
     """Calls a service. What comes back goes to the caller and to the port's own reactions."""
 
-    def __init__(self, core: Core, port: Port) -> None:
+    def __init__(self, core: NodeContext, port: Port) -> None:
         self._core = core
         self._find_server = core.delivery.find_server(port)
         self._name = port.name.value

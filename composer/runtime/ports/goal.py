@@ -8,7 +8,7 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from rclpy.action.server import GoalEvent, ServerGoalHandle
 
-from composer.runtime.tasks import Future
+from composer.runtime.executors.tasks import Future
 
 
 class RunningGoal:

@@ -8,12 +8,12 @@ from math import inf
 from typing import Any, Protocol
 
 from composer.model import Port
-from composer.runtime.core import Core
-from composer.runtime.loop import Taken
-from composer.runtime.ports.callback import Callback
+from composer.runtime.callbacks.callback import Callback
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.executors.loop import Taken
+from composer.runtime.executors.strand import InlineStrand
+from composer.runtime.metrics.statistics import CallbackStatistics
 from composer.runtime.ports.queue import Queue, queue_of
-from composer.runtime.statistics import CallbackStatistics
-from composer.runtime.strand import Direct
 
 #: The queue and the turn of a mailbox, and objects that are used when a message is handled.
 Needed = tuple[Queue, Callable[[], object], object, object, object, object, object, object, object]
@@ -34,7 +34,7 @@ class Mailbox(Callback):
 
     They are handled on its loop, one per turn of it, so that a flood holds nobody up, and one at a
     time: what a handler awaits, the next message waits for as well. Everything that a message needs
-    is in this one object, as in :class:`~composer.runtime.delivery.sender.Sender`.
+    is in this one object, as in :class:`~composer.runtime.intra_process.publisher.Sender`.
 
     Each message brings a turn along. One that pushes another out does not, or a flood would fill
     the loop; there, and after a handler that awaited, an extra turn takes one message and sees to
@@ -59,7 +59,7 @@ class Mailbox(Callback):
 
     def __init__(
         self,
-        core: Core,
+        core: NodeContext,
         port: Port,
         handle: Callable[[Any], Any],
         statistics: CallbackStatistics,
@@ -82,7 +82,7 @@ class Mailbox(Callback):
         self._has_no_extra = [True]
         self._is_awaiting = False
         # On a loop of one thread one is at a time anyway.
-        self._is_direct = self._overlaps or isinstance(core.strand, Direct)
+        self._is_direct = self._overlaps or isinstance(core.strand, InlineStrand)
         self._turn = self._one_at_a_time(self._take_turn)
         self._extra_turn = self._one_at_a_time(self._take_extra_turn)
         self._needed = self._what_is_needed()

@@ -7,7 +7,7 @@ from typing import Protocol
 from rclpy.callback_groups import CallbackGroup, ReentrantCallbackGroup
 
 from composer.model import Port
-from composer.runtime.core import Core
+from composer.runtime.callbacks.context import NodeContext
 
 
 class RunningPort(Protocol):
@@ -23,6 +23,6 @@ class RunningPort(Protocol):
         """Give back everything."""
 
 
-def callback_group(core: Core, port: Port) -> CallbackGroup:
+def callback_group(core: NodeContext, port: Port) -> CallbackGroup:
     """Return the callback group of the port: the one all ports of its node share, if it may."""
     return ReentrantCallbackGroup() if port.reentrant else core.group

@@ -8,12 +8,12 @@ from typing import cast
 from rclpy.event_handler import PublisherEventCallbacks
 
 from composer.model import Port
-from composer.runtime.core import Core
-from composer.runtime.delivery.sender import Origin, Target
-from composer.runtime.messages import interface_class
-from composer.runtime.mutation import Remembered
-from composer.runtime.ports.profiles import rclpy_profile
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.callbacks.mutation_check import Remembered
+from composer.runtime.intra_process.publisher import Origin, Target
 from composer.runtime.ports.qos_events import QosEvents
+from composer.runtime.ros.messages import interface_class
+from composer.runtime.ros.qos_profiles import rclpy_profile
 
 
 class PublisherPort:
@@ -30,7 +30,7 @@ class PublisherPort:
         "sender",
     )
 
-    def __init__(self, core: Core, port: Port) -> None:
+    def __init__(self, core: NodeContext, port: Port) -> None:
         self._core = core
         self._name = port.name.value
         self._qos_events = QosEvents(core, port)

@@ -21,10 +21,10 @@ from rclpy.event_handler import (
 )
 
 from composer.model import Port, PortKind
-from composer.runtime.core import Core
-from composer.runtime.ports.misfits import Misfits
-from composer.runtime.repeated import Repeated
-from composer.runtime.topic_ends import topic_info
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.ports.incompatible_qos import Misfits
+from composer.runtime.ports.repeated import Repeated
+from composer.runtime.ros.endpoints import topic_info
 
 _PUBLISHER = QoSPublisherEventType
 _SUBSCRIPTION = QoSSubscriptionEventType
@@ -58,15 +58,15 @@ class QosEvents:
     """What rclpy makes the event handlers of one port with: its ``event_callbacks``.
 
     There are none: ends that do not fit, deadlines and the own liveliness are counted as they are
-    announced (:mod:`composer.runtime.announced_events`); of lost messages and of the liveliness of
+    announced (``event_counts``); of lost messages and of the liveliness of
     others the status is taken, which tells how many, and loss from return. That a publisher has
-    matched is for delivery to know (:class:`~composer.runtime.marks.MatchEvent`): rmw tells one
+    matched is for delivery to know (``MatchEvent``): rmw tells one
     callback of each kind of event.
 
     What goes on with a port of a node that is not active is nobody's concern: it is to be silent.
     """
 
-    def __init__(self, core: Core, port: Port) -> None:
+    def __init__(self, core: NodeContext, port: Port) -> None:
         self._core = core
         self._port = port
         self._misfits = Misfits(core, port)

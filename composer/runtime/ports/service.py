@@ -6,18 +6,18 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from composer.model import Port
-from composer.runtime.core import Core
-from composer.runtime.delivery.server import Server
-from composer.runtime.line import line_for
-from composer.runtime.log import describe
-from composer.runtime.loop import Reply
-from composer.runtime.messages import interface_class
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.callbacks.log import describe
+from composer.runtime.callbacks.queue import line_for
+from composer.runtime.callbacks.reactions import RunningReaction
+from composer.runtime.callbacks.timing import CallbackTimer
+from composer.runtime.executors.loop import Reply
+from composer.runtime.executors.tasks import Cancelled
+from composer.runtime.executors.user_code import calls_user_code
+from composer.runtime.intra_process.service import Server
 from composer.runtime.ports.port import callback_group
-from composer.runtime.ports.profiles import rclpy_profile
-from composer.runtime.reactions import RunningReaction
-from composer.runtime.tasks import Cancelled
-from composer.runtime.tracing import CallbackTimer
-from composer.runtime.user_code import calls_user_code
+from composer.runtime.ros.messages import interface_class
+from composer.runtime.ros.qos_profiles import rclpy_profile
 
 Handler = Callable[[Any, Any], Any]
 
@@ -50,7 +50,11 @@ class ServicePort:
     """
 
     def __init__(
-        self, core: Core, port: Port, reaction: RunningReaction | None, handler: Handler | None
+        self,
+        core: NodeContext,
+        port: Port,
+        reaction: RunningReaction | None,
+        handler: Handler | None,
     ) -> None:
         self._core = core
         self._name = port.name.value

@@ -12,14 +12,14 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 
 from composer.model import Port
 from composer.qos import Durability
-from composer.runtime.core import Core
-from composer.runtime.messages import interface_class
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.callbacks.reactions import RunningReaction
+from composer.runtime.callbacks.timing import watched
 from composer.runtime.ports.mailbox import Mailbox, OverlappingMailbox
 from composer.runtime.ports.port import callback_group
-from composer.runtime.ports.profiles import rclpy_profile
 from composer.runtime.ports.qos_events import QosEvents
-from composer.runtime.reactions import RunningReaction
-from composer.runtime.tracing import watched
+from composer.runtime.ros.messages import interface_class
+from composer.runtime.ros.qos_profiles import rclpy_profile
 
 
 class SubscriptionPort:
@@ -49,7 +49,7 @@ class SubscriptionPort:
 
     def __init__(
         self,
-        core: Core,
+        core: NodeContext,
         port: Port,
         reaction: RunningReaction | None,
         handler: Callable[[Any], Any] | None,

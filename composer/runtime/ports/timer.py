@@ -10,12 +10,12 @@ from typing import Any
 from composer.expressions import EvaluationError, Expression
 from composer.model import Period, TimerClock
 from composer.model import Timer as TimerModel
-from composer.runtime.core import Core
-from composer.runtime.line import line_for
-from composer.runtime.loop import Timer
-from composer.runtime.ports.callback import NOTHING, Callback
-from composer.runtime.reactions import RunningReaction
-from composer.runtime.tracing import watched
+from composer.runtime.callbacks.callback import NOTHING, Callback
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.callbacks.queue import line_for
+from composer.runtime.callbacks.reactions import RunningReaction
+from composer.runtime.callbacks.timing import watched
+from composer.runtime.executors.loop import Timer
 
 
 class PeriodError(Exception):
@@ -45,7 +45,7 @@ class TimerPort(Callback):
 
     def __init__(
         self,
-        core: Core,
+        core: NodeContext,
         timer: TimerModel,
         reaction: RunningReaction | None,
         handler: Callable[[], Any] | None,

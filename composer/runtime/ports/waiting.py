@@ -8,8 +8,8 @@ from math import inf
 from typing import Any, TypeVar
 
 from composer.behavior import CallCancelled, CallTimeout, ServerUnavailable
-from composer.runtime.core import Core
-from composer.runtime.tasks import Future, sleep, wrap_future
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.executors.tasks import Future, sleep, wrap_future
 
 T = TypeVar("T")
 
@@ -22,7 +22,7 @@ class Waiting:
 
     __slots__ = ("_core", "_end_s", "_period", "_timeout_ms", "_what")
 
-    def __init__(self, core: Core, what: str, timeout_ms: float | None) -> None:
+    def __init__(self, core: NodeContext, what: str, timeout_ms: float | None) -> None:
         """Without ``timeout_ms`` there is no limit. Raises CallCancelled in the wrong state."""
         self._period = core.gate.period  # looked at first, so that no end of it is missed
         if not core.gate.outgoing:

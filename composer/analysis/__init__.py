@@ -1,0 +1,1 @@
+"""What several rules compute: rates, wiring, periods, publications, parameter values."""

@@ -1,0 +1,114 @@
+"""How much of its time an executor may need, by the budgets of its callbacks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from composer.analysis.context import Context
+from composer.analysis.publications import Cause
+from composer.analysis.rates import Rates, rates
+from composer.analysis.words import number
+from composer.diagnostics import Label
+from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, Timer
+from composer.source import Located, Span
+
+#: So many callbacks are named in a message and shown beside it, those with most to do first.
+SHOWN = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """What one callback may take: ``rate_hz`` times ``budget_ms``."""
+
+    name: str  # "motor.step"
+    rate_hz: float
+    budget_ms: Located[float]
+    reentrant: bool
+
+    @property
+    def seconds(self) -> float:
+        """Seconds a second."""
+        return self.rate_hz * self.budget_ms.value / 1000.0
+
+    def __str__(self) -> str:
+        return f"{self.name} {number(self.rate_hz)} Hz x {number(self.budget_ms.value)} ms"
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """What callbacks may take together; ``threads`` is what there is for them."""
+
+    what: str  # "executor 'control'"
+    span: Span
+    threads: int
+    shares: tuple[Share, ...]
+
+    @property
+    def ratio(self) -> float:
+        """Time that may be needed, in terms of the time there is."""
+        return sum(share.seconds for share in self.shares) / self.threads
+
+    @property
+    def told(self) -> str:
+        """The sum, as a message shows it."""
+        ordered = self._ordered()
+        terms = [str(share) for share in ordered[:SHOWN]]
+        if len(ordered) > SHOWN:
+            terms.append(f"{len(ordered) - SHOWN} more")
+        of = f" of {self.threads} threads" if self.threads > 1 else ""
+        return f"{' + '.join(terms)} = {number(self.ratio * 100)} %{of}"
+
+    @property
+    def labels(self) -> tuple[Label, ...]:
+        """Where the budgets stand."""
+        return tuple(
+            Label(share.budget_ms.span, f"{share} = {number(share.seconds * 100)} %")
+            for share in self._ordered()[:SHOWN]
+        )
+
+    def _ordered(self) -> list[Share]:
+        return sorted(self.shares, key=lambda share: (-share.seconds, share.name))
+
+
+def loads(context: Context) -> tuple[Load, ...]:
+    """Return the load of every executor on which a callback has a budget and a known rate.
+
+    Callbacks of a node run one at a time, unless they are reentrant, however many threads there
+    are: on an executor with several threads each node is a load of its own, too.
+    """
+    known = context.once(rates)
+    declared = {executor.name.value: executor for executor in context.system.executors}
+    shares: dict[str, list[Share]] = {}
+    found = []
+    for node in context.system.nodes:
+        name = node.executor.value if node.executor is not None else DEFAULT_EXECUTOR
+        of_node = tuple(_shares(known, node))
+        shares.setdefault(name, []).extend(of_node)
+        alone = tuple(share for share in of_node if not share.reentrant)
+        if alone and name in declared and _threads(declared[name]) > 1:
+            found.append(Load(f"node '{node.name}', one at a time,", node.name.span, 1, alone))
+    for name, executor in declared.items():
+        of_executor = tuple(shares.pop(name, ()))
+        if of_executor:
+            what = f"executor '{name}'"
+            found.append(Load(what, executor.name.span, _threads(executor), of_executor))
+    if shares.get(DEFAULT_EXECUTOR):
+        what = f"executor '{DEFAULT_EXECUTOR}'"
+        found.append(Load(what, context.system.span, 1, tuple(shares[DEFAULT_EXECUTOR])))
+    return tuple(found)
+
+
+def _threads(executor: Executor) -> int:
+    return max(executor.threads, 1) if executor.kind is ExecutorKind.MULTI_THREADED else 1
+
+
+def _shares(known: Rates, node: Node) -> Iterator[Share]:
+    callbacks: list[tuple[Timer | Port, Cause]] = []
+    callbacks += [(timer, Cause(timer=timer)) for timer in node.timers]
+    callbacks += [(port, Cause(port=port)) for port in node.ports]
+    for callback, cause in callbacks:
+        budget_ms = callback.budget_ms
+        rate_hz = known.callback_hz(node, cause) if budget_ms is not None else None
+        if budget_ms is not None and rate_hz is not None:
+            yield Share(f"{node.name}.{callback.name}", rate_hz, budget_ms, callback.reentrant)

@@ -1,0 +1,131 @@
+"""How often messages come: publishers, topics and callbacks, as far as the declaration tells.
+
+A rate is the highest there can be: what depends on a condition may come less often.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from composer.analysis.context import Context
+from composer.analysis.periods import period_seconds
+from composer.analysis.publications import Cause, Causes, causes
+from composer.model import ChannelKind, Node, PortKind, PortOfNode
+
+
+def timed_publishers(context: Context) -> tuple[tuple[PortOfNode, float], ...]:
+    """Return every publisher that only timers publish through, with their shortest period.
+
+    The period is in seconds.
+    """
+    found = []
+    for node in context.system.nodes:
+        for port in node.ports_of(PortKind.PUBLISHER):
+            of_port = context.once(causes).get(_key(PortOfNode(node, port)), ())
+            periods = [
+                period_seconds(node, cause.timer) if cause.timer is not None else None
+                for cause in of_port
+            ]
+            known = [period_s for period_s in periods if period_s is not None]
+            if known and len(known) == len(periods):
+                found.append((PortOfNode(node, port), min(known)))
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """Rates in hertz; None where they are not known."""
+
+    causes: Causes
+    topics: Mapping[str, float | None]
+
+    def topic_hz(self, name: str) -> float | None:
+        """Return how many messages a second come on a topic."""
+        return self.topics.get(name)
+
+    def publisher_hz(self, end: PortOfNode) -> float | None:
+        """Return how many messages a second a publisher sends."""
+        return _publisher_hz(self.causes, self.topics, end)
+
+    def callback_hz(self, node: Node, cause: Cause) -> float | None:
+        """Return how often the callback of a timer or a subscription runs."""
+        return _callback_hz(self.topics, node, cause)
+
+
+def rates(context: Context) -> Rates:
+    """Return the rates of a system."""
+    known = context.once(causes)
+    publishers = {
+        channel.name: channel.sources
+        for channel in context.channels
+        if channel.kind is ChannelKind.TOPIC
+        and channel.sources
+        and not any(end.port.external for end in channel.sinks)  # others publish there, too
+    }
+    topics: dict[str, float | None] = {}
+    for name in _in_order_of_cause(known, publishers):
+        topics[name] = _total(_publisher_hz(known, topics, end) for end in publishers[name])
+    return Rates(known, topics)
+
+
+def _in_order_of_cause(
+    known: Causes, publishers: Mapping[str, tuple[PortOfNode, ...]]
+) -> Iterator[str]:
+    """Yield the topics, each behind those whose messages make others on it.
+
+    What goes round in a circle is left out: it has no rate.
+    """
+    waits: dict[str, int] = {}
+    makes: dict[str, list[str]] = {}
+    for name, ends in publishers.items():
+        before = {
+            cause.port.full_name
+            for end in ends
+            for cause in known.get(_key(end), ())
+            if cause.port is not None and cause.port.full_name in publishers
+        }
+        waits[name] = len(before)
+        for other in before:
+            makes.setdefault(other, []).append(name)
+    ready = [name for name, count in waits.items() if not count]
+    while ready:
+        name = ready.pop()
+        yield name
+        for made in makes.get(name, ()):
+            waits[made] -= 1
+            if not waits[made]:
+                ready.append(made)
+
+
+def _publisher_hz(
+    known: Causes, topics: Mapping[str, float | None], end: PortOfNode
+) -> float | None:
+    found = known.get(_key(end))
+    if found is None:
+        return None
+    return _total(_callback_hz(topics, end.node, cause) for cause in found)
+
+
+def _callback_hz(topics: Mapping[str, float | None], node: Node, cause: Cause) -> float | None:
+    if cause.timer is not None:
+        period_s = period_seconds(node, cause.timer)
+        return 1.0 / period_s if period_s is not None else None
+    port = cause.port
+    if port is None or port.kind is not PortKind.SUBSCRIPTION:
+        return None
+    return topics.get(port.full_name)
+
+
+def _total(found: Iterable[float | None]) -> float | None:
+    """Return the sum; None when a part of it is not known."""
+    total = 0.0
+    for rate_hz in found:
+        if rate_hz is None:
+            return None
+        total += rate_hz
+    return total
+
+
+def _key(end: PortOfNode) -> tuple[str, str]:
+    return end.node.name.value, end.port.name.value

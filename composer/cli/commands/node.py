@@ -1,0 +1,79 @@
+"""``compose node``: the nodes of the ROS graph, whoever wrote them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from composer.cli.support.help import examples
+from composer.cli.support.listing import Count, Hidden, Json, say_none_found
+from composer.cli.support.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.support.terminal import columns, write
+from composer.cli.support.values import as_json
+
+app = typer.Typer(
+    help="See the nodes that run, and what each offers and uses.",
+    epilog=examples("compose node list", "compose node info planner"),
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+_SECTIONS = (
+    ("Subscribers", "subscriptions"),
+    ("Publishers", "publishers"),
+    ("Service Servers", "services"),
+    ("Service Clients", "clients"),
+    ("Action Servers", "action_servers"),
+    ("Action Clients", "action_clients"),
+)
+
+
+@app.command("list", epilog=examples("compose node list", "compose node list --json"))
+def list_nodes(
+    *,
+    hidden: Hidden = False,
+    count: Count = False,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """List the nodes."""
+    with ros_session("compose node", timeout) as (session, deadline):
+        from composer.remote.graph_names import Names
+
+        nodes = Names(session, deadline).nodes(hidden=hidden)
+    if count:
+        write(str(len(nodes)))
+    elif json:
+        write(as_json(list(nodes), indent=2))
+    elif nodes:
+        write("\n".join(nodes))
+    else:
+        say_none_found("node")
+
+
+@app.command("info", epilog=examples("compose node info planner"))
+def info(
+    name: Annotated[
+        str, typer.Argument(metavar="NODE", help="Its full name, or the last part of just one.")
+    ],
+    *,
+    hidden: Hidden = False,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Print what a node publishes, subscribes to, serves and calls."""
+    with ros_session("compose node", timeout) as (session, deadline):
+        from composer.remote.graph_names import Names
+
+        found = asdict(Names(session, deadline).node(name, hidden=hidden))
+    if json:
+        write(as_json(found, indent=2))
+        return
+    lines = [found["name"]]
+    for title, key in _SECTIONS:
+        lines.append(f"  {title}:")
+        rows = [(f"    {item}:", ", ".join(types)) for item, types in found[key]]
+        lines += columns(rows).splitlines()
+    write("\n".join(lines))

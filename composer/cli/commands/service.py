@@ -1,0 +1,119 @@
+"""``compose service``: the services of the ROS graph, whoever serves them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.help import examples
+from composer.cli.support.listing import Count, Hidden, Json, ShowTypes, print_names
+from composer.cli.support.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.support.terminal import write
+from composer.cli.support.values import as_json, as_yaml
+
+if TYPE_CHECKING:
+    from composer.remote.graph_names import Names
+
+app = typer.Typer(
+    help="See the services, and call them.",
+    epilog=examples(
+        "compose service list -t",
+        "compose service type /plan_trajectory",
+        "compose service call /plan_trajectory '{goal: {x: 1.0}, max_velocity: 0.5}'",
+    ),
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+Service = Annotated[str, typer.Argument(metavar="SERVICE")]
+
+
+@app.command("list", epilog=examples("compose service list", "compose service list -t"))
+def list_services(
+    *,
+    types: ShowTypes = False,
+    count: Count = False,
+    hidden: Hidden = False,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """List the services."""
+    with ros_session("compose service", timeout) as (session, deadline):
+        from composer.remote.graph_names import Names
+
+        services = Names(session, deadline).services(hidden=hidden)
+    print_names("service", services, types=types, count=count, json=json)
+
+
+@app.command("type", epilog=examples("compose service type /plan_trajectory"))
+def type_of(service: Service, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
+    """Print the type of a service."""
+    with ros_session("compose service", timeout) as (session, deadline):
+        from composer.remote.graph_names import Names
+
+        types = Names(session, deadline).types("service", service)
+    write(as_json(list(types), indent=2) if json else "\n".join(types))
+
+
+@app.command(
+    "call",
+    epilog=examples(
+        "compose service call /plan_trajectory '{goal: {x: 1.0}, max_velocity: 0.5}'",
+        "compose service call /reset std_srvs/srv/Trigger",
+        "compose service call /switch std_srvs/srv/SetBool '{data: true}' --json",
+    ),
+)
+def call(
+    service: Service,
+    values: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[TYPE] [REQUEST]",
+            help="The type may be left out; the request is YAML.",
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Call a service and print the response."""
+    type_name, request = split_values(values or [])
+    with ros_session("compose service", timeout) as (session, deadline):
+        from composer.remote.calls import call_service
+        from composer.remote.graph_names import Names
+        from composer.remote.name_matching import full_name
+        from composer.remote.values import to_plain
+
+        name = full_name("service", service)
+        found = type_name or one_type(Names(session, deadline), "service", name)
+        response = to_plain(call_service(session, deadline, name, found, request))
+    write(as_json(response, indent=2) if json else as_yaml(response))
+
+
+def split_values(values: list[str]) -> tuple[str | None, str]:
+    """Return the type, if it is given, and the YAML. Raises UsageFailure."""
+    from composer.cli.support.failure import UsageFailure
+
+    match values:
+        case []:
+            return None, "{}"
+        case [text] if "/" in text and not text.lstrip().startswith("{"):
+            return text, "{}"
+        case [text]:
+            return None, text
+        case [type_name, text]:
+            return type_name, text
+        case _:
+            raise UsageFailure("too many arguments", hint="quote the YAML: '{data: true}'")
+
+
+def one_type(names: Names, kind: str, name: str) -> str:
+    """Return the only type of a service or action. Raises RosError where there are more."""
+    from composer.remote.session import RosError
+
+    types = names.types(kind, name)
+    if len(types) > 1:
+        raise RosError(f"{kind} '{name}' has more than one type", f"say which: {', '.join(types)}")
+    return types[0]

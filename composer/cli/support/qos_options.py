@@ -1,0 +1,64 @@
+"""The ``--qos-*`` options of topic commands, as ros2 has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Annotated, Any
+
+import typer
+
+from composer.cli.support.finite import finite
+from composer.cli.support.option_groups import option_group
+from composer.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
+
+
+class Preset(StrEnum):
+    """The presets of the language."""
+
+    SENSOR_DATA = "sensor_data"
+    COMMAND = "command"
+    STATE = "state"
+    SERVICES_DEFAULT = "services_default"
+    PARAMETERS = "parameters"
+    SYSTEM_DEFAULT = "system_default"
+
+
+@dataclass(frozen=True, slots=True)
+class QosWish:
+    """What the options say of a profile; None where they say nothing.
+
+    Each field is the option ``--qos-<field>``.
+    """
+
+    profile: Annotated[Preset | None, typer.Option(help="A preset.")] = None
+    history: Annotated[History | None, typer.Option()] = None
+    depth: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="How many messages are kept.")
+    ] = None
+    reliability: Annotated[Reliability | None, typer.Option()] = None
+    durability: Annotated[Durability | None, typer.Option()] = None
+    liveliness: Annotated[Liveliness | None, typer.Option()] = None
+    liveliness_lease_duration_seconds: Annotated[
+        float | None, typer.Option(min=0.0, callback=finite, metavar="SECONDS")
+    ] = None
+
+    def applied_to(self, start: QosProfile) -> QosProfile:
+        """Return ``start``, or the preset, with the policies that are given."""
+        lease_s = self.liveliness_lease_duration_seconds
+        policies = {
+            "history": self.history,
+            "depth": self.depth,
+            "reliability": self.reliability,
+            "durability": self.durability,
+            "liveliness": self.liveliness,
+            "liveliness_lease_duration_ms": None if lease_s is None else lease_s * 1000.0,
+        }
+        given: dict[str, Any] = {
+            name: value for name, value in policies.items() if value is not None
+        }
+        return replace(start if self.profile is None else PRESETS[self.profile.value], **given)
+
+
+#: For commands with a parameter ``qos``, which is a QosWish.
+takes_qos_options = option_group("qos", QosWish, prefix="qos_")

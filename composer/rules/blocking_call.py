@@ -1,0 +1,106 @@
+"""A handler that keeps everybody else waiting."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from composer.analysis.behaviors import GENERAL_HANDLERS, behaviors, handlers
+from composer.analysis.context import Context
+from composer.analysis.python_calls import calls_of
+from composer.behavior_source import BehaviorSource, Call
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.source import Span
+
+RULE = register(
+    Rule(
+        code="RC436",
+        name="blocking-call",
+        severity=Severity.WARNING,
+        summary="A handler calls something that waits, and blocks its executor meanwhile.",
+        why=(
+            "While a handler waits, no other callback of its executor runs: timers are late, "
+            "messages pile up, and a call to a node on the same executor never returns. Use "
+            "'await' in an async handler, or a timer."
+        ),
+        bad="""\
+# file: system.yaml
+system: behaviour
+nodes:
+  counter:
+    behavior: counter:Counter
+    timers: {tick: {period_ms: 1000}}
+# file: counter.py
+import time
+
+
+class Counter:
+    def on_tick(self):
+        time.sleep(0.5)
+""",
+        good="""\
+# file: system.yaml
+system: behaviour
+nodes:
+  counter:
+    behavior: counter:Counter
+    timers: {tick: {period_ms: 1000}}
+# file: counter.py
+class Counter:
+    async def on_tick(self):
+        await self.clock.sleep(0.5)
+""",
+    )
+)
+
+_BLOCKING = re.compile(
+    r"time\.sleep|input|os\.system|os\.wait|os\.waitpid"
+    r"|subprocess\.(run|call|check_call|check_output|getoutput|getstatusoutput)"
+    r"|requests\.(get|post|put|patch|delete|head|options|request)"
+    r"|urllib\.request\.(urlopen|urlretrieve)"
+    r"|socket\.create_connection"
+    r"|rclpy\.(spin|spin_once|spin_until_future_complete)"
+    r"|(.+\.)?spin_until_future_complete"
+    r"|(.+\.)?(sock|socket|connection|conn)\.(recv|recvfrom|recv_into|accept|connect)"
+)
+#: rclpy's own synchronous call; those of the composer's clients are awaited.
+_SYNCHRONOUS_CALL = re.compile(r"(.+\.)?\w*(client|cli)\.call")
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at what the handlers of every behaviour call, also through their own methods."""
+    for node, source in context.once(behaviors):
+        places = dict.fromkeys(GENERAL_HANDLERS, source.reference.text.span)
+        places |= {handler.name: handler.of.span for handler in handlers(node)}
+        seen: set[Span] = set()
+        for name, place in places.items():
+            yield from _handler(source, name, place, seen)
+
+
+def _handler(
+    source: BehaviorSource, name: str, place: Span, seen: set[Span]
+) -> Iterator[Diagnostic]:
+    """Report each line once, for the first handler that comes to it."""
+    method = source.method(name)
+    for call in calls_of(source, method) if method is not None else ():
+        if _blocks(call) and call.span not in seen:
+            seen.add(call.span)
+            yield Diagnostic(
+                RULE,
+                f"handler '{name}' of '{source.reference.class_name}' blocks in '{call.name}'",
+                place,
+                (Label(call.span, "waits here"),),
+                _hint(call),
+            )
+
+
+def _blocks(call: Call) -> bool:
+    if call.awaited or call.deferred:
+        return False
+    return bool(_BLOCKING.fullmatch(call.name) or _SYNCHRONOUS_CALL.fullmatch(call.name))
+
+
+def _hint(call: Call) -> str:
+    if call.name == "time.sleep":
+        return "use 'await self.clock.sleep(...)' in an async handler"
+    return "await something that does not block, or use a timer"

@@ -1,0 +1,64 @@
+"""A chain with a gap in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+from composer.analysis.chains import inputs
+from composer.analysis.context import Context
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import PortKind
+
+RULE = register(
+    Rule(
+        code="RC416",
+        name="broken-chain",
+        severity=Severity.ERROR,
+        summary="A node of a chain does not hear the one before it.",
+        why="Nothing goes through the chain, and its latency says nothing.",
+        bad="""\
+system: chain
+nodes:
+  lidar:
+    publishers: {scan: {type: std_msgs/msg/Float64, qos: sensor_data, external: true}}
+  brake:
+    publishers: {force: {type: std_msgs/msg/Float64, qos: command, external: true}}
+chains:
+  stop: {through: [lidar.scan, brake.force], latency_ms: 50}
+""",
+        good="""\
+system: chain
+nodes:
+  lidar:
+    publishers: {scan: {type: std_msgs/msg/Float64, qos: sensor_data}}
+  brake:
+    subscriptions:
+      scan: {type: std_msgs/msg/Float64, qos: sensor_data, publish: {force: "{message}"}}
+    publishers: {force: {type: std_msgs/msg/Float64, qos: command, external: true}}
+chains:
+  stop: {through: [lidar.scan, brake.force], latency_ms: 50}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at every two ports that follow each other in a chain."""
+    system = context.system
+    for chain in system.chains:
+        for before, after in pairwise(chain.through):
+            port, node = system.port(before), system.node(after.node)
+            if port is None or port.kind is not PortKind.PUBLISHER:
+                continue
+            if node is None or not node.complete or system.port(after) is None:
+                continue
+            if not any(inputs(node, port.full_name)):
+                yield Diagnostic(
+                    RULE,
+                    f"node '{node.name}' does not hear '{port.full_name}', "
+                    f"which '{before.text}' publishes",
+                    after.text.span,
+                    (Label(before.text.span, "comes before it"),),
+                    f"let '{node.name}' subscribe to it, or name what is between the two",
+                )

@@ -1,0 +1,75 @@
+"""A client that is active before what it calls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.words import end_name
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import Channel, ChannelKind, PortOfNode
+from composer.model.dependencies import (
+    dependency_cycles,
+    dependency_edges,
+    in_dependency_order,
+)
+
+RULE = register(
+    Rule(
+        code="RC403",
+        name="client-before-server",
+        severity=Severity.WARNING,
+        summary="A node that calls a service or action is started before the node that serves it.",
+        why=(
+            "Servers are started before their clients, unless 'depends_on' says otherwise. Here "
+            "it does, so the first calls find no server."
+        ),
+        bad="""\
+system: order
+nodes:
+  motor_controller:
+    clients: {plan: {type: std_srvs/srv/Trigger}}
+  planner:
+    services: {plan: {type: std_srvs/srv/Trigger, respond: {success: true}}}
+    lifecycle: {depends_on: [motor_controller]}
+""",
+        good="""\
+system: order
+nodes:
+  motor_controller:
+    clients: {plan: {type: std_srvs/srv/Trigger}}
+    lifecycle: {depends_on: [planner]}
+  planner:
+    services: {plan: {type: std_srvs/srv/Trigger, respond: {success: true}}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Hold the order of the bring-up against services and actions."""
+    system = context.system
+    if dependency_cycles(system) or not system.implied_dependencies:
+        return
+    order = in_dependency_order(system, dependency_edges(system))
+    rank = {name: place for place, name in enumerate(order)}
+    for channel in context.channels:
+        if channel.kind is ChannelKind.TOPIC or len(channel.sources) != 1:
+            continue
+        server = channel.sources[0]
+        for client in channel.sinks:
+            if rank[client.node.name.value] < rank[server.node.name.value]:
+                yield _finding(channel, client, server)
+
+
+def _finding(channel: Channel, client: PortOfNode, server: PortOfNode) -> Diagnostic:
+    cause = next(iter(server.node.depends_on), None)
+    place = cause.node.span if cause is not None else server.port.name.span
+    return Diagnostic(
+        RULE,
+        f"'{end_name(client)}' is started before '{end_name(server)}', "
+        f"the server of '{channel.name}'",
+        client.port.name.span,
+        (Label(place, f"'{server.node.name}' has to wait"),),
+        f"let '{client.node.name}' depend on '{server.node.name}'",
+    )

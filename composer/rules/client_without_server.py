@@ -1,0 +1,53 @@
+"""A client of a service or action that nobody serves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.near_miss import nearest_channel
+from composer.analysis.wiring import external_hint, lonely_ends, place_of
+from composer.analysis.words import end_name
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.model import PortKind
+
+RULE = register(
+    Rule(
+        code="RC322",
+        name="client-without-server",
+        severity=Severity.WARNING,
+        summary="Nothing in the system serves what a client calls.",
+        why=(
+            "Every call ends in a timeout: most often a name differs on the two sides. Where the "
+            "server is outside, 'external: true' says so."
+        ),
+        bad="""\
+system: unserved
+nodes:
+  operator:
+    clients: {reset: {type: std_srvs/srv/Trigger}}
+""",
+        good="""\
+system: unserved
+nodes:
+  operator:
+    clients: {reset: {type: std_srvs/srv/Trigger, external: true}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look for services and actions with clients only."""
+    for kind in (PortKind.CLIENT, PortKind.ACTION_CLIENT):
+        for end in lonely_ends(context, kind):
+            if end.port.required is None:
+                place, labels = place_of(end)
+                yield Diagnostic(
+                    RULE,
+                    f"nobody in this system serves '{end.port.full_name}', "
+                    f"which '{end_name(end)}' calls",
+                    place,
+                    labels,
+                    nearest_channel(context, end) or external_hint(end),
+                )

@@ -1,0 +1,51 @@
+"""A publisher that promises messages more often than it sends them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.rates import timed_publishers
+from composer.analysis.words import number
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+
+RULE = register(
+    Rule(
+        code="RC312",
+        name="deadline-too-short",
+        severity=Severity.WARNING,
+        summary="A publisher's deadline is shorter than the period it publishes with.",
+        why="Every single message is late, and every subscription is told of a missed deadline.",
+        bad="""\
+system: deadline
+nodes:
+  robot:
+    publishers:
+      pose: {type: geometry_msgs/msg/Pose, qos: {deadline_ms: 50}, external: true}
+    timers: {step: {period_ms: 100, publish: {pose: {}}}}
+""",
+        good="""\
+system: deadline
+nodes:
+  robot:
+    publishers:
+      pose: {type: geometry_msgs/msg/Pose, qos: {deadline_ms: 150}, external: true}
+    timers: {step: {period_ms: 100, publish: {pose: {}}}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Hold offered deadlines against the periods that timers publish with."""
+    for end, period_s in context.once(timed_publishers):
+        qos = end.port.qos
+        deadline_ms = qos.profile.deadline_ms
+        if qos.known and deadline_ms is not None and deadline_ms < period_s * 1000.0:
+            yield Diagnostic(
+                RULE,
+                f"publisher '{end.port.name}' promises a message every {number(deadline_ms)} ms, "
+                f"but publishes every {number(period_s * 1000.0)} ms",
+                qos.policy_span("deadline_ms"),
+                hint="leave the deadline some room above the period",
+            )

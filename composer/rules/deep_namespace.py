@@ -1,0 +1,49 @@
+"""A namespace that is nested too deep to be of use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.names import namespace_problem
+
+RULE = register(
+    Rule(
+        code="RC231",
+        name="deep-namespace",
+        severity=Severity.WARNING,
+        summary="A namespace has more than three levels.",
+        why=(
+            "Two or three levels (robot, subsystem, device) say where a node belongs. Deeper "
+            "names are mistyped, remapped wrongly and cut off in every tool."
+        ),
+        bad="""\
+system: deep
+nodes:
+  driver: {namespace: /robot/front/left/camera, on_activate: {log: started}}
+""",
+        good="""\
+system: deep
+nodes:
+  driver: {namespace: /robot/camera_front_left, on_activate: {log: started}}
+""",
+    )
+)
+
+DEEPEST = 3
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Count the levels of every node's namespace."""
+    for node in context.system.nodes:
+        namespace = node.namespace
+        levels = namespace.value.strip("/").count("/") + 1
+        if levels <= DEEPEST or is_opaque(namespace.value) or namespace_problem(namespace.value):
+            continue
+        yield Diagnostic(
+            RULE,
+            f"namespace '{namespace}' has {levels} levels, more than {DEEPEST}",
+            namespace.span,
+            hint="join levels that do not stand for a choice, or drop them",
+        )

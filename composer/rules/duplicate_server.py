@@ -1,0 +1,54 @@
+"""Two servers for one service or action."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.words import end_name
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import ChannelKind
+
+RULE = register(
+    Rule(
+        code="RC321",
+        name="duplicate-server",
+        severity=Severity.ERROR,
+        summary="Two ports serve the same service or action.",
+        why="Each of them answers every request, and the client gets whichever answer is first.",
+        bad="""\
+system: servers
+nodes:
+  first:
+    services: {reset: {type: std_srvs/srv/Trigger, respond: {success: true}}}
+  second:
+    services: {reset: {type: std_srvs/srv/Trigger, respond: {success: false}}}
+""",
+        good="""\
+system: servers
+nodes:
+  first:
+    services: {reset: {type: std_srvs/srv/Trigger, respond: {success: true}}}
+  second:
+    services:
+      reset: {type: std_srvs/srv/Trigger, service: ~/reset, respond: {success: false}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Count the servers of every service and action."""
+    for channel in context.channels:
+        if channel.kind is ChannelKind.TOPIC or len(channel.sources) < 2:
+            continue
+        first = channel.sources[0]
+        for other in channel.sources[1:]:
+            yield Diagnostic(
+                RULE,
+                f"{channel.kind} '{channel.name}' is served by '{end_name(other)}' "
+                f"and by '{end_name(first)}'",
+                other.port.name.span,
+                (Label(first.port.name.span, "the other server"),),
+                f"give one of them another name, such as '~/{other.port.name}'",
+            )

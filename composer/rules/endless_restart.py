@@ -1,0 +1,76 @@
+"""A budget of restarts that can never be spent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.words import number
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.model import OnFailure, RestartBudget
+from composer.source import Span
+
+RULE = register(
+    Rule(
+        code="RC406",
+        name="endless-restart",
+        severity=Severity.WARNING,
+        summary="The waits before restarts add up to more than the window they are counted in.",
+        why=(
+            "By the time of the last attempt the first one is forgotten, so the system never gives "
+            "up on a node that fails each time."
+        ),
+        bad="""\
+system: restarting
+nodes:
+  lidar:
+    on_activate: {log: started}
+    lifecycle:
+      on_failure: restart
+      restart: {max_attempts: 5, window_ms: 10000, backoff_ms: 1000}
+""",
+        good="""\
+system: restarting
+nodes:
+  lidar:
+    on_activate: {log: started}
+    lifecycle:
+      on_failure: restart
+      restart: {max_attempts: 5, window_ms: 60000, backoff_ms: 1000}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at every declared budget that a node is restarted by, once."""
+    seen: set[Span] = set()
+    for node in context.system.nodes:
+        budget = node.supervision.restart
+        if node.supervision.policy is not OnFailure.RESTART or budget.span is None:
+            continue
+        total_ms = _waits_ms(budget)
+        if total_ms < budget.window_ms or budget.span in seen:
+            continue
+        seen.add(budget.span)
+        yield Diagnostic(
+            RULE,
+            f"{budget.max_attempts} restarts take at least {number(total_ms)} ms, "
+            f"but only those within {number(budget.window_ms)} ms are counted",
+            budget.span,
+            hint="make 'window_ms' longer, or 'max_attempts' or the waits smaller",
+        )
+
+
+def _waits_ms(budget: RestartBudget) -> float:
+    """Return the shortest time from the first restart to the last.
+
+    The waits are all the same from some attempt on, so a great number of them is no loop.
+    """
+    total_s = 0.0
+    for attempt in range(1, budget.max_attempts):
+        wait_s = budget.backoff_s(attempt)
+        if wait_s == budget.backoff_s(attempt + 1):
+            return 1000.0 * (total_s + wait_s * (budget.max_attempts - attempt))
+        total_s += wait_s
+    return 1000.0 * total_s

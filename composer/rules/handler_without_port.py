@@ -1,0 +1,81 @@
+"""A handler that nothing calls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.behaviors import complete_behaviors, handlers
+from composer.analysis.context import Context
+from composer.analysis.orphans import orphans
+from composer.analysis.words import a
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, nearest, register, suggestion
+from composer.model import Node
+
+RULE = register(
+    Rule(
+        code="RC434",
+        name="handler-without-port",
+        severity=Severity.ERROR,
+        summary="A behaviour has a handler for a port or timer that the node does not have.",
+        why=(
+            "Handlers bind by name: 'on_scan' is for a port or timer called 'scan'. Without one "
+            "the method is never called. A helper of another purpose should not begin with 'on_'."
+        ),
+        bad="""\
+# file: system.yaml
+system: behaviour
+nodes:
+  counter:
+    behavior: counter:Counter
+    timers: {tick: {period_ms: 100}}
+# file: counter.py
+class Counter:
+    def on_tick(self):
+        pass
+
+    def on_message(self, message):
+        pass
+""",
+        good="""\
+# file: system.yaml
+system: behaviour
+nodes:
+  counter:
+    behavior: counter:Counter
+    timers: {tick: {period_ms: 100}}
+# file: counter.py
+class Counter:
+    def on_tick(self):
+        pass
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Hold the methods of behaviours against ports and timers."""
+    for node, source in complete_behaviors(context):
+        known = list(handlers(node))
+        missing = {
+            handler.name
+            for handler in known
+            if handler.needed and source.method(handler.name) is None
+        }
+        for method in orphans(node, source):
+            if nearest(method.name, missing) is not None:
+                continue  # it is what the finding about the missing handler shows
+            yield Diagnostic(
+                RULE,
+                f"nothing calls '{method.name}' of '{source.reference.class_name}'",
+                source.reference.text.span,
+                (Label(method.span, "defined here"),),
+                _hint(node, method.name, [handler.name for handler in known]),
+            )
+
+
+def _hint(node: Node, name: str, known: list[str]) -> str | None:
+    stem = name.removeprefix("on_").removeprefix("accept_")
+    port = node.port(stem)
+    if port is not None:
+        return f"'{stem}' is {a(port.kind)}, which has no such handler"
+    return suggestion(name, known)

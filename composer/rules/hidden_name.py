@@ -1,0 +1,59 @@
+"""A name that ROS tools hide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.names import is_hidden, topic_name_problem
+from composer.source import Located
+
+RULE = register(
+    Rule(
+        code="RC232",
+        name="hidden-name",
+        severity=Severity.INFO,
+        summary="A name has a part that begins with an underscore, so ROS tools leave it out.",
+        why=(
+            "Names with a leading underscore are for what ROS itself makes. 'ros2 topic list', "
+            "rqt and rosbag leave them out unless asked, and people miss them."
+        ),
+        bad="""\
+system: hidden
+nodes:
+  talker:
+    publishers: {_status: {type: std_msgs/msg/String, qos: state, external: true}}
+""",
+        good="""\
+system: hidden
+nodes:
+  talker:
+    publishers: {status: {type: std_msgs/msg/String, qos: state, external: true}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the names of nodes, ports and connections."""
+    for word, name in _names(context):
+        if (
+            is_hidden(name.value)
+            and not is_opaque(name.value)
+            and not topic_name_problem(name.value)
+        ):
+            yield Diagnostic(
+                RULE,
+                f"{word} '{name}' is hidden from ROS tools by its leading underscore",
+                name.span,
+            )
+
+
+def _names(context: Context) -> Iterator[tuple[str, Located[str]]]:
+    for node in context.system.nodes:
+        yield "node", node.name
+        for port in node.ports:
+            yield port.kind.channel.value, port.ros_name
+    for connection in context.system.connections:
+        yield connection.kind.value, connection.name

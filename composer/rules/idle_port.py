@@ -1,0 +1,61 @@
+"""A timer, service or action server that does nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.behaviors import handlers
+from composer.analysis.context import Context
+from composer.analysis.doubt import doubt
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.model import Node, PortKind
+
+RULE = register(
+    Rule(
+        code="RC438",
+        name="idle-port",
+        severity=Severity.WARNING,
+        summary="A timer or server has neither a behaviour nor a reaction.",
+        why=(
+            "The timer fires for nothing; the service answers every request with an empty "
+            "response, which looks like a failure or, worse, like success."
+        ),
+        bad="""\
+system: idle
+nodes:
+  planner:
+    services: {reset: {type: std_srvs/srv/Trigger}}
+""",
+        good="""\
+system: idle
+nodes:
+  planner:
+    services: {reset: {type: std_srvs/srv/Trigger, respond: {success: true}}}
+""",
+    )
+)
+
+_HINTS = {
+    "timer": "add 'publish', 'call', 'set' or 'log'",
+    PortKind.SERVICE.value: "add 'respond'",
+    PortKind.ACTION_SERVER.value: "add 'result'",
+}
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at nodes without behaviour."""
+    suspects = context.once(doubt).nodes
+    for node in context.system.nodes:
+        if node.behavior is None and node.complete and node.name.value not in suspects:
+            yield from _node(node)
+
+
+def _node(node: Node) -> Iterator[Diagnostic]:
+    for handler in handlers(node):
+        if handler.needed and handler.kind in _HINTS:
+            yield Diagnostic(
+                RULE,
+                f"{handler.kind} '{handler.of}' does nothing",
+                handler.of.span,
+                hint=_HINTS[handler.kind],
+            )

@@ -1,0 +1,47 @@
+"""A node name that ROS does not take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.analysis.words import safe_name
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.names import node_name_problem
+
+RULE = register(
+    Rule(
+        code="RC221",
+        name="invalid-node-name",
+        severity=Severity.ERROR,
+        summary="A node's name is not one that ROS takes.",
+        why=(
+            "Node names consist of letters, digits and underscores and do not begin with a digit "
+            "(rmw_validate_node_name). rclpy refuses to make a node with any other name."
+        ),
+        bad="""\
+system: names
+nodes:
+  front-camera: {on_activate: {log: started}}
+""",
+        good="""\
+system: names
+nodes:
+  front_camera: {on_activate: {log: started}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the name of every node."""
+    for node in context.system.nodes:
+        name = node.name
+        problem = node_name_problem(name.value)
+        if problem is not None and not is_opaque(name.value):
+            yield Diagnostic(
+                RULE,
+                f"node name '{name}' {problem}",
+                name.span,
+                hint=f"call it '{safe_name(name.value)}'",
+            )

@@ -1,0 +1,51 @@
+"""A parameter name that tools cannot name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.analysis.words import safe_name
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.names import parameter_name_problem
+
+RULE = register(
+    Rule(
+        code="RC224",
+        name="invalid-parameter-name",
+        severity=Severity.ERROR,
+        summary="A parameter's name is not words joined by dots.",
+        why=(
+            "Parameter files, the command line and expressions can only name parameters made of "
+            "letters, digits and underscores, with dots between them."
+        ),
+        bad="""\
+system: names
+nodes:
+  motor:
+    parameters: {max velocity: {type: double, default: 1.0}}
+""",
+        good="""\
+system: names
+nodes:
+  motor:
+    parameters: {max_velocity: {type: double, default: 1.0}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the name of every declared parameter."""
+    for node in context.system.nodes:
+        for parameter in node.parameters:
+            name = parameter.name
+            problem = parameter_name_problem(name.value)
+            if problem is not None and not is_opaque(name.value):
+                better = ".".join(safe_name(part) for part in name.value.split(".") if part)
+                yield Diagnostic(
+                    RULE,
+                    f"parameter name '{name}' {problem}",
+                    name.span,
+                    hint=f"call it '{better}'",
+                )

@@ -1,0 +1,59 @@
+"""A name of a topic, service or action that ROS does not take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.names import topic_name_problem
+from composer.source import Located
+
+RULE = register(
+    Rule(
+        code="RC223",
+        name="invalid-ros-name",
+        severity=Severity.ERROR,
+        summary="The name of a topic, service or action is not one that ROS takes.",
+        why=(
+            "The parts of a name consist of letters, digits and underscores, none begins with a "
+            "digit, there is one slash between them, and '~' stands only in front "
+            "(rcl_validate_topic_name). rclpy refuses any other name."
+        ),
+        bad="""\
+system: names
+nodes:
+  talker:
+    publishers:
+      chatter:
+        {type: std_msgs/msg/String, qos: command, topic: /news//today, external: true}
+""",
+        good="""\
+system: names
+nodes:
+  talker:
+    publishers:
+      chatter: {type: std_msgs/msg/String, qos: command, topic: /news/today, external: true}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the names of ports, of connections, and in remappings."""
+    for kind, name in _names(context):
+        problem = topic_name_problem(name.value)
+        if problem is not None and not is_opaque(name.value):
+            yield Diagnostic(RULE, f"{kind} name '{name}' {problem}", name.span)
+
+
+def _names(context: Context) -> Iterator[tuple[str, Located[str]]]:
+    for node in context.system.nodes:
+        for port in node.ports:
+            yield port.kind.channel.value, port.ros_name
+        for remapping in node.remappings:
+            yield "remapped", remapping.source
+            yield "remapped", remapping.target
+    for connection in context.system.connections:
+        if not connection.name.value.startswith("~"):
+            yield connection.kind.value, connection.name

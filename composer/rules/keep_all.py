@@ -1,0 +1,53 @@
+"""A queue without an end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.model import ChannelKind
+from composer.qos import History
+
+RULE = register(
+    Rule(
+        code="RC314",
+        name="keep-all",
+        severity=Severity.INFO,
+        summary="A topic end keeps all messages.",
+        why=(
+            "When a subscription is slower than its publisher, the queue grows until memory is "
+            "used up, or a reliable publisher has to wait. A depth says how much is worth keeping."
+        ),
+        bad="""\
+system: queues
+nodes:
+  talker:
+    publishers:
+      chatter: {type: std_msgs/msg/String, qos: {history: keep_all}, external: true}
+""",
+        good="""\
+system: queues
+nodes:
+  talker:
+    publishers:
+      chatter: {type: std_msgs/msg/String, qos: {history: keep_last, depth: 100}, external: true}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the history of every topic end; a profile that many use is reported once."""
+    for node in context.system.nodes:
+        for port in node.ports:
+            qos = port.qos
+            if port.kind.channel is not ChannelKind.TOPIC or not qos.known:
+                continue
+            if qos.profile.history is History.KEEP_ALL:
+                yield Diagnostic(
+                    RULE,
+                    "'keep_all' lets queues grow without limit",
+                    qos.policy_span("history"),
+                    hint="use 'keep_last' with a depth",
+                )

@@ -1,0 +1,68 @@
+"""A chain that cannot be as quick as it must."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.chains import delays
+from composer.analysis.context import Context
+from composer.analysis.words import number
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+
+RULE = register(
+    Rule(
+        code="RC415",
+        name="latency-budget",
+        severity=Severity.ERROR,
+        summary="The periods and budgets on a chain's way add up to more than its latency.",
+        why=(
+            "A node that publishes by a timer lets what it heard wait for up to a period. What "
+            "the periods make impossible no processor can make up for."
+        ),
+        bad="""\
+system: chain
+nodes:
+  lidar:
+    publishers: {scan: {type: std_msgs/msg/Float64, qos: sensor_data}}
+  brake:
+    state: {distance: 0.0}
+    subscriptions:
+      scan: {type: std_msgs/msg/Float64, qos: sensor_data, set: {distance: "{message.data}"}}
+    publishers: {force: {type: std_msgs/msg/Float64, qos: command, external: true}}
+    timers: {step: {period_ms: 100, publish: {force: {data: "{state.distance}"}}}}
+chains:
+  stop: {through: [lidar.scan, brake.force], latency_ms: 50}
+""",
+        good="""\
+system: chain
+nodes:
+  lidar:
+    publishers: {scan: {type: std_msgs/msg/Float64, qos: sensor_data}}
+  brake:
+    subscriptions:
+      scan: {type: std_msgs/msg/Float64, qos: sensor_data, publish: {force: "{message}"}}
+    publishers: {force: {type: std_msgs/msg/Float64, qos: command, external: true}}
+chains:
+  stop: {through: [lidar.scan, brake.force], latency_ms: 50}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Add up what may hold data up on the way of every chain."""
+    for chain in context.system.chains:
+        found = list(delays(context, chain))
+        total_ms = sum(delay.milliseconds for delay in found)
+        if total_ms > chain.latency_ms.value:
+            yield Diagnostic(
+                RULE,
+                f"chain '{chain.name}' may take {number(total_ms)} ms, "
+                f"more than its {number(chain.latency_ms.value)} ms",
+                chain.latency_ms.span,
+                tuple(
+                    Label(delay.span, f"{delay.what} {number(delay.milliseconds)} ms")
+                    for delay in found
+                ),
+                "publish where a message is heard, or let timers come more often",
+            )

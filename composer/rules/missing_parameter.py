@@ -1,0 +1,46 @@
+"""A required parameter without a value."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+
+RULE = register(
+    Rule(
+        code="RC424",
+        name="missing-parameter",
+        severity=Severity.ERROR,
+        summary="A parameter without default is given no value.",
+        why="A parameter without default is one that the node cannot do without.",
+        bad="""\
+system: parameters
+nodes:
+  camera:
+    parameters: {serial_number: {type: string}}
+""",
+        good="""\
+system: parameters
+nodes:
+  camera:
+    parameters: {serial_number: {type: string, default: A-1047}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look for parameters without value. A node type alone need not have them all."""
+    if context.system.node_type:
+        return
+    for node in context.system.nodes:
+        for parameter in node.parameters:
+            if parameter.value is None:
+                yield Diagnostic(
+                    RULE,
+                    f"node '{node.name}' needs a value for parameter '{parameter.name}'",
+                    node.name.span,
+                    (Label(parameter.name.span, "declared without default"),),
+                    f"add 'parameters: {{{parameter.name}: ...}}' to the node",
+                )

@@ -1,0 +1,51 @@
+"""A watch over the silence of a node that publishes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.doubt import PORT_SECTIONS, doubt
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.model import PortKind
+
+RULE = register(
+    Rule(
+        code="RC404",
+        name="nothing-to-watch",
+        severity=Severity.ERROR,
+        summary="topic_silence_ms is set for a node without publishers.",
+        why="A node that cannot publish is always silent: it would fail again and again.",
+        bad="""\
+system: watching
+nodes:
+  logger:
+    subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true, log: scan}}
+    lifecycle: {watch: {topic_silence_ms: 500}}
+""",
+        good="""\
+system: watching
+nodes:
+  logger:
+    subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true, log: scan}}
+    lifecycle: {watch: {callback_ms: 500}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at every node that is watched as a whole."""
+    doubts = context.once(doubt)
+    for node in context.system.nodes:
+        limit = node.supervision.watch.silence_ms
+        if limit is None or not node.complete or node.ports_of(PortKind.PUBLISHER):
+            continue
+        if doubts.may_have(node.name.value, *PORT_SECTIONS):
+            continue
+        yield Diagnostic(
+            RULE,
+            f"node '{node.name}' is watched for silence, but has no publishers",
+            limit.span,
+            hint="watch the node whose messages it needs, or set 'callback_ms'",
+        )

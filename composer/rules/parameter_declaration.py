@@ -1,0 +1,98 @@
+"""A declaration that no value could meet, or that means nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.parameter_values import KNOWN_TYPES, describe, type_problem
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import USE_SIM_TIME, Parameter, ParameterType
+
+RULE = register(
+    Rule(
+        code="RC425",
+        name="parameter-declaration",
+        severity=Severity.ERROR,
+        summary="A parameter's declaration contradicts itself.",
+        why=(
+            "A minimum above the maximum leaves no value, a range on text means nothing, and a "
+            "choice of another type can never be taken."
+        ),
+        bad="""\
+system: parameters
+nodes:
+  motor:
+    parameters: {max_velocity: {type: double, default: 3.0, minimum: 5.0, maximum: 1.0}}
+""",
+        good="""\
+system: parameters
+nodes:
+  motor:
+    parameters: {max_velocity: {type: double, default: 3.0, minimum: 1.0, maximum: 5.0}}
+""",
+    )
+)
+
+_WITH_RANGE = frozenset(
+    {
+        ParameterType.INTEGER,
+        ParameterType.DOUBLE,
+        ParameterType.INTEGER_ARRAY,
+        ParameterType.DOUBLE_ARRAY,
+        ParameterType.BYTE_ARRAY,
+    }
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the declarations, not at values."""
+    for node in context.system.nodes:
+        for parameter in node.parameters:
+            yield from _of_every_node(parameter)
+            if parameter.type.value in KNOWN_TYPES:
+                yield from _range(parameter)
+                yield from _choices(parameter)
+
+
+def _of_every_node(parameter: Parameter) -> Iterator[Diagnostic]:
+    kind = parameter.type
+    if parameter.name.value == USE_SIM_TIME and kind.value in KNOWN_TYPES - {ParameterType.BOOL}:
+        message = f"parameter '{USE_SIM_TIME}', which every node has, is of type bool, not {kind}"
+        yield Diagnostic(RULE, message, kind.span)
+
+
+def _range(parameter: Parameter) -> Iterator[Diagnostic]:
+    low, high, step = parameter.minimum, parameter.maximum, parameter.step
+    name = parameter.name
+    if parameter.type.value not in _WITH_RANGE:
+        limits = {"minimum": low, "maximum": high, "step": step}
+        for word, limit in limits.items():
+            if limit is not None:
+                message = f"parameter '{name}' of type {parameter.type} cannot have a {word}"
+                yield Diagnostic(RULE, message, limit.span)
+        return
+    if low is not None and high is not None and low.value > high.value:
+        yield Diagnostic(
+            RULE,
+            f"parameter '{name}' has a minimum of {low}, more than its maximum of {high}",
+            low.span,
+            (Label(high.span, f"the maximum is {high}"),),
+            "swap them",
+        )
+
+
+def _choices(parameter: Parameter) -> Iterator[Diagnostic]:
+    if parameter.choices is None:
+        return
+    kind = parameter.type.value.removesuffix("_array")
+    if kind not in KNOWN_TYPES:
+        return
+    for choice in parameter.choices.value:
+        if type_problem(choice, kind) is not None:
+            yield Diagnostic(
+                RULE,
+                f"parameter '{parameter.name}' of type {parameter.type} has "
+                f"{describe(choice)} among its choices",
+                parameter.choices.span,
+            )

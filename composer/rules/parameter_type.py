@@ -1,0 +1,52 @@
+"""A parameter with a value of another type."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.judged_parameters import judged_values
+from composer.analysis.parameter_values import type_problem
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+
+RULE = register(
+    Rule(
+        code="RC421",
+        name="parameter-type",
+        severity=Severity.ERROR,
+        summary="A parameter's value is not of the type that was declared.",
+        why=(
+            "ROS parameters are typed: the node would refuse the value when it starts. A whole "
+            "number is fine where a double is declared; nothing else is converted."
+        ),
+        bad="""\
+system: parameters
+nodes:
+  motor:
+    parameters: {max_velocity: {type: double, default: fast}}
+""",
+        good="""\
+system: parameters
+nodes:
+  motor:
+    parameters: {max_velocity: {type: double, default: 1.0}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at defaults and at the values that instances give."""
+    for parameter, value in judged_values(context):
+        problem = type_problem(value.value, parameter.type.value)
+        if problem is None:
+            continue
+        labels: tuple[Label, ...] = ()
+        if value is not parameter.default:
+            labels = (Label(parameter.name.span, f"declared as {parameter.type}"),)
+        yield Diagnostic(
+            RULE,
+            f"parameter '{parameter.name}' is of type {parameter.type}, not {problem}",
+            value.span,
+            labels,
+        )

@@ -1,0 +1,73 @@
+"""A port in two connections that want different things of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import Connection, Endpoint
+
+RULE = register(
+    Rule(
+        code="RC212",
+        name="port-connected-twice",
+        severity=Severity.ERROR,
+        summary="A port is in two connections with different names or QoS profiles.",
+        why="A port has one name and one profile in ROS; one of the connections would not exist.",
+        bad="""\
+system: split
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+  left:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+  right:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: /left/chatter, from: talker.chatter, to: left.chatter}
+  - {topic: /right/chatter, from: talker.chatter, to: right.chatter}
+""",
+        good="""\
+system: split
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+  left:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+  right:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: /chatter, from: talker.chatter, to: [left.chatter, right.chatter]}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Compare every further connection of a port with its first."""
+    first: dict[str, tuple[Connection, Endpoint]] = {}
+    for connection in context.system.connections:
+        for endpoint in (*connection.sources, *connection.sinks):
+            if context.system.port(endpoint) is None or is_opaque(connection.name.value):
+                continue
+            earlier, place = first.setdefault(endpoint.text.value, (connection, endpoint))
+            difference = _difference(earlier, connection)
+            if difference is not None:
+                yield Diagnostic(
+                    RULE,
+                    f"port '{endpoint.text}' is connected twice, with {difference}",
+                    endpoint.text.span,
+                    (Label(place.text.span, f"connected to '{earlier.name}' here"),),
+                    "join all ports that share a name in one connection",
+                )
+
+
+def _difference(earlier: Connection, later: Connection) -> str | None:
+    if earlier.kind is not later.kind:
+        return None  # one of them has the wrong kind of port, and that is said
+    if earlier.name.value.lstrip("/") != later.name.value.lstrip("/"):
+        return f"the names '{earlier.name}' and '{later.name}'"
+    if earlier.qos is not None and later.qos is not None and earlier.qos != later.qos:
+        return f"the QoS profiles '{earlier.qos}' and '{later.qos}'"
+    return None

@@ -1,0 +1,111 @@
+"""Two ends whose QoS keeps them apart."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
+
+from composer.analysis.context import Context
+from composer.analysis.words import end_name
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import Channel, ChannelKind, PortOfNode
+from composer.qos import Incompatibility, QosProfile, incompatibilities
+
+RULE = register(
+    Rule(
+        code="RC311",
+        name="qos-incompatible",
+        severity=Severity.ERROR,
+        summary="One end of a topic or service asks for more than the other end offers.",
+        why=(
+            "A subscription requests, a publisher offers, and they match only when the offer is "
+            "at least as strong: a best-effort publisher never reaches a reliable subscription, "
+            "while a reliable publisher does reach a best-effort one. Requests and responses of "
+            "services follow the same rule in both directions. When ends do not match, nothing "
+            "arrives, and at best a warning is lost among the logs."
+        ),
+        bad="""\
+system: quality
+nodes:
+  lidar:
+    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
+  mapper:
+    subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: command}}
+""",
+        good="""\
+system: quality
+nodes:
+  lidar:
+    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
+  mapper:
+    subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
+""",
+    )
+)
+
+#: So many further ends with the same trouble are shown.
+_SHOWN = 3
+
+Groups = Mapping[QosProfile, list[PortOfNode]]
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Hold the profiles on every channel against each other, each kind of profile once."""
+    for channel in context.channels:
+        if channel.sources and channel.sinks and _one_type(channel):
+            sources, sinks = _by_profile(channel.sources), _by_profile(channel.sinks)
+            yield from _direction(channel, sources, sinks)
+            if channel.kind is not ChannelKind.TOPIC:
+                yield from _direction(channel, sinks, sources)
+
+
+def _one_type(channel: Channel) -> bool:
+    """Say whether all ends have one type; others never match, and that is said elsewhere."""
+    return len({end.port.interface.value for end in channel.ends}) == 1
+
+
+def _by_profile(ends: Iterable[PortOfNode]) -> Groups:
+    groups: dict[QosProfile, list[PortOfNode]] = defaultdict(list)
+    for end in ends:
+        if end.port.qos.known:
+            groups[end.port.qos.profile].append(end)
+    return groups
+
+
+def _direction(channel: Channel, offering: Groups, requesting: Groups) -> Iterator[Diagnostic]:
+    for offered, offers in offering.items():
+        for requested, requests in requesting.items():
+            for problem in incompatibilities(offered, requested):
+                yield _finding(channel, problem, offers, requests)
+
+
+def _finding(
+    channel: Channel,
+    problem: Incompatibility,
+    offers: list[PortOfNode],
+    requests: list[PortOfNode],
+) -> Diagnostic:
+    request, offer = requests[0], offers[0]
+    policy = problem.policy
+    labels = [
+        Label(
+            end.port.qos.policy_span(policy),
+            f"{end.port.kind} '{end_name(end)}' offers {problem.offered}",
+        )
+        for end in offers[: 1 + _SHOWN]
+    ]
+    labels += [
+        Label(
+            end.port.qos.policy_span(policy),
+            f"{end.port.kind} '{end_name(end)}' requests {problem.requested} too",
+        )
+        for end in requests[1 : 1 + _SHOWN]
+    ]
+    return Diagnostic(
+        RULE,
+        f"{request.port.kind} '{end_name(request)}' requests {policy} {problem.requested} on "
+        f"'{channel.name}', but {offer.port.kind} '{end_name(offer)}' offers {problem.offered}",
+        request.port.qos.policy_span(policy),
+        tuple(labels),
+        f"offer {problem.requested}, or request {problem.offered}",
+    )

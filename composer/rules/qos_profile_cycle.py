@@ -1,0 +1,71 @@
+"""QoS profiles that extend each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import NamedQos
+
+RULE = register(
+    Rule(
+        code="RC318",
+        name="qos-profile-cycle",
+        severity=Severity.ERROR,
+        summary="QoS profiles extend each other in a circle.",
+        why="None of them has anything to start from.",
+        bad="""\
+system: profiles
+qos_profiles:
+  odometry: {extends: pose, depth: 1}
+  pose: {extends: odometry, depth: 2}
+nodes:
+  robot: {on_activate: {log: started}}
+""",
+        good="""\
+system: profiles
+qos_profiles:
+  odometry: {extends: sensor_data, depth: 1}
+  pose: {extends: odometry, depth: 2}
+nodes:
+  robot:
+    publishers: {pose: {type: geometry_msgs/msg/Pose, qos: pose, external: true}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Follow what profiles extend; every circle is reported where it was entered first."""
+    profiles = {profile.name.value: profile for profile in context.system.qos_profiles}
+    done: set[str] = set()
+    for name in profiles:
+        way: dict[str, NamedQos] = {}
+        step: str | None = name
+        while step is not None and step in profiles and step not in done and step not in way:
+            way[step] = profiles[step]
+            extends = way[step].extends
+            step = extends.value if extends is not None else None
+        done.update(way)
+        if step is not None and step in way:
+            names = list(way)
+            yield _finding([way[item] for item in names[names.index(step) :]])
+
+
+def _finding(circle: list[NamedQos]) -> Diagnostic:
+    places = [profile.extends or profile.name for profile in circle]
+    names = [profile.name.value for profile in circle]
+    way = " -> ".join((*names, names[0]))
+    message = (
+        f"QoS profile '{names[0]}' extends itself"
+        if len(circle) == 1
+        else f"QoS profiles extend each other in a circle: {way}"
+    )
+    labels = (
+        Label(place.span, f"'{name}' extends '{place}'")
+        for place, name in zip(places[1:], names[1:], strict=True)
+    )
+    return Diagnostic(
+        RULE, message, places[0].span, tuple(labels), "extend a preset in one of them"
+    )

@@ -1,0 +1,61 @@
+"""A sensor stream that waits for what is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.rates import rates
+from composer.analysis.words import number
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.model import PortKind, PortOfNode
+from composer.qos import Reliability
+
+RULE = register(
+    Rule(
+        code="RC317",
+        name="reliable-sensor-stream",
+        severity=Severity.INFO,
+        summary="Fast sensor data is sent reliably.",
+        why=(
+            "Sending a lost image again delays all that come after it, and nobody needs the old "
+            "one. The preset 'sensor_data' is best effort."
+        ),
+        bad="""\
+system: stream
+nodes:
+  camera:
+    publishers: {image: {type: sensor_msgs/msg/Image, qos: command, external: true}}
+    timers: {frame: {rate_hz: 30, publish: {image: {}}}}
+""",
+        good="""\
+system: stream
+nodes:
+  camera:
+    publishers: {image: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}}
+    timers: {frame: {rate_hz: 30, publish: {image: {}}}}
+""",
+    )
+)
+
+FAST_HZ = 10.0
+_PACKAGE = "sensor_msgs/msg/"
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at publishers of sensor messages whose rate is known."""
+    known = context.once(rates)
+    for node in context.system.nodes:
+        for port in node.ports_of(PortKind.PUBLISHER):
+            if not port.interface.value.startswith(_PACKAGE) or not port.qos.known:
+                continue
+            rate_hz = known.publisher_hz(PortOfNode(node, port))
+            if rate_hz is None or rate_hz < FAST_HZ:
+                continue
+            if port.qos.profile.reliability is Reliability.RELIABLE:
+                yield Diagnostic(
+                    RULE,
+                    f"sensor data on '{port.full_name}' at {number(rate_hz)} Hz is sent reliably",
+                    port.qos.policy_span("reliability"),
+                    hint="use 'qos: sensor_data'",
+                )

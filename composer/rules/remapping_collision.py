@@ -1,0 +1,78 @@
+"""Two ports of one node that a remapping put on one name."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.analysis.remapped import matched_ports, own_name
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import Node, Port, PortKind, Remapping
+
+RULE = register(
+    Rule(
+        code="RC226",
+        name="remapping-collision",
+        severity=Severity.WARNING,
+        summary="A remapping gives a port a name that another port of the node already has.",
+        why=(
+            "What was two streams of the node becomes one, and nobody who listens can tell which "
+            "message came from which port."
+        ),
+        bad="""\
+system: collision
+nodes:
+  camera:
+    publishers:
+      left: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}
+      right: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}
+    remappings: {left: right}
+""",
+        good="""\
+system: collision
+nodes:
+  camera:
+    publishers:
+      left: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}
+      right: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}
+    remappings: {left: left_eye}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the ports that every remapping moves."""
+    for node in context.system.nodes:
+        if not node.remappings:
+            continue
+        joined: dict[tuple[PortKind, str], list[Port]] = defaultdict(list)
+        for port in node.ports:
+            joined[port.kind, port.full_name].append(port)
+        told: set[tuple[PortKind, str]] = set()
+        for remapping in node.remappings:
+            yield from _remapping(node, remapping, joined, told)
+
+
+def _remapping(
+    node: Node,
+    remapping: Remapping,
+    joined: dict[tuple[PortKind, str], list[Port]],
+    told: set[tuple[PortKind, str]],
+) -> Iterator[Diagnostic]:
+    """Report each name once, where a remapping first brings it about."""
+    if is_opaque(remapping.target.value):
+        return
+    target = own_name(node, remapping.target.value)
+    for port in matched_ports(node, remapping):
+        others = [other for other in joined[port.kind, target] if other is not port]
+        if port.full_name == target and others and (port.kind, target) not in told:
+            told.add((port.kind, target))
+            yield Diagnostic(
+                RULE,
+                f"remapping '{remapping.source}' to '{remapping.target}' puts {port.kind}s "
+                f"'{port.name}' and '{others[0].name}' of one node on '{target}'",
+                remapping.target.span,
+                (Label(others[0].name.span, "has the name already"),),
+            )

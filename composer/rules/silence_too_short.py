@@ -1,0 +1,76 @@
+"""A node that counts as silent between two of its messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.rates import timed_publishers
+from composer.analysis.words import number
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import Node, PortKind, PortOfNode
+from composer.source import Located
+
+RULE = register(
+    Rule(
+        code="RC405",
+        name="silence-too-short",
+        severity=Severity.ERROR,
+        summary="topic_silence_ms is not longer than the period of the messages.",
+        why=(
+            "The node would count as failed although it publishes when it should. A timer is never "
+            "punctual to the microsecond: allow for a few periods."
+        ),
+        bad="""\
+system: watching
+nodes:
+  lidar:
+    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
+    timers: {spin: {period_ms: 100, publish: {scan: {data: beep}}}}
+    lifecycle: {watch: {topic_silence_ms: 50}}
+""",
+        good="""\
+system: watching
+nodes:
+  lidar:
+    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
+    timers: {spin: {period_ms: 100, publish: {scan: {data: beep}}}}
+    lifecycle: {watch: {topic_silence_ms: 500}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Hold what is watched against the timers that publish."""
+    periods: dict[str, dict[str, tuple[PortOfNode, float]]] = {}
+    for end, period_s in context.once(timed_publishers):
+        of_node = periods.setdefault(end.node.name.value, {})
+        of_node[end.port.name.value] = (end, period_s)
+    for node in context.system.nodes:
+        known = periods.get(node.name.value, {})
+        watch = node.supervision.watch
+        for name, limit in watch.topics:
+            if name.value in known:
+                yield from _held(limit, *known[name.value])
+        if watch.silence_ms is not None and known and len(known) == _publishers(node):
+            fastest = min(known.values(), key=lambda item: item[1])
+            yield from _held(watch.silence_ms, *fastest)
+
+
+def _publishers(node: Node) -> int:
+    return len(node.ports_of(PortKind.PUBLISHER))
+
+
+def _held(limit: Located[float], end: PortOfNode, period_s: float) -> Iterator[Diagnostic]:
+    period_ms = period_s * 1000.0
+    if limit.value > period_ms:
+        return
+    yield Diagnostic(
+        RULE,
+        f"node '{end.node.name}' counts as silent after {number(limit.value)} ms, but publishes "
+        f"'{end.port.name}' every {number(period_ms)} ms",
+        limit.span,
+        (Label(end.port.name.span, "watched here"),),
+        f"allow for a few messages to be late: {number(3 * period_ms)}",
+    )

@@ -1,0 +1,79 @@
+"""A timer that could not run, or not as often as it says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.periods import period_value
+from composer.analysis.words import number
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.expressions import Expression
+from composer.model import PeriodUnit, Timer
+
+RULE = register(
+    Rule(
+        code="RC411",
+        name="timer-period",
+        severity=Severity.ERROR,
+        summary="A timer's period is not positive, or beyond all use.",
+        why=(
+            "rcl refuses a period that is not positive. One under 0.1 ms is more than Python can "
+            "do; one over a day is nearly always a mistake of units."
+        ),
+        bad="""\
+system: timing
+nodes:
+  clock:
+    timers: {tick: {period_ms: 0.001, log: tick}}
+""",
+        good="""\
+system: timing
+nodes:
+  clock:
+    timers: {tick: {period_ms: 1.0, log: tick}}
+""",
+    )
+)
+
+SHORTEST_S = 0.0001
+LONGEST_S = 86_400.0
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at every timer whose period is known."""
+    for node in context.system.nodes:
+        for timer in node.timers:
+            value = period_value(node, timer)
+            problem = _problem(timer, value) if value is not None else None
+            if problem is not None:
+                yield Diagnostic(
+                    RULE,
+                    f"timer '{timer.name}' {problem}{_origin(timer)}",
+                    timer.period.span,
+                    hint="use a period between 0.1 ms and one day",
+                )
+
+
+def _problem(timer: Timer, value: float) -> str | None:
+    unit = "ms" if timer.period.unit is PeriodUnit.MILLISECONDS else "Hz"
+    if not math.isfinite(value):
+        return f"has a {timer.period.unit} that is no finite number"
+    if value <= 0:
+        return f"has a {timer.period.unit} of {number(value)}, which is not positive"
+    seconds = timer.period.seconds(value)
+    written = f"({number(value)} {unit})"
+    if seconds < SHORTEST_S:
+        return f"fires every {number(seconds * 1e6)} us {written}, which cannot be kept"
+    if seconds > LONGEST_S:
+        return f"fires every {number(seconds / 3600)} h {written}, which is absurd"
+    return None
+
+
+def _origin(timer: Timer) -> str:
+    """Say which values an expression got its result from."""
+    value = timer.period.value
+    if not isinstance(value, Expression) or not value.paths:
+        return ""
+    return ", with the values its parameters start with"

@@ -1,0 +1,73 @@
+"""Two types on one topic, service or action."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.words import end_name
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import Channel, PortOfNode
+
+RULE = register(
+    Rule(
+        code="RC303",
+        name="type-mismatch",
+        severity=Severity.ERROR,
+        summary="The ends of one topic, service or action have different types.",
+        why="DDS does not join ends of different types: nothing arrives, and nothing says so.",
+        bad="""\
+system: types
+nodes:
+  talker:
+    publishers: {speed: {type: std_msgs/msg/Float64, qos: command}}
+  listener:
+    subscriptions: {speed: {type: std_msgs/msg/Float32, qos: command}}
+""",
+        good="""\
+system: types
+nodes:
+  talker:
+    publishers: {speed: {type: std_msgs/msg/Float64, qos: command}}
+  listener:
+    subscriptions: {speed: {type: std_msgs/msg/Float64, qos: command}}
+""",
+    )
+)
+
+#: So many of the ends that agree with a wrong one are shown beside it.
+_SHOWN = 3
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Compare the types on every channel; each type that is not the common one is a finding."""
+    for channel in context.channels:
+        yield from _channel(context, channel)
+
+
+def _channel(context: Context, channel: Channel) -> Iterator[Diagnostic]:
+    by_type: dict[str, list[PortOfNode]] = defaultdict(list)
+    for end in channel.ends:
+        if context.interface(end.port) is not None:
+            by_type[end.port.interface.value].append(end)
+    if len(by_type) < 2:
+        return
+    common = max(by_type, key=lambda name: len(by_type[name]))  # the first, of equals
+    usual = by_type.pop(common)[0]
+    for name, ends in by_type.items():
+        odd = ends[0]
+        labels = [
+            Label(usual.port.interface.span, f"{usual.port.kind} '{end_name(usual)}': {common}")
+        ]
+        labels += [
+            Label(end.port.interface.span, f"{end.port.kind} '{end_name(end)}' too: {name}")
+            for end in ends[1 : 1 + _SHOWN]
+        ]
+        yield Diagnostic(
+            RULE,
+            f"{odd.port.kind} '{end_name(odd)}' has type '{name}', "
+            f"but {channel.kind} '{channel.name}' has '{common}'",
+            odd.port.interface.span,
+            tuple(labels),
+        )

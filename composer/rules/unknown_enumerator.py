@@ -1,0 +1,97 @@
+"""A number that a message has no name for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from composer.analysis.contents import contents
+from composer.analysis.context import Context
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.interfaces import Interfaces, Message
+from composer.templates import Constant, Items, Record, Template
+
+RULE = register(
+    Rule(
+        code="RC306",
+        name="unknown-enumerator",
+        severity=Severity.WARNING,
+        summary="A field that the message has constants for is given none of them.",
+        why=(
+            "A message that defines STATUS_IDLE and STATUS_BUSY means its field 'status' to be one "
+            "of them. Whoever receives another number does not know what to do."
+        ),
+        bad="""\
+system: battery
+nodes:
+  battery:
+    publishers: {charge: {type: sensor_msgs/msg/BatteryState, qos: state, external: true}}
+    timers: {tick: {period_ms: 1000, publish: {charge: {power_supply_status: 9}}}}
+""",
+        good="""\
+system: battery
+nodes:
+  battery:
+    publishers: {charge: {type: sensor_msgs/msg/BatteryState, qos: state, external: true}}
+    timers: {tick: {period_ms: 1000, publish: {charge: {power_supply_status: 2}}}}
+""",
+    )
+)
+
+#: So many names are told in a hint.
+_SHOWN = 6
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the numbers that fields of messages are filled with."""
+    for template, message in contents(context):
+        yield from _template(template, message, context.interfaces)
+
+
+def _template(template: Template, message: Message, interfaces: Interfaces) -> Iterator[Diagnostic]:
+    if not isinstance(template, Record):
+        return
+    for name, content in template.fields:
+        field = message.field(name.value)
+        if field is None:
+            continue
+        nested = interfaces.message(field.type.name)
+        for item in content.items if isinstance(content, Items) else (content,):
+            if isinstance(item, Constant):
+                yield from _number(item, name.value, message)
+            elif nested is not None:
+                yield from _template(item, nested, interfaces)
+
+
+def _number(constant: Constant, field: str, message: Message) -> Iterator[Diagnostic]:
+    value = constant.value
+    known = _enumerators(message, field)
+    if not known or not isinstance(value, int) or isinstance(value, bool):
+        return
+    if value in known.values() or _is_combination(value, set(known.values())):
+        return
+    names = [f"{number} {name}" for name, number in known.items()]
+    listed = ", ".join(names[:_SHOWN]) + (", ..." if len(names) > _SHOWN else "")
+    yield Diagnostic(
+        RULE,
+        f"{message.name} has no {field.upper()}_... of {value}",
+        constant.span,
+        hint=f"it has: {listed}",
+    )
+
+
+def _enumerators(message: Message, field: str) -> Mapping[str, int]:
+    """Return the constants that are named after the field: STATUS_IDLE for ``status``."""
+    prefix = f"{field.upper()}_"
+    return {
+        constant.name: constant.value
+        for constant in message.constants
+        if constant.name.startswith(prefix) and isinstance(constant.value, int)
+    }
+
+
+def _is_combination(value: int, known: set[int]) -> bool:
+    """Say whether the constants are flags, and ``value`` a combination of some of them."""
+    flags = known - {0}
+    if not all(flag > 0 and flag.bit_count() == 1 for flag in flags) or max(flags, default=0) < 4:
+        return False
+    return value & ~sum(flags) == 0

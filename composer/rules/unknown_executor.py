@@ -1,0 +1,50 @@
+"""A node put on an executor that the system does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.model import DEFAULT_EXECUTOR
+
+RULE = register(
+    Rule(
+        code="RC207",
+        name="unknown-executor",
+        severity=Severity.ERROR,
+        summary="A node is put on an executor that is not under executors.",
+        why="Nobody would call the node's callbacks.",
+        bad="""\
+system: threads
+executors:
+  perception: {kind: multi_threaded, threads: 4}
+nodes:
+  camera: {executor: percepton, on_activate: {log: started}}
+  detector: {executor: perception, on_activate: {log: started}}
+""",
+        good="""\
+system: threads
+executors:
+  perception: {kind: multi_threaded, threads: 4}
+nodes:
+  camera: {executor: perception, on_activate: {log: started}}
+  detector: {executor: perception, on_activate: {log: started}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the executor of every node that names one."""
+    known = {executor.name.value for executor in context.system.executors} | {DEFAULT_EXECUTOR}
+    for node in context.system.nodes if not context.is_partial else ():
+        name = node.executor
+        if name is None or name.value in known or is_opaque(name.value):
+            continue
+        yield Diagnostic(
+            RULE,
+            f"node '{node.name}' runs on '{name}', which is not an executor of this system",
+            name.span,
+            hint=suggestion(name.value, known),
+        )

@@ -1,0 +1,40 @@
+"""A field that the message does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.fields import field_problems
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+
+RULE = register(
+    Rule(
+        code="RC304",
+        name="unknown-field",
+        severity=Severity.ERROR,
+        summary="An expression reads, or a map fills, a field that the message does not have.",
+        why="At run time the reaction would fail at every message.",
+        bad="""\
+system: fields
+nodes:
+  listener:
+    subscriptions:
+      chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{message.text}"}
+""",
+        good="""\
+system: fields
+nodes:
+  listener:
+    subscriptions:
+      chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{message.data}"}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Report the fields that are missing."""
+    for problem in context.once(field_problems):
+        if problem.missing:
+            yield Diagnostic(RULE, problem.message, problem.span, hint=problem.hint)

@@ -1,0 +1,73 @@
+"""A type of messages, services or actions that is nowhere to be found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.interfaces.similar import similar_interface
+from composer.model import Port
+
+RULE = register(
+    Rule(
+        code="RC301",
+        name="unknown-interface",
+        severity=Severity.ERROR,
+        summary="A port's type is neither installed nor in an interface package of the project.",
+        why="Without its definition the port cannot be made, and nothing that uses it be checked.",
+        bad="""\
+system: types
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/Strin, qos: command, external: true}}
+""",
+        good="""\
+system: types
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look up the type of every port."""
+    hints: dict[tuple[str, str], str | None] = {}
+    for node in context.system.nodes:
+        for port in node.ports:
+            name = port.interface
+            if is_opaque(name.value) or context.interfaces.find(name.value) is not None:
+                continue
+            problem = context.interfaces.problem(name.value)
+            if problem is not None:
+                yield Diagnostic(RULE, str(problem), name.span, hint=f"see {problem.place}")
+                continue
+            key = (name.value, port.kind.channel.interface_folder)
+            if key not in hints:
+                hints[key] = _hint(context, port)
+            yield Diagnostic(
+                RULE,
+                f"there is no {_word(port)} type '{name}'",
+                name.span,
+                hint=hints[key],
+            )
+
+
+def _word(port: Port) -> str:
+    return {"msg": "message"}.get(port.kind.channel.interface_folder, port.kind.channel.value)
+
+
+def _hint(context: Context, port: Port) -> str | None:
+    folder = port.kind.channel.interface_folder
+    name = port.interface.value
+    package, slash, rest = name.partition("/")
+    known = context.interfaces.names(folder)
+    full = f"{package}/{folder}/{rest.rpartition('/')[2]}"
+    if full in known:
+        return f"write '{full}'"
+    hint = similar_interface(full if slash else name, known)
+    if hint is not None or not slash:
+        return hint or f"write it with its package, as std_msgs/{folder}/Name"
+    return f"package '{package}' is neither installed nor among the project's interfaces"

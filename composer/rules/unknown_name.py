@@ -1,0 +1,63 @@
+"""An expression that uses a name which means nothing where it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.places import part_of_path
+from composer.analysis.sites import EVENT_NAMES, Site, sites
+from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+
+RULE = register(
+    Rule(
+        code="RC209",
+        name="unknown-name",
+        severity=Severity.ERROR,
+        summary="An expression uses a name that is not in scope where it stands.",
+        why=(
+            "What can be used depends on what is reacted to: 'message' in a subscription, "
+            "'request' in a service, 'response' in on_response, and so on; 'parameters', 'state', "
+            "'count', 'now' and 'node' everywhere."
+        ),
+        bad="""\
+system: names
+nodes:
+  listener:
+    subscriptions:
+      chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{msg.data}"}
+""",
+        good="""\
+system: names
+nodes:
+  listener:
+    subscriptions:
+      chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{message.data}"}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the first part of every path."""
+    for site in context.once(sites):
+        for path in site.expression.paths:
+            if path.root in site.names:
+                continue
+            yield Diagnostic(
+                RULE,
+                f"'{path.root}' is not a name that can be used here",
+                part_of_path(site.span, site.expression, path),
+                hint=_hint(path.root, site),
+            )
+
+
+def _hint(name: str, site: Site) -> str | None:
+    if site.node.parameter(name) is not None and "parameters" in site.names:
+        return f"write 'parameters.{name}'"
+    if any(known.value == name for known, _ in site.node.state) and "state" in site.names:
+        return f"write 'state.{name}'"
+    own = EVENT_NAMES.get(site.event) if site.event is not None else None
+    if own and any(name in names for names in EVENT_NAMES.values()):
+        return f"here it is '{own[0]}'"
+    return suggestion(name, site.names)

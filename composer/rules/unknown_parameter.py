@@ -1,0 +1,79 @@
+"""A parameter that the node does not declare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from composer.analysis.context import Context
+from composer.analysis.doubt import doubt
+from composer.analysis.places import part_of_path
+from composer.analysis.sites import sites
+from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.source import Span
+
+RULE = register(
+    Rule(
+        code="RC206",
+        name="unknown-parameter",
+        severity=Severity.ERROR,
+        summary="A value is given to, or an expression reads, a parameter that is not declared.",
+        why=(
+            "A misspelt parameter leaves the real one at its default, and nothing shows it until "
+            "the robot moves at the wrong speed."
+        ),
+        bad="""\
+system: parameters
+nodes:
+  source:
+    type: timer_source
+    variables: {message_type: std_msgs/msg/String}
+    publishers: {output: {external: true}}
+    parameters: {rate: 2.0}
+""",
+        good="""\
+system: parameters
+nodes:
+  source:
+    type: timer_source
+    variables: {message_type: std_msgs/msg/String}
+    publishers: {output: {external: true}}
+    parameters: {rate_hz: 2.0}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the values that instances give and at what expressions read."""
+    for node in context.system.nodes:
+        for unknown in node.unknown:
+            if unknown.section == "parameters":
+                yield Diagnostic(
+                    RULE,
+                    f"node '{node.name}' has no parameter '{unknown.name}'",
+                    unknown.name.span,
+                    hint=suggestion(unknown.name.value, unknown.known),
+                )
+    doubts = context.once(doubt)
+    known = {
+        node.name.value: [parameter.name.value for parameter in node.parameters]
+        for node in context.system.nodes
+    }
+    names = {node: frozenset(declared) for node, declared in known.items()}
+    for node_name, name, span in _uses(context, names):
+        if name not in names[node_name] and not doubts.may_have(node_name, "parameters"):
+            yield Diagnostic(
+                RULE,
+                f"the node declares no parameter '{name}'",
+                span,
+                hint=suggestion(name, known[node_name]),
+            )
+
+
+def _uses(context: Context, known: Mapping[str, frozenset[str]]) -> Iterator[tuple[str, str, Span]]:
+    for site in context.once(sites):
+        for path in site.expression.paths:
+            if path.root == "parameters" and len(path.parts) > 1:
+                span = part_of_path(site.span, site.expression, path, 1)
+                node_name = site.node.name.value
+                yield node_name, path.key(known[node_name]) or str(path.parts[1]), span

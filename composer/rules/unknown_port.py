@@ -1,0 +1,102 @@
+"""A port that the node does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.analysis.doubt import PORT_SECTIONS, doubt
+from composer.analysis.endpoints import endpoints
+from composer.analysis.places import part_of
+from composer.analysis.reactions import sends
+from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.model import Endpoint, Node, PortKind
+
+RULE = register(
+    Rule(
+        code="RC203",
+        name="unknown-port",
+        severity=Severity.ERROR,
+        summary="A connection, a reaction or an instance names a port that the node does not have.",
+        why="Nothing would flow there: a port has to be declared by the node or by its type.",
+        bad="""\
+system: ports
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
+    timers: {tick: {period_ms: 1000, publish: {chattter: {data: hello}}}}
+""",
+        good="""\
+system: ports
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
+    timers: {tick: {period_ms: 1000, publish: {chatter: {data: hello}}}}
+""",
+    )
+)
+
+_SECTIONS = frozenset(kind.section for kind in PortKind)
+_SENDERS = {
+    "publish": (PortKind.PUBLISHER,),
+    "call": (PortKind.CLIENT, PortKind.ACTION_CLIENT),
+}
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the ends of connections, at what reactions send through, at what instances refine."""
+    doubts = context.once(doubt)
+    for endpoint in endpoints(context.system):
+        if not doubts.may_have(endpoint.node, *PORT_SECTIONS):
+            yield from _endpoint(context, endpoint)
+    for site, key, send in sends(context.system):
+        name = send.port
+        if not site.node.complete or is_opaque(name.value):
+            continue
+        if doubts.may_have(site.node.name.value, *PORT_SECTIONS):
+            continue
+        if site.node.port(name.value) is not None:
+            continue
+        candidates = [port.name.value for port in site.node.ports_of(*_SENDERS[key])]
+        yield Diagnostic(
+            RULE,
+            f"'{key}' names port '{name}', which the node does not have",
+            name.span,
+            hint=suggestion(name.value, candidates),
+        )
+    for node in context.system.nodes:
+        yield from _refinements(node)
+
+
+def _endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
+    node = context.system.node(endpoint.node)
+    if node is None or not node.complete or node.port(endpoint.port) is not None:
+        return
+    name = endpoint.port
+    if is_opaque(endpoint.text.value):
+        return
+    yield Diagnostic(
+        RULE,
+        f"node '{node.name}' has no port '{name}'",
+        part_of(endpoint.text, len(endpoint.node) + 1, len(name)),
+        hint=suggestion(name, [port.name.value for port in node.ports]),
+    )
+
+
+def _refinements(node: Node) -> Iterator[Diagnostic]:
+    for unknown in node.unknown:
+        if unknown.section not in _SECTIONS:
+            continue
+        name = unknown.name
+        other = node.port(name.value)
+        hint = (
+            f"'{name}' is declared under '{other.kind.section}'"
+            if other is not None
+            else suggestion(name.value, unknown.known)
+        )
+        yield Diagnostic(
+            RULE,
+            f"node type '{node.type_name}' has no port '{name}' under '{unknown.section}'",
+            name.span,
+            hint=hint,
+        )

@@ -1,0 +1,88 @@
+"""A remapping of a name that the node does not use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.analysis.remapped import matched_ports, own_name
+from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.model import Node, Remapping
+from composer.names import topic_name_problem
+
+RULE = register(
+    Rule(
+        code="RC208",
+        name="unknown-remapping",
+        severity=Severity.ERROR,
+        summary="A remapping names a topic, service or action that no port of the node has.",
+        why="ROS ignores such a remapping without a word, and the port keeps its old name.",
+        bad="""\
+system: renamed
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
+    remappings: {chater: news}
+""",
+        good="""\
+system: renamed
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
+    remappings: {chatter: news}
+""",
+    )
+)
+
+#: Names that every ROS node has without declaring them, before expansion.
+_EVERY_NODE = (
+    "/clock",
+    "/diagnostics",
+    "/parameter_events",
+    "/rosout",
+    "~/describe_parameters",
+    "~/get_parameter_types",
+    "~/get_parameters",
+    "~/get_type_description",
+    "~/list_parameters",
+    "~/set_parameters",
+    "~/set_parameters_atomically",
+    "~/change_state",
+    "~/get_available_states",
+    "~/get_available_transitions",
+    "~/get_state",
+    "~/get_transition_graph",
+    "~/transition_event",
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at what every remapping renames."""
+    for node in context.system.nodes:
+        if not node.complete or any(is_opaque(port.ros_name.value) for port in node.ports):
+            continue
+        for remapping in node.remappings:
+            if not _known(node, remapping):
+                source = remapping.source
+                yield Diagnostic(
+                    RULE,
+                    f"node '{node.name}' has no port with the name '{source}' to remap",
+                    source.span,
+                    hint=_hint(node, source.value),
+                )
+
+
+def _known(node: Node, remapping: Remapping) -> bool:
+    source = remapping.source.value
+    if is_opaque(source) or topic_name_problem(source) is not None:
+        return True  # nothing to say, or another rule's to say
+    return any(matched_ports(node, remapping)) or own_name(node, source) in {
+        own_name(node, name) for name in _EVERY_NODE
+    }
+
+
+def _hint(node: Node, source: str) -> str | None:
+    port = node.port(source)
+    if port is not None:
+        return f"the {port.kind.channel} of port '{source}' is called '{port.ros_name}'"
+    return suggestion(source, [port.ros_name.value for port in node.ports])

@@ -1,0 +1,64 @@
+"""A part of the node's own memory that was not declared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.doubt import doubt
+from composer.analysis.places import part_of_path
+from composer.analysis.reactions import reactions
+from composer.analysis.sites import sites
+from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.model import Node
+from composer.source import Span
+
+RULE = register(
+    Rule(
+        code="RC210",
+        name="unknown-state",
+        severity=Severity.ERROR,
+        summary="A name under 'state' is used or set that the node does not declare.",
+        why="What a node remembers is declared with its first value, so that it always has one.",
+        bad="""\
+system: memory
+nodes:
+  counter:
+    state: {last: 0.0}
+    timers: {tick: {period_ms: 100, set: {lost: "{now}"}}}
+""",
+        good="""\
+system: memory
+nodes:
+  counter:
+    state: {last: 0.0}
+    timers: {tick: {period_ms: 100, set: {last: "{now}"}}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at what reactions set and at what expressions read."""
+    doubts = context.once(doubt)
+    known = {
+        node.name.value: frozenset(name.value for name, _ in node.state)
+        for node in context.system.nodes
+    }
+    for node, name, span in _uses(context):
+        of_node = node.name.value
+        if name not in known[of_node] and not doubts.may_have(of_node, "state"):
+            names = [declared.value for declared, _ in node.state]
+            hint = suggestion(name, names) or f"declare it: 'state: {{{name}: 0}}'"
+            yield Diagnostic(RULE, f"the node declares no state '{name}'", span, hint=hint)
+
+
+def _uses(context: Context) -> Iterator[tuple[Node, str, Span]]:
+    for found in reactions(context.system):
+        for name, _ in found.reaction.state:
+            yield found.node, name.value, name.span
+    for site in context.once(sites):
+        for path in site.expression.paths:
+            if path.root == "state" and "state" in site.names and len(path.parts) > 1:
+                span = part_of_path(site.span, site.expression, path, 1)
+                yield site.node, str(path.parts[1]), span

@@ -1,0 +1,49 @@
+"""An instance that refines a timer its node type does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+
+RULE = register(
+    Rule(
+        code="RC204",
+        name="unknown-timer",
+        severity=Severity.ERROR,
+        summary="An instance refines a timer that its node type does not have.",
+        why="A node of a type has the timers of the type; the change would reach none of them.",
+        bad="""\
+system: source
+nodes:
+  source:
+    type: timer_source
+    variables: {message_type: std_msgs/msg/String}
+    publishers: {output: {external: true}}
+    timers: {tock: {rate_hz: 2}}
+""",
+        good="""\
+system: source
+nodes:
+  source:
+    type: timer_source
+    variables: {message_type: std_msgs/msg/String}
+    publishers: {output: {external: true}}
+    timers: {tick: {rate_hz: 2}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the timers that instances refine."""
+    for node in context.system.nodes:
+        for unknown in node.unknown:
+            if unknown.section == "timers":
+                yield Diagnostic(
+                    RULE,
+                    f"node type '{node.type_name}' has no timer '{unknown.name}'",
+                    unknown.name.span,
+                    hint=suggestion(unknown.name.value, unknown.known),
+                )

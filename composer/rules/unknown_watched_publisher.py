@@ -1,0 +1,51 @@
+"""A watch over the silence of a publisher that the node does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.analysis.doubt import PORT_SECTIONS, doubt
+from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.model import PortKind
+
+RULE = register(
+    Rule(
+        code="RC213",
+        name="unknown-watched-publisher",
+        severity=Severity.ERROR,
+        summary="topic_silence_ms names a publisher that the node does not have.",
+        why="Nothing would be watched, and the node could fall silent unnoticed.",
+        bad="""\
+system: watching
+nodes:
+  lidar:
+    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
+    lifecycle: {watch: {topic_silence_ms: {scans: 500}}}
+""",
+        good="""\
+system: watching
+nodes:
+  lidar:
+    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
+    lifecycle: {watch: {topic_silence_ms: {scan: 500}}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Hold the publishers that are watched against those there are."""
+    doubts = context.once(doubt)
+    for node in context.system.nodes:
+        if not node.complete or doubts.may_have(node.name.value, *PORT_SECTIONS):
+            continue
+        known = [port.name.value for port in node.ports_of(PortKind.PUBLISHER)]
+        for name, _ in node.supervision.watch.topics:
+            if name.value not in known and not is_opaque(name.value):
+                yield Diagnostic(
+                    RULE,
+                    f"node '{node.name}' has no publisher '{name}' to watch",
+                    name.span,
+                    hint=suggestion(name.value, known),
+                )

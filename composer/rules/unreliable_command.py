@@ -1,0 +1,55 @@
+"""Orders that may be lost."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.model import PortKind
+from composer.qos import Reliability
+
+RULE = register(
+    Rule(
+        code="RC316",
+        name="unreliable-command",
+        severity=Severity.INFO,
+        summary="A topic that carries commands, by its name, is best effort.",
+        why=(
+            "A lost reading is followed by the next one; a lost order is not carried out. The "
+            "preset 'command' is reliable."
+        ),
+        bad="""\
+system: orders
+nodes:
+  planner:
+    publishers:
+      motor_commands: {type: geometry_msgs/msg/Twist, qos: sensor_data, external: true}
+""",
+        good="""\
+system: orders
+nodes:
+  planner:
+    publishers:
+      motor_commands: {type: geometry_msgs/msg/Twist, qos: command, external: true}
+""",
+    )
+)
+
+_COMMAND = re.compile(r"(^|[/_])(cmd|command|commands|order|orders)($|[/_])")
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the reliability of publishers whose topic is called a command."""
+    for node in context.system.nodes:
+        for port in node.ports_of(PortKind.PUBLISHER):
+            if not port.qos.known or port.qos.profile.reliability is Reliability.RELIABLE:
+                continue
+            if _COMMAND.search(port.full_name):
+                yield Diagnostic(
+                    RULE,
+                    f"'{port.full_name}' carries commands, but may lose them: it is best effort",
+                    port.qos.policy_span("reliability"),
+                    hint="use 'qos: command'",
+                )

@@ -1,0 +1,47 @@
+"""An executor without a node."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.doubt import doubt
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.model import DEFAULT_EXECUTOR
+
+RULE = register(
+    Rule(
+        code="RC245",
+        name="unused-executor",
+        severity=Severity.INFO,
+        summary="No node runs on an executor of executors.",
+        why="It is left over, or a node that was meant for it runs on another one.",
+        bad="""\
+system: threads
+executors:
+  perception: {kind: multi_threaded, threads: 4}
+nodes:
+  camera: {on_activate: {log: started}}
+""",
+        good="""\
+system: threads
+executors:
+  perception: {kind: multi_threaded, threads: 4}
+nodes:
+  camera: {executor: perception, on_activate: {log: started}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Hold the executors against the nodes. One called ``default`` is that of all other nodes."""
+    used = {
+        node.executor.value if node.executor else DEFAULT_EXECUTOR for node in context.system.nodes
+    }
+    known = {executor.name.value for executor in context.system.executors} | {DEFAULT_EXECUTOR}
+    if not used <= known or context.once(doubt).any:
+        return  # the unknown name may be meant for the unused one
+    for executor in context.system.executors:
+        if executor.name.value not in used:
+            yield Diagnostic(RULE, f"no node runs on '{executor.name}'", executor.name.span)

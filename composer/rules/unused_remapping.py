@@ -1,0 +1,69 @@
+"""A remapping that changes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_opaque
+from composer.analysis.remapped import matched_ports, own_name
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.model import Node, Remapping
+
+RULE = register(
+    Rule(
+        code="RC241",
+        name="unused-remapping",
+        severity=Severity.WARNING,
+        summary="A remapping has no effect, because a connection names the port anew.",
+        why=(
+            "The name in a connection wins over a remapping. Whoever reads the remapping expects "
+            "the port under a name that it does not have."
+        ),
+        bad="""\
+system: renamed
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+    remappings: {chatter: news}
+  listener:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: /chatter, from: talker.chatter, to: listener.chatter}
+""",
+        good="""\
+system: renamed
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+  listener:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: /chatter, from: talker.chatter, to: listener.chatter}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the names that remapped ports have in the end."""
+    for node in context.system.nodes:
+        for remapping in node.remappings:
+            yield from _remapping(node, remapping)
+
+
+def _remapping(node: Node, remapping: Remapping) -> Iterator[Diagnostic]:
+    target = remapping.target.value
+    ports = list(matched_ports(node, remapping))
+    if not ports or is_opaque(target):
+        return
+    wanted = own_name(node, target)
+    actual = sorted({port.full_name for port in ports} - {wanted})
+    if any(port.full_name == wanted for port in ports) or not actual:
+        return
+    yield Diagnostic(
+        RULE,
+        f"remapping '{remapping.source}' to '{target}' has no effect: "
+        f"the name is '{actual[0]}' in the end",
+        remapping.source.span,
+        hint="remove the remapping, or the port from its connection",
+    )

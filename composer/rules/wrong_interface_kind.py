@@ -1,0 +1,59 @@
+"""A service type on a topic, or any other mixture of kinds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.words import a
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.interfaces import Action, Message, Service
+from composer.model import ChannelKind
+
+RULE = register(
+    Rule(
+        code="RC302",
+        name="wrong-interface-kind",
+        severity=Severity.ERROR,
+        summary="A port has a type of another kind: a service type on a topic, say.",
+        why="Topics carry messages, services and actions have types of their own.",
+        bad="""\
+system: kinds
+nodes:
+  talker:
+    publishers: {trigger: {type: std_srvs/srv/Trigger, qos: command, external: true}}
+""",
+        good="""\
+system: kinds
+nodes:
+  talker:
+    clients: {trigger: {type: std_srvs/srv/Trigger, external: true}}
+""",
+    )
+)
+
+_WANTED = {
+    ChannelKind.TOPIC: "a message type",
+    ChannelKind.SERVICE: "a service type",
+    ChannelKind.ACTION: "an action type",
+}
+_KINDS = {
+    Message: ChannelKind.TOPIC,
+    Service: ChannelKind.SERVICE,
+    Action: ChannelKind.ACTION,
+}
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the kind of every port's type."""
+    for node in context.system.nodes:
+        for port in node.ports:
+            found = context.interfaces.find(port.interface.value)
+            if found is None or _KINDS[type(found)] is port.kind.channel:
+                continue
+            yield Diagnostic(
+                RULE,
+                f"'{port.interface}' is {_WANTED[_KINDS[type(found)]]}, "
+                f"but {a(port.kind)} needs {_WANTED[port.kind.channel]}",
+                port.interface.span,
+            )

@@ -1,0 +1,165 @@
+"""A port used as what it is not: a subscription as a source, a service in ``publish``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from composer.analysis.context import Context
+from composer.analysis.reactions import sends
+from composer.analysis.words import a, either
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import Chain, ChannelKind, Connection, Endpoint, Port, PortKind
+
+RULE = register(
+    Rule(
+        code="RC211",
+        name="wrong-port-kind",
+        severity=Severity.ERROR,
+        summary="A port stands where a port of another kind is needed.",
+        why=(
+            "Messages leave from publishers and arrive at subscriptions; requests leave from "
+            "clients and arrive at services. The other way round nothing could flow."
+        ),
+        bad="""\
+system: swapped
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+  listener:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: /chatter, from: talker.chatter, to: talker.chatter}
+""",
+        good="""\
+system: swapped
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+  listener:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: /chatter, from: talker.chatter, to: listener.chatter}
+""",
+    )
+)
+
+#: For each kind of channel the keys of a connection and the kinds of port they take.
+_ENDS = {
+    ChannelKind.TOPIC: (("from", PortKind.PUBLISHER), ("to", PortKind.SUBSCRIPTION)),
+    ChannelKind.SERVICE: (("server", PortKind.SERVICE), ("clients", PortKind.CLIENT)),
+    ChannelKind.ACTION: (("server", PortKind.ACTION_SERVER), ("clients", PortKind.ACTION_CLIENT)),
+}
+_SENDERS = {
+    "publish": (PortKind.PUBLISHER,),
+    "call": (PortKind.CLIENT, PortKind.ACTION_CLIENT),
+}
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look at the ends of connections and at the ports that reactions send through."""
+    for connection in context.system.connections:
+        yield from _connection(context, connection)
+    for chain in context.system.chains:
+        yield from _chain(context, chain)
+    for site, key, send in sends(context.system):
+        port = site.node.port(send.port.value)
+        allowed = _SENDERS[key]
+        if port is not None and port.kind not in allowed:
+            yield Diagnostic(
+                RULE,
+                f"'{key}' needs {either(allowed)}, but '{port.name}' is {a(port.kind)}",
+                send.port.span,
+                (Label(port.name.span, f"declared as {a(port.kind)}"),),
+                _hint(port.kind),
+            )
+
+
+def _chain(context: Context, chain: Chain) -> Iterator[Diagnostic]:
+    for endpoint in chain.through:
+        port = context.system.port(endpoint)
+        if port is not None and port.kind is not PortKind.PUBLISHER:
+            yield Diagnostic(
+                RULE,
+                f"chain '{chain.name}' goes through publishers, but '{endpoint.text}' "
+                f"is {a(port.kind)}",
+                endpoint.text.span,
+                (Label(port.name.span, f"declared as {a(port.kind)}"),),
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    """An end of a connection: its key, the kind of port it takes, and the port that is there."""
+
+    endpoint: Endpoint
+    key: str
+    wanted: PortKind
+    port: Port
+
+    @property
+    def label(self) -> Label:
+        return Label(self.port.name.span, f"'{self.endpoint.text}' is {a(self.port.kind)}")
+
+
+def _connection(context: Context, connection: Connection) -> Iterator[Diagnostic]:
+    ends = list(_ends(context, connection))
+    wrong = [end for end in ends if end.port.kind is not end.wanted]
+    kinds = {end.port.kind.channel for end in wrong}
+    if len(wrong) > 1 and len(wrong) == len(ends) and len(kinds) == 1:
+        yield _all_wrong(connection, wrong, kinds.pop())
+        return
+    for end in wrong:
+        actual = end.port.kind
+        yield Diagnostic(
+            RULE,
+            f"'{end.key}' of {connection.kind} '{connection.name}' needs {a(end.wanted)}, "
+            f"but '{end.endpoint.text}' is {a(actual)}",
+            end.endpoint.text.span,
+            (Label(end.port.name.span, f"declared as {a(actual)}"),),
+            _belongs(connection, actual),
+        )
+
+
+def _ends(context: Context, connection: Connection) -> Iterator[_End]:
+    groups = (connection.sources, connection.sinks)
+    for endpoints, (key, kind) in zip(groups, _ENDS[connection.kind], strict=True):
+        for endpoint in endpoints:
+            port = context.system.port(endpoint)
+            if port is not None:
+                yield _End(endpoint, key, kind, port)
+
+
+def _all_wrong(connection: Connection, ends: list[_End], kind: ChannelKind) -> Diagnostic:
+    """Tell as one mistake what makes every end of a connection wrong."""
+    (source_key, _), (sink_key, _) = _ENDS[connection.kind]
+    if kind is connection.kind:
+        message = f"the ends of {kind} '{connection.name}' are swapped"
+        hint = f"exchange '{source_key}' and '{sink_key}'"
+    else:
+        message = (
+            f"'{connection.name}' joins the ends of {_an(kind)}, not of {_an(connection.kind)}"
+        )
+        (source_key, _), (sink_key, _) = _ENDS[kind]
+        hint = f"write '{kind}:', '{source_key}:' and '{sink_key}:'"
+    labels = tuple(end.label for end in ends)
+    return Diagnostic(RULE, message, connection.span, labels, hint)
+
+
+def _belongs(connection: Connection, actual: PortKind) -> str:
+    if actual.channel is connection.kind:
+        other = next(key for key, kind in _ENDS[connection.kind] if kind is actual)
+        return f"{a(actual)} belongs under '{other}'"
+    return f"{a(actual)} belongs in a connection that begins with '{actual.channel}:'"
+
+
+def _an(kind: ChannelKind) -> str:
+    return f"{'an' if kind.value.startswith('a') else 'a'} {kind}"
+
+
+def _hint(kind: PortKind) -> str | None:
+    if kind is PortKind.PUBLISHER:
+        return "use 'publish' to send a message"
+    if kind in {PortKind.CLIENT, PortKind.ACTION_CLIENT}:
+        return "use 'call' to send a request or a goal"
+    return None

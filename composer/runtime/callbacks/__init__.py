@@ -1,0 +1,1 @@
+"""How a callback runs: its context, queue, timing, budget and reactions."""

@@ -1,0 +1,146 @@
+"""A node's logger, and what becomes of the exceptions of user code."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TypeAlias
+
+from rcl_interfaces.msg import Log as LogMessage
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidHandle
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from composer.model import LogLevel
+from composer.runtime.metrics.statistics import Statistics
+
+_SEVERITIES = {
+    LogLevel.DEBUG: 10,
+    LogLevel.INFO: 20,
+    LogLevel.WARN: 30,
+    LogLevel.ERROR: 40,
+    LogLevel.FATAL: 50,
+}
+#: As rcl_qos_profile_rosout_default: who listens late still gets the last ten seconds.
+_ROSOUT_QOS = QoSProfile(
+    depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=Duration(seconds=10)
+)
+#: What there is to hear of a node, or of a whole context, that is gone.
+_GONE = (InvalidHandle, rclpy_implementation.RCLError)
+_AGAIN_AFTER_S = 1.0
+
+#: Takes (level, name of the logger, message).
+Write: TypeAlias = Callable[[LogLevel, str, str], None]
+
+
+class Log:
+    """A behaviour's ``log``: to whoever shows it, and to /rosout.
+
+    Not by way of rcl: its console knows no time that starts with the system, and rclpy's logger
+    looks for its caller in the stack at every call, which takes longer than the rest.
+    """
+
+    def __init__(self, node: Node, level: LogLevel, write: Write, *, rosout: bool = True) -> None:
+        """Log what is at least ``level``. ``node`` must not have a rosout publisher of rcl's.
+
+        Without ``rosout`` to whoever shows it alone.
+        """
+        self._name = node.get_fully_qualified_name().strip("/").replace("/", ".")
+        self._lowest = _SEVERITIES[level]
+        self._write = write
+        self._clock = node.get_clock()
+        self._rosout = node.create_publisher(LogMessage, "/rosout", _ROSOUT_QOS) if rosout else None
+
+    def is_on(self, level: LogLevel) -> bool:
+        """Say whether anything becomes of a message at ``level``."""
+        return _SEVERITIES[level] >= self._lowest
+
+    def write(self, level: LogLevel, message: str) -> None:
+        """Log ``message`` at ``level``."""
+        if not self.is_on(level):
+            return
+        text = str(message)
+        self._write(level, self._name, text)
+        if self._rosout is None:
+            return
+        with suppress(*_GONE):
+            self._rosout.publish(
+                LogMessage(
+                    stamp=self._clock.now().to_msg(),
+                    level=_SEVERITIES[level],
+                    name=self._name,
+                    msg=text,
+                )
+            )
+
+    def debug(self, message: str) -> None:
+        """Log for whoever looks for a fault."""
+        self.write(LogLevel.DEBUG, message)
+
+    def info(self, message: str) -> None:
+        """Log what a person running the system wants to see."""
+        self.write(LogLevel.INFO, message)
+
+    def warn(self, message: str) -> None:
+        """Log what may be wrong."""
+        self.write(LogLevel.WARN, message)
+
+    def error(self, message: str) -> None:
+        """Log what is wrong."""
+        self.write(LogLevel.ERROR, message)
+
+    def fatal(self, message: str) -> None:
+        """Log what ends the node."""
+        self.write(LogLevel.FATAL, message)
+
+
+class Faults:
+    """Takes the exceptions of user code: counts them, logs them, and lets the node go on.
+
+    The first fault of a callback comes with its traceback; after that a callback that fails all
+    the time gets one line a second.
+    """
+
+    def __init__(
+        self, log: Log, statistics: Statistics, report: Callable[[str, str], None]
+    ) -> None:
+        """``report(callback, text)`` is told of each fault that is logged."""
+        self._log = log
+        self._statistics = statistics
+        self._report = report
+        self._silent_until_s: dict[str, float] = {}
+        self._unsaid: dict[str, int] = {}
+
+    def take(self, callback: str, error: BaseException) -> None:
+        """Log that ``callback`` raised ``error``."""
+        self.note(callback, describe(error), traceback_of(error))
+
+    def note(self, callback: str, text: str, details: str = "") -> None:
+        """Log that ``callback`` did something wrong; ``details`` only the first time."""
+        self._statistics.errors += 1
+        now_s = time.monotonic()
+        silent_until_s = self._silent_until_s.get(callback)
+        if silent_until_s is not None and now_s < silent_until_s:
+            self._unsaid[callback] = self._unsaid.get(callback, 0) + 1
+            return
+        self._silent_until_s[callback] = now_s + _AGAIN_AFTER_S
+        unsaid = self._unsaid.pop(callback, 0)
+        times = f" ({unsaid} more since the last time)" if unsaid else ""
+        story = f"\n{details}" if details and silent_until_s is None else ""
+        self._log.error(f"{callback}: {text}{times}{story}")
+        self._report(callback, text)
+
+
+def describe(error: BaseException) -> str:
+    """Return the exception as one line: its type and, where it has one, its text."""
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def traceback_of(error: BaseException) -> str:
+    """Return the traceback as text, as Python prints it."""
+    return "".join(traceback.format_exception(error)).rstrip()

@@ -1,0 +1,1 @@
+"""Counters and histograms of nodes and callbacks, and the messages that publish them."""

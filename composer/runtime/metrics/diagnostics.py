@@ -1,0 +1,58 @@
+"""Figures of callbacks and chains as managers tell them: diagnostic_msgs/msg/DiagnosticArray."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import fields
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
+
+Figures = CallbackFigures | ChainFigures
+#: Which type each field has, for the way back from text.
+_TYPES = {
+    field.name: {"int": int, "float": float}.get(str(field.type), str)
+    for kind in (CallbackFigures, ChainFigures)
+    for field in fields(kind)
+}
+
+
+def to_message(system: str, figures: Iterable[Figures]) -> DiagnosticArray:
+    """Return a message with a status for each; what took longer than it may warns."""
+    return DiagnosticArray(status=[_status(system, item) for item in figures])
+
+
+def from_message(
+    message: DiagnosticArray,
+) -> tuple[tuple[CallbackFigures, ...], tuple[ChainFigures, ...]]:
+    """Return the callbacks and the chains that :func:`to_message` was given."""
+    values = [
+        {item.key: _TYPES[item.key](item.value) for item in status.values}
+        for status in message.status
+    ]
+    return (
+        tuple(CallbackFigures(**item) for item in values if "chain" not in item),
+        tuple(ChainFigures(**item) for item in values if "chain" in item),
+    )
+
+
+def _status(system: str, figures: Figures) -> DiagnosticStatus:
+    if isinstance(figures, ChainFigures):
+        name, is_well, text = f"chain {figures.chain}", not figures.late, figures.text
+    else:
+        name = f"{figures.node} {figures.callback}"
+        is_well = not (figures.overruns or figures.dropped)
+        text = f"{figures.overruns} over budget, {figures.dropped} dropped"
+    values = {field.name: getattr(figures, field.name) for field in fields(figures)}
+    return DiagnosticStatus(
+        level=DiagnosticStatus.OK if is_well else DiagnosticStatus.WARN,
+        name=f"{system}: {name}",
+        message=text,
+        hardware_id=system,
+        values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
+    )
+
+
+def _text(value: str | float) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,1 @@
+"""The lifecycle node: its entities, its behavior, its parameters, and rcl's state machine."""

@@ -1,0 +1,146 @@
+"""Builds the ports and timers of a node from its model and binds reactions and handlers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from composer.model import Event, Node, Port, PortKind, Reaction, Timer
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.callbacks.reactions import Caller, RunningReaction
+from composer.runtime.intra_process.publisher import Sender
+from composer.runtime.node.behavior_loader import method
+from composer.runtime.ports.action_client import ActionClientPort
+from composer.runtime.ports.action_server import ActionServerPort, Handlers
+from composer.runtime.ports.client import ClientPort
+from composer.runtime.ports.port import RunningPort
+from composer.runtime.ports.publisher import PublisherPort
+from composer.runtime.ports.service import ServicePort
+from composer.runtime.ports.subscription import SubscriptionPort
+from composer.runtime.ports.timer import TimerPort
+from composer.runtime.ros.messages import interface_class
+
+
+@dataclass(slots=True)
+class Assembly:
+    """The entities of a configured node, by name, and its reactions to transitions.
+
+    ``standby`` is the core of what is always on; it differs from ``core`` in its gate.
+    """
+
+    core: NodeContext
+    standby: NodeContext
+    publishers: dict[str, PublisherPort] = field(default_factory=dict)
+    clients: dict[str, ClientPort] = field(default_factory=dict)
+    action_clients: dict[str, ActionClientPort] = field(default_factory=dict)
+    action_servers: dict[str, ActionServerPort] = field(default_factory=dict)
+    subscriptions: dict[str, SubscriptionPort] = field(default_factory=dict)
+    services: dict[str, ServicePort] = field(default_factory=dict)
+    timers: dict[str, TimerPort] = field(default_factory=dict)
+    transitions: dict[Event, RunningReaction] = field(default_factory=dict)
+    always_on: list[RunningPort] = field(default_factory=list)
+
+    @property
+    def senders(self) -> dict[str, Sender]:
+        """What the node publishes with, by the name of the publisher."""
+        return {name: port.sender for name, port in self.publishers.items()}
+
+    @property
+    def ports(self) -> Iterator[RunningPort]:
+        """Everything: first what sends, then what takes, then what drives."""
+        yield from self.publishers.values()
+        yield from self.clients.values()
+        yield from self.action_clients.values()
+        yield from self.subscriptions.values()
+        yield from self.services.values()
+        yield from self.action_servers.values()
+        yield from self.timers.values()
+
+    @property
+    def gated(self) -> Iterator[RunningPort]:
+        """What is to stand still unless the node is active."""
+        return (port for port in self.ports if port not in self.always_on)
+
+    def build(self, model: Node, behavior: object | None) -> None:
+        """Create the entities of ``model``. What was created is kept when one of them cannot be.
+
+        Raises MessageError, PeriodError, and what rclpy raises.
+        """
+        self._tell_of_dds(model)
+        for port in model.ports_of(PortKind.PUBLISHER):
+            self.publishers[port.name.value] = PublisherPort(self._core_of(port), port)
+        for port in model.ports_of(PortKind.CLIENT):
+            self.clients[port.name.value] = ClientPort(self._core_of(port), port)
+        for port in model.ports_of(PortKind.ACTION_CLIENT):
+            self.action_clients[port.name.value] = ActionClientPort(self._core_of(port), port)
+        self._bind_answers(model)
+        for port in model.ports_of(PortKind.SUBSCRIPTION, PortKind.SERVICE, PortKind.ACTION_SERVER):
+            self._add_receiver(port, behavior)
+        for timer in model.timers:
+            name = timer.name.value
+            reaction = self._reaction(timer.reaction)
+            handler = method(behavior, f"on_{name}")
+            self.timers[name] = TimerPort(self._core_of(timer), timer, reaction, handler)
+        for event, declared in model.reactions:
+            self.transitions[event] = self._compile(declared)
+        self.always_on.extend(self._always_on(model))
+
+    def _tell_of_dds(self, model: Node) -> None:
+        for port in model.ports:
+            objection = self.core.delivery.objection(port)
+            if objection is not None:
+                self.core.log.debug(f"{port.kind} '{port.name}' uses DDS alone: {objection}")
+
+    def _core_of(self, declared: Port | Timer) -> NodeContext:
+        return self.standby if declared.always_on else self.core
+
+    def _always_on(self, model: Node) -> Iterator[RunningPort]:
+        sections: dict[PortKind, Mapping[str, RunningPort]] = {
+            PortKind.PUBLISHER: self.publishers,
+            PortKind.CLIENT: self.clients,
+            PortKind.ACTION_CLIENT: self.action_clients,
+            PortKind.SUBSCRIPTION: self.subscriptions,
+            PortKind.SERVICE: self.services,
+            PortKind.ACTION_SERVER: self.action_servers,
+        }
+        for port in model.ports:
+            if port.always_on:
+                yield sections[port.kind][port.name.value]
+        for timer in model.timers:
+            if timer.always_on:
+                yield self.timers[timer.name.value]
+
+    def _bind_answers(self, model: Node) -> None:
+        for port in model.ports_of(PortKind.CLIENT):
+            for event, declared in port.reactions:
+                self.clients[port.name.value].react(event, self._compile(declared))
+        for port in model.ports_of(PortKind.ACTION_CLIENT):
+            for event, declared in port.reactions:
+                self.action_clients[port.name.value].react(event, self._compile(declared))
+
+    def _add_receiver(self, port: Port, behavior: object | None) -> None:
+        name = port.name.value
+        core = self._core_of(port)
+        handler = method(behavior, f"on_{name}")
+        match port.kind:
+            case PortKind.SUBSCRIPTION:
+                reaction = self._reaction(port.reaction(Event.MESSAGE))
+                self.subscriptions[name] = SubscriptionPort(core, port, reaction, handler)
+            case PortKind.SERVICE:
+                response_type = interface_class(port.interface.value).Response
+                reaction = self._reaction(port.reaction(Event.REQUEST), response_type)
+                self.services[name] = ServicePort(core, port, reaction, handler)
+            case PortKind.ACTION_SERVER:
+                reaction = self._reaction(port.reaction(Event.GOAL))
+                handlers = Handlers(handler, method(behavior, f"accept_{name}"))
+                self.action_servers[name] = ActionServerPort(core, port, reaction, handlers)
+
+    def _reaction(
+        self, declared: Reaction | None, response_type: Any = None
+    ) -> RunningReaction | None:
+        return None if declared is None else self._compile(declared, response_type)
+
+    def _compile(self, declared: Reaction, response_type: Any = None) -> RunningReaction:
+        callers: dict[str, Caller] = {**self.clients, **self.action_clients}
+        return RunningReaction(self.core, declared, self.senders, callers, response_type)

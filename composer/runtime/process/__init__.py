@@ -1,0 +1,1 @@
+"""What concerns the whole process: environment, DDS profiles, instance lock, signals, exit."""

@@ -1,0 +1,1 @@
+"""Message classes, QoS profiles and graph endpoints, as rclpy has them."""

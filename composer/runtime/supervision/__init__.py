@@ -1,0 +1,1 @@
+"""Bring-up, supervision and tear-down of a system, on the main thread."""
