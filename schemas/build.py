@@ -1,7 +1,7 @@
-"""Make the schemas from their parts: ``python schemas/build.py``.
+"""Build the JSON Schemas from ``parts/*.yaml``: ``python schemas/build.py``.
 
-Editors want each schema in one file; the two share most of their definitions. So people edit
-``parts/*.yaml``, and this puts what a schema needs of ``parts/shared.yaml`` into it.
+Editors need each schema in a single file, but the schemas share most of their definitions. Each
+schema therefore gets the definitions of ``parts/shared.yaml`` that it references.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _DEFINITIONS = "#/definitions/"
 
 
 def build(name: str) -> str:
-    """Return the text of the schema called ``name``."""
+    """Return the text of a schema."""
     schema = _read(name)
     definitions = {**_read("shared"), **schema.pop("definitions")}
     needed = sorted(_reachable(schema, definitions))
@@ -29,27 +29,27 @@ def build(name: str) -> str:
 
 
 def path(name: str) -> Path:
-    """Return where the schema called ``name`` is kept."""
+    """Return the path of a schema file."""
     return FOLDER / f"{name}.schema.json"
 
 
 def _read(part: str) -> dict[str, Any]:
-    tree, _, findings = read_document(FOLDER / "parts" / f"{part}.yaml")
-    if tree is None or findings:
-        raise SystemExit("\n".join(f"{item.primary}: {item.message}" for item in findings))
+    tree, _, diagnostics = read_document(FOLDER / "parts" / f"{part}.yaml")
+    if tree is None or diagnostics:
+        raise SystemExit("\n".join(f"{item.primary}: {item.message}" for item in diagnostics))
     content: dict[str, Any] = plain(tree)
     return content
 
 
 def _reachable(schema: dict[str, Any], definitions: dict[str, Any]) -> set[str]:
-    found: set[str] = set()
+    reachable: set[str] = set()
     waiting = list(_references(schema))
     while waiting:
         name = waiting.pop()
-        if name not in found:
-            found.add(name)
+        if name not in reachable:
+            reachable.add(name)
             waiting.extend(_references(definitions[name]))
-    return found
+    return reachable
 
 
 def _references(part: Any) -> Iterator[str]:

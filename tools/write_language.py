@@ -1,6 +1,6 @@
-"""Write docs/language.md from the JSON Schemas: a section for a kind of map, a row for a key.
+"""Write docs/language.md from the JSON Schemas: a section per kind of map, a row per key.
 
-What is said of a key is its description in ``schemas/parts``; the words around it are in
+The descriptions of keys come from ``schemas/parts``, the introduction from
 ``tools/language_introduction.md``.
 """
 
@@ -23,7 +23,7 @@ INTRODUCTION = Path(__file__).with_name("language_introduction.md")
 
 Part = dict[str, Any]
 
-#: Headings of maps whose titles are not enough to tell them apart.
+#: Headings of maps whose titles are ambiguous.
 _HEADINGS = {
     "#lifecycle": "Lifecycle of the system",
     "inline_node": "Inline node",
@@ -33,17 +33,17 @@ _HEADINGS = {
     "watch_all": "Watch of the system",
 }
 _FILES = {"system": "System", "node": "Node type", "project": "Project"}
-#: A key of a connection that names nothing could mean any of the three kinds.
+#: The schema of a connection without a name lists the keys of all three kinds.
 _NOT_SHOWN = {"unnamed_connection"}
-#: What the introduction tells about, or what a word says better than its parts.
+#: Definitions that are described in the introduction or by a short phrase.
 _NAMES = {"fields": "[fields](#fields)", "parameter_value": "value of a parameter"}
 _WORDS = {
     "object": "map",
     "array": "list",
-    "string": "text",
+    "string": "string",
     "number": "number",
-    "integer": "whole number",
-    "boolean": "true or false",
+    "integer": "integer",
+    "boolean": "boolean",
     "null": "null",
 }
 _SUBSTITUTION = r"\$\{"
@@ -54,8 +54,8 @@ _EXPRESSION = r"\{"
 class Section:
     """A kind of map: its heading and its keys.
 
-    ``required`` must be there; ``declared`` must be there too, but for maps that only change what a
-    node type has.
+    Keys in ``required`` are always required; those in ``declared`` only where a port is declared,
+    not where a system overrides the port of a node type.
     """
 
     heading: str
@@ -63,8 +63,8 @@ class Section:
     required: frozenset[str]
     declared: frozenset[str] = frozenset()
 
-    def met_again(self, other: Section) -> Section:
-        """Return the section with what another place wants of the same map."""
+    def merged_with(self, other: Section) -> Section:
+        """Return the section combined with another use of the same map."""
         always = self.required & other.required
         sometimes = self.required | self.declared | other.required
         return replace(self, required=always, declared=sometimes - always)
@@ -72,19 +72,19 @@ class Section:
 
 @dataclass(slots=True)
 class Schema:
-    """One schema, and the sections found in it so far, in the order they are come to."""
+    """One schema, and its sections in order of appearance."""
 
     name: str
     definitions: Part
     sections: dict[str, Section] = field(default_factory=dict)
 
-    def look_through(self, whole: Part) -> None:
-        """Find the sections of the schema, each before those of its own keys."""
+    def collect_sections(self, whole: Part) -> None:
+        """Collect the sections of the schema, each before the sections of its keys."""
         waiting = [self._section(_FILES[self.name], whole, frozenset())]
         while waiting:
             section = waiting.pop(0)
             known = self.sections.get(section.heading)
-            self.sections[section.heading] = known.met_again(section) if known else section
+            self.sections[section.heading] = known.merged_with(section) if known else section
             if known is not None:
                 continue
             waiting += [
@@ -94,7 +94,7 @@ class Schema:
             ]
 
     def maps(self, part: Part, name: str, required: frozenset[str] = frozenset()) -> list[Section]:
-        """Return the kinds of map that ``part`` is, holds by name, or lists."""
+        """Return the kinds of map that ``part`` allows, directly or as values or items."""
         required |= frozenset(part.get("required", ()))
         if "$ref" in part:
             definition = _definition(part)
@@ -105,10 +105,10 @@ class Schema:
             return [self._section(self._heading(name, part), part, required)]
         inner = [*part.get("allOf", ()), *_branches(part)]
         inner += [part[key] for key in ("additionalProperties", "items") if _is_part(part, key)]
-        return [found for one in inner for found in self.maps(one, name, required)]
+        return [section for one in inner for section in self.maps(one, name, required)]
 
     def kind(self, part: Part, key: str) -> str:
-        """Return what may stand under ``key``, or in what does, with links to sections."""
+        """Return a description of the values allowed for ``key``, with links to sections."""
         if "$ref" in part:
             definition = _definition(part)
             return _NAMES.get(definition) or self.kind(self.definitions[definition], definition)
@@ -126,14 +126,14 @@ class Schema:
         return _either(words) + _limits(part)
 
     def described(self, part: Part) -> Part:
-        """Return ``part`` with what its definition says beside what it says itself."""
+        """Return ``part`` merged with the definition that it references."""
         if "$ref" not in part:
             return part
         return {**self.described(self.definitions[_definition(part)]), **part}
 
     def _words(self, name: str, part: Part, key: str, *, alone: bool) -> Iterator[str]:
         if name == "string" and not alone and part.get("pattern") == _SUBSTITUTION:
-            return  # that a variable may stand anywhere is said once, in the introduction
+            return  # the introduction explains that variables are allowed everywhere
         if name == "string" and part.get("pattern") == _EXPRESSION:
             yield "`{expression}`"
         elif name == "object":
@@ -151,7 +151,7 @@ class Schema:
 
     def _plural(self, part: Part, key: str) -> str:
         kind = self._links(part, key) or self.kind(part, key)
-        return {"text": "texts"}.get(kind, kind)
+        return {"string": "strings"}.get(kind, kind)
 
     def _links(self, part: Part, key: str) -> str:
         if _NAMES.get(_definition(part)):
@@ -172,40 +172,40 @@ def page() -> str:
     known: set[str] = set()
     for name in SCHEMAS:
         whole = schema(name)
-        found = Schema(name, whole["definitions"])
-        found.look_through(whole)
-        for section in found.sections.values():
+        document = Schema(name, whole["definitions"])
+        document.collect_sections(whole)
+        for section in document.sections.values():
             if section.heading not in known:
                 known.add(section.heading)
-                parts.append(_rendered(section, found))
+                parts.append(_rendered(section, document))
     return "\n".join(parts)
 
 
-def _rendered(section: Section, found: Schema) -> str:
+def _rendered(section: Section, document: Schema) -> str:
     level = "##" if section.heading in _FILES.values() else "###"
     lines = [f"{level} {section.heading}", ""]
     if "description" in section.part:
         lines += [section.part["description"], ""]
-    lines += ["| key | what it says | what stands there | for example |", "|---|---|---|---|"]
+    lines += ["| Key | Description | Value | Example |", "|---|---|---|---|"]
     for key, part in section.part["properties"].items():
-        lines.append(_row(key, part, section, found))
+        lines.append(_row(key, part, section, document))
     alternatives = [choice["required"] for choice in section.part.get("anyOf", ())]
     if alternatives:
-        names = _either([f"`{name}`" for choice in alternatives for name in choice])
-        lines += ["", f"At least {names} must be there."]
+        names = " and ".join(f"`{name}`" for choice in alternatives for name in choice)
+        lines += ["", f"At least one of {names} is required."]
     return "\n".join([*lines, ""])
 
 
-def _row(key: str, part: Part, section: Section, found: Schema) -> str:
-    described = found.described(part)
+def _row(key: str, part: Part, section: Section, document: Schema) -> str:
+    described = document.described(part)
     what = described.get("description", "").strip()
     if key in section.required:
-        what = f"**Must be there.** {what}"
+        what = f"**Required.** {what}"
     elif key in section.declared:
-        what = f"**Must be there**, unless a node type has said it. {what}"
-    kind = found.kind(part, f"#{key}")
+        what = f"**Required** unless set by a node type. {what}"
+    kind = document.kind(part, f"#{key}")
     if "default" in described:
-        kind += f"; `{_flow(described['default'])}` by default"
+        kind += f"; default: `{_flow(described['default'])}`"
     example = f"`{_flow(described['examples'][0])}`" if described.get("examples") else ""
     cells = [f"`{key}`", what, kind, example]
     return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
@@ -249,7 +249,7 @@ def _link(heading: str) -> str:
 
 
 def _flow(value: Any) -> str:
-    """Return a value as YAML in one line, in JSON's way where that is as short."""
+    """Return a value as YAML in one line."""
     if isinstance(value, dict | list):
         text = yaml.safe_dump(value, default_flow_style=True, sort_keys=False, width=10_000)
         return text.strip()
@@ -257,7 +257,7 @@ def _flow(value: Any) -> str:
 
 
 def main() -> None:
-    """Write the page anew."""
+    """Write the page."""
     PAGE.write_text(page(), encoding="utf-8")
 
 

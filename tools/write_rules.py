@@ -10,7 +10,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "rules.md"
 
 
 def main() -> None:
-    """Write the page anew."""
+    """Write the page."""
     PAGE.write_text(page(all_rules()), encoding="utf-8")
 
 
