@@ -17,7 +17,7 @@ from typing import TextIO
 import pytest
 from hypothesis import HealthCheck, settings
 
-from composer.runtime.process.dds_participants import participants_here
+from composer.runtime.process.dds_participants import count_participants
 
 TESTS_WITH_ROS = Path(__file__).parent / "ros"
 PROFILE_OF_FAST_DDS = Path(__file__).with_name("udp_on_this_computer.xml")
@@ -106,7 +106,7 @@ def pytest_runtest_logfinish() -> None:
     A lifecycle node of rclpy is one, with its participant; so is whatever an exception was raised
     in. This is the first moment at which nobody holds what the fixtures have made.
     """
-    if any(participants_here(domain_id) for domain_id in _visited):
+    if any(count_participants(domain_id) for domain_id in _visited):
         gc.collect()
     _visited.clear()
 
@@ -132,7 +132,7 @@ def _hold_domain_id() -> tuple[int, TextIO]:
         except BlockingIOError:
             lock.close()
             continue
-        if participants_here(domain_id):
+        if count_participants(domain_id):
             lock.close()
             continue
         os.utime(lock.fileno())

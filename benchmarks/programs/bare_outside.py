@@ -20,7 +20,7 @@ from benchmarks.programs.payloads import CLASSES, make
 from benchmarks.programs.task import places, task_from_arguments
 from benchmarks.programs.work import COUNTS, hand_over, measure, needs_kick
 from composer.runtime.executors.readiness import MESSAGE, Signal
-from composer.runtime.process.dds_profiles import complete_discovery
+from composer.runtime.process.dds_profiles import use_discovery_profile
 
 
 def pass_on(subscription: Subscription, publisher: Publisher) -> None:
@@ -42,7 +42,7 @@ def main() -> None:
     (place,) = places(task)
     kind = CLASSES[task.message]
     started_s = time.perf_counter()
-    complete_discovery(os.environ)
+    use_discovery_profile(os.environ)
     rclpy.init()
     node = rclpy.create_node(f"node_{place.index}")
     publisher = node.create_publisher(kind, place.sends, QUEUE_DEPTH)

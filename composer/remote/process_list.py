@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from composer.remote.lifecycle import Control
 from composer.remote.session import Deadline, Session
 from composer.remote.systems import MEETING_S, SystemReport, Systems
-from composer.runtime.process.instance_lock import claims
+from composer.runtime.process.instance_lock import local_systems
 
 #: Who does not answer so soon after being met is said to be silent.
 _PATIENCE_S = 2.0
@@ -29,7 +29,7 @@ def list_processes(session: Session, deadline: Deadline, *, callbacks: bool) -> 
     systems = Systems(session, deadline, callbacks=callbacks)
     control = Control(session, deadline)
     meeting = Deadline(min(MEETING_S, deadline.left_s))
-    here = sorted(claims())
+    here = sorted(local_systems())
     systems.listen(here)
     names, nodes = session.wait_until_still(lambda: (systems.look(), control.known()), deadline)
     reports = systems.reports({*here, *names}, meeting)

@@ -20,8 +20,8 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from composer.runtime.process import dds_profiles as discovery
-from composer.runtime.process.dds_participants import make_room_for_announcements, participants_here
-from composer.runtime.process.instance_lock import claims
+from composer.runtime.process.dds_participants import count_participants, enlarge_receive_buffers
+from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.ros.endpoints import NO_NAME
 from composer.runtime.ros.manager_protocol import NAME
 
@@ -74,13 +74,13 @@ class Deadline:
         return self.left_s <= 0.0
 
 
-def suit_commands() -> None:
+def use_command_profile() -> None:
     """Have this process do without shared memory: see :mod:`composer.runtime.process.dds_profiles`.
 
     For commands that do not carry large messages, before they join the ROS graph.
     """
     if get_rmw_implementation_identifier().startswith("rmw_fastrtps"):
-        discovery.suit_commands(os.environ)
+        discovery.use_command_profile(os.environ)
 
 
 class _Member(Node):
@@ -95,7 +95,7 @@ class _Member(Node):
         """Create a publisher. The first one is a node's own, made right after its participant."""
         if not self.joined_s:
             self.joined_s = time.monotonic()
-            make_room_for_announcements()
+            enlarge_receive_buffers()
         return super().create_publisher(*args, **options)
 
 
@@ -144,7 +144,7 @@ class Session:
         With their processes, which are stopped or busy. What is met lacks their nodes.
         """
         met = set(self.others())
-        return {name: pid for name, pid in claims().items() if (NAME, name) not in met}
+        return {name: pid for name, pid in local_systems().items() if (NAME, name) not in met}
 
     def spin_once(self, deadline: Deadline) -> None:
         """Wait for something to come in, for a moment and not beyond the deadline."""
@@ -191,7 +191,7 @@ class Session:
             return False
         if now_s >= self.node.joined_s + _MET_WITHIN_S:
             return True
-        return met >= participants_here(self._domain_id) and self._have_all_told()
+        return met >= count_participants(self._domain_id) and self._have_all_told()
 
     def _have_all_told(self) -> bool:
         """Say whether each participant's nodes are known: it tells of them last."""

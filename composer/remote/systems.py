@@ -15,7 +15,7 @@ from composer.remote.requests import call_once
 from composer.remote.session import Deadline, NoAnswer, Session
 from composer.runtime.metrics.diagnostics import from_message
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
-from composer.runtime.process.instance_lock import claims
+from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.ros.manager_protocol import (
     CALLBACKS_QOS,
     CALLBACKS_TOPIC,
@@ -106,12 +106,12 @@ class Systems:
 
     def find(self, name: str) -> str:
         """Return the full name of the running system that ``name`` means. Raises NotThere."""
-        here = _called(name, claims())
+        here = _called(name, local_systems())
         if not here:
             known = self._session.wait_until_still(self.look, self._deadline)
             here = _called(name, known)
         if not here:
-            error = not_there("running system", name, (*claims(), *known))
+            error = not_there("running system", name, (*local_systems(), *known))
             none = "no system is running: start one with 'compose run'"
             raise NotThere(str(error), error.hint if known else none)
         if len(here) > 1:
@@ -120,7 +120,7 @@ class Systems:
 
     def only(self) -> str:
         """Return the full name of the one system that runs. Raises NotThere."""
-        known = sorted(claims()) or self._session.wait_until_still(self.look, self._deadline)
+        known = sorted(local_systems()) or self._session.wait_until_still(self.look, self._deadline)
         if not known:
             raise NotThere("no system is running", "start one with 'compose run'")
         if len(known) > 1:
@@ -169,10 +169,10 @@ class Systems:
 
     def end(self, name: str) -> str:
         """End a system and its process; return what it said. Raises NoAnswer."""
-        was_here = name in claims()
+        was_here = name in local_systems()
         _, message = self.command(name, "shutdown")
         if was_here:
-            self._session.wait_for(lambda: name not in claims() or None, self._deadline)
+            self._session.wait_for(lambda: name not in local_systems() or None, self._deadline)
         return message
 
     def _hear(self, names: Collection[str], patience: Deadline) -> bool:
@@ -183,7 +183,7 @@ class Systems:
         )
 
     def _silent(self, name: str) -> NoAnswer:
-        pid = claims().get(name)
+        pid = local_systems().get(name)
         where = "its process may be busy or gone" if pid is None else f"its process is {pid}"
         return NoAnswer(
             f"{name}/{NAME} did not answer within {self._deadline.timeout_s:g} s",
@@ -227,7 +227,7 @@ class _Life(Deadline):
     def __init__(self, system: str, limit: Deadline) -> None:
         super().__init__(limit.left_s)
         self._system = system
-        self._is_here = system in claims()
+        self._is_here = system in local_systems()
         self._last_words: Deadline | None = None
 
     @property
@@ -240,7 +240,7 @@ class _Life(Deadline):
     @property
     def is_over(self) -> bool:
         """Whether the process has ended."""
-        return self._is_here and self._system not in claims()
+        return self._is_here and self._system not in local_systems()
 
 
 def _time_s(message: DiagnosticArray) -> float:

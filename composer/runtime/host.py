@@ -3,7 +3,7 @@
 How a command uses it::
 
     from composer.runtime.host import Host, HostOptions
-    from composer.runtime.process.errors import StartRefused
+    from composer.runtime.process import StartRefused
 
     host = Host(system, bring_up(system), tear_down(system), HostOptions(run_for_s=5.0), report)
     try:
@@ -36,11 +36,11 @@ from composer.plan import Fault, FaultKind, Plan
 from composer.runtime.callbacks.log import describe
 from composer.runtime.manager.node import Command, Manager, ManagerCallbacks, manager_namespace
 from composer.runtime.node.node import Listener, RunningNode, Shared
-from composer.runtime.process.dds_profiles import leave_discovery_alone
+from composer.runtime.process import StartRefused
+from composer.runtime.process.dds_profiles import use_large_system_profile
 from composer.runtime.process.environment import prepare_environment
-from composer.runtime.process.errors import StartRefused
-from composer.runtime.process.fast_exit import can_leave_at_once, leave_at_once
-from composer.runtime.process.instance_lock import claimed, refusal
+from composer.runtime.process.fast_exit import leave_ros_graph, supports_fast_exit
+from composer.runtime.process.instance_lock import already_running, hold_instance_lock
 from composer.runtime.process.signals import stop_signals
 from composer.runtime.supervision import events
 from composer.runtime.supervision.commands import Commands
@@ -152,12 +152,12 @@ class Host:
         """
         prepare_environment()
         if self._leaves_at_once:
-            leave_discovery_alone(os.environ)
+            use_large_system_profile(os.environ)
         namespace = manager_namespace(self._system.namespace, self._system.name.value)
         signals = stop_signals(
             self.stop, self._main_queue.bell, ends_process=self._options.ends_process
         )
-        with claimed(namespace), signals:
+        with hold_instance_lock(namespace), signals:
             self._limit_start()
             _start_ros()
             try:
@@ -285,7 +285,7 @@ class Host:
 
     def _yield_to(self, namespace: str, host: str, pid: str) -> None:
         if not self._main_queue.closing:
-            self._fail(str(refusal(namespace, host, pid)))
+            self._fail(str(already_running(namespace, host, pid)))
 
     # --- down
 
@@ -301,7 +301,7 @@ class Host:
         self._failed = self._failed or self._supervisor.has_failed_nodes
         self._status.set_activity("stopping")
         self._reporter.tell(events.Stopping(self._reporter.elapsed_s, self._reason))
-        if self._leaves_at_once and can_leave_at_once():
+        if self._leaves_at_once and supports_fast_exit():
             self._node_set.keep_entities()
         stop_within_s = self._options.stop_within_s
         self._end_s = time.monotonic() + stop_within_s
@@ -327,7 +327,7 @@ class Host:
         manager.retire(linger=bool(self._farewells))
         # A thread that hangs may come back and use what is gone.
         if self._remains and self._options.ends_process and not self._node_set.hung:
-            self._has_left = leave_at_once()
+            self._has_left = leave_ros_graph()
         if not self._has_left:
             manager.destroy()
 
@@ -375,7 +375,9 @@ class Host:
     def _take_fault(self, name: str, callback: str, text: str) -> None:
         self._status.set_error(name, f"{callback}: {text}")
         full_name = self._node_set.nodes[name].full_name
-        self._reporter.tell(events.Fault(self._reporter.elapsed_s, full_name, callback, text))
+        self._reporter.tell(
+            events.CallbackFailed(self._reporter.elapsed_s, full_name, callback, text)
+        )
 
     def _write_log(self, level: LogLevel, logger: str, message: str) -> None:
         self._reporter.tell(events.Logged(self._reporter.elapsed_s, logger, level, message))

@@ -37,7 +37,7 @@ def test_a_node_type_with_what_it_extends(tmp_path: Path) -> None:
     )
     done = compose("config", str(tmp_path / "quick.yaml"))
     assert (done.code, done.err) == (0, "")
-    assert done.out.startswith('node: quick\ndescription: Publishes true')
+    assert done.out.startswith("node: quick\ndescription: Publishes true")
     assert "default: 10.0" in done.out
     assert "extends" not in done.out
 

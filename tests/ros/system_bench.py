@@ -31,7 +31,7 @@ from composer.plan import bring_up, tear_down
 from composer.resolve import resolve
 from composer.runtime.host import Host, HostOptions
 from composer.runtime.node.node import RunningNode
-from composer.runtime.process.shared_memory import remove_half_made_ports
+from composer.runtime.process.shared_memory import remove_incomplete_ports
 from composer.runtime.supervision.events import (
     BroughtUp,
     Event,
@@ -190,7 +190,7 @@ class Peer:
     """A node as anybody would write it, in a participant of its own."""
 
     def __init__(self) -> None:
-        remove_half_made_ports()
+        remove_incomplete_ports()
         self.context = Context()
         self.context.init([])
         self.node = Node(f"peer_{os.getpid()}", context=self.context)

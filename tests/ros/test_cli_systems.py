@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from composer.runtime.process.instance_lock import claims
+from composer.runtime.process.instance_lock import local_systems
 from tests.ros.commands import COMPOSE, PATIENCE_S, asked_until, compose, errors, said
 from tests.ros.system_bench import wait_until
 
@@ -71,7 +71,7 @@ def on_a_terminal(*arguments: str) -> str:
 def nothing_stays_running() -> Iterator[None]:
     """End what a failed test left in the background: it would hinder all that come after."""
     yield
-    for pid in claims().values():
+    for pid in local_systems().values():
         with suppress(ProcessLookupError, ValueError):
             os.kill(int(pid), signal.SIGKILL)
 
@@ -264,7 +264,7 @@ def test_what_does_not_answer_is_said_to_be_so_in_time(robot: Robot) -> None:
 
 def test_a_system_that_was_killed_is_said_not_to_run(robot: Robot) -> None:
     robot.kill()
-    wait_until(lambda: not claims(), "its end")
+    wait_until(lambda: not local_systems(), "its end")
     began_s = time.monotonic()
     assert said("ps") == "nothing is running\n"
     assert said("lifecycle", "nodes") == ""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from std_msgs.msg import Empty
 
-from composer.runtime.process.dds_participants import participants_here
+from composer.runtime.process.dds_participants import count_participants
 from tests.ros.commands import PYTHON
 from tests.ros.system_bench import Peer, wait_until
 
@@ -45,9 +45,9 @@ import json, os, re
 from pathlib import Path
 from composer.runtime.process.environment import prepare_environment
 prepare_environment()
-from composer.remote.session import Deadline, Session, suit_commands
+from composer.remote.session import Deadline, Session, use_command_profile
 
-suit_commands()
+use_command_profile()
 with Session() as session:
     session.wait_for(lambda: session.others() or None, Deadline(10.0))
     sockets = {os.readlink(path) for path in Path("/proc/self/fd").iterdir() if path.is_socket()}
@@ -78,14 +78,14 @@ def test_a_process_that_joins_is_met_at_once_with_all_its_topics(peer: Peer) -> 
 
 def test_each_participant_on_this_computer_is_counted(peer: Peer) -> None:
     domain_id = int(os.environ["ROS_DOMAIN_ID"])
-    before = participants_here(domain_id)
+    before = count_participants(domain_id)
     assert before >= 1
     another = Peer()
     try:
-        assert participants_here(domain_id) == before + 1
+        assert count_participants(domain_id) == before + 1
     finally:
         another.close()
-    wait_until(lambda: participants_here(domain_id) == before, "it left")
+    wait_until(lambda: count_participants(domain_id) == before, "it left")
 
 
 def test_a_command_meets_others_without_shared_memory_and_stays_on_this_computer(

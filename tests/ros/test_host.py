@@ -12,12 +12,12 @@ from composer.model import PrimaryState
 from composer.runtime.host import HostOptions
 from composer.runtime.supervision.events import (
     BroughtUp,
-    Fault,
+    CallbackFailed,
     NodeFailed,
+    NodeTransitionFailed,
     RollingBack,
     Stopping,
     Stuck,
-    TransitionRefused,
 )
 from tests.ros.system_bench import Peer, RunningSystem, end_limit_s, running, system_of, wait_until
 
@@ -212,7 +212,7 @@ def test_a_refused_deactivation_is_told_and_ends_in_shutdown(tmp_path: Path) -> 
     """
     with running(CHAIN, tmp_path, planner=module) as system:
         outcome = system.stop()
-    refused = system.told(TransitionRefused)[0]
+    refused = system.told(NodeTransitionFailed)[0]
     assert (refused.state, refused.reason) == ("active", "TransitionFailed: not now")
     assert [node.state for node in outcome.nodes] == ["finalized"] * 3
 
@@ -267,4 +267,4 @@ def test_who_listens_badly_does_not_disturb(tmp_path: Path) -> None:
 
     system.host._reporter._listener = fail
     assert system.stop().exit_code == 0
-    assert not system.told(Fault)
+    assert not system.told(CallbackFailed)

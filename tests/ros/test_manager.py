@@ -12,7 +12,7 @@ from std_srvs.srv import Trigger
 
 from composer.model import PrimaryState
 from composer.runtime.host import Host, HostOptions
-from composer.runtime.process.errors import StartRefused
+from composer.runtime.process import StartRefused
 from composer.runtime.ros.manager_protocol import STATE_QOS
 from composer.runtime.supervision.events import RolledBack, RollingBack, StateChanged
 from tests.ros.system_bench import Peer, RunningSystem, running, system_of, wait_until

@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import Header, String
 
 from composer.model import ExecutorKind
-from composer.runtime.supervision.events import Fault
+from composer.runtime.supervision.events import CallbackFailed
 from tests.ros.simulator import NANOSECONDS, Simulator, listeners
 from tests.ros.system_bench import Peer, RunningSystem, running, wait_until
 
@@ -81,7 +81,7 @@ def test_timers_stand_start_pause_and_jump_with_the_clock(
         wait_for_ticks(system, 1000.1, 1100.1, 1100.2, 7.1)
         let_real_time_pass(system)
         assert len(ticks(system)) == 4
-        assert system.told(Fault) == []
+        assert system.told(CallbackFailed) == []
 
 
 @pytest.mark.parametrize("factor", [1.0, 10.0])
@@ -164,7 +164,7 @@ def test_a_node_that_is_deactivated_waits_no_more(tmp_path: Path, peer: Peer, ki
         assert peer.change("/a", "activate")
         let_real_time_pass(system)
         assert "awake" not in system.log_text()
-        assert system.told(Fault) == []
+        assert system.told(CallbackFailed) == []
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from composer.runtime.process import StartRefused
 from composer.runtime.process.environment import check_environment, complete_environment, log_folder
-from composer.runtime.process.errors import StartRefused
 
 SECURE = {
     "ROS_SECURITY_ENABLE": "true",

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.process.errors import StartRefused
-from composer.runtime.process.shared_memory import remove_half_made_ports
+from composer.runtime.process import StartRefused
+from composer.runtime.process.shared_memory import remove_incomplete_ports
 
 READY, INITIALIZING = b"\x02\0\0\0 the rest", b"\x01\0\0\0 the rest"
 LONG_AGO_S = time.time() - 3600.0
@@ -39,7 +39,7 @@ def test_only_half_made_ports_are_removed(
     tmp_path: Path, name: str, content: bytes, remains: bool
 ) -> None:
     path = segment(tmp_path, name, content)
-    remove_half_made_ports(tmp_path)
+    remove_incomplete_ports(tmp_path)
     assert path.exists() == remains
 
 
@@ -47,19 +47,19 @@ def test_who_is_making_one_just_now_may_finish(tmp_path: Path) -> None:
     path = segment(tmp_path, "fastrtps_port7411", b"", old=False)
     maker = threading.Timer(0.1, lambda: path.write_bytes(READY))
     maker.start()
-    remove_half_made_ports(tmp_path)
+    remove_incomplete_ports(tmp_path)
     maker.join()
     assert path.read_bytes() == READY
 
 
 def test_one_that_was_just_left_is_removed_too(tmp_path: Path) -> None:
     path = segment(tmp_path, "fastrtps_port7411", b"", old=False)
-    remove_half_made_ports(tmp_path)
+    remove_incomplete_ports(tmp_path)
     assert not path.exists()
 
 
 def test_where_there_is_no_shared_memory_there_is_nothing_to_remove(tmp_path: Path) -> None:
-    remove_half_made_ports(tmp_path / "nowhere")
+    remove_incomplete_ports(tmp_path / "nowhere")
 
 
 @pytest.mark.skipif(os.getuid() == 0, reason="root may remove everything")
@@ -68,7 +68,7 @@ def test_what_may_not_be_removed_is_named(tmp_path: Path) -> None:
     tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
     try:
         with pytest.raises(StartRefused, match="fastrtps_port7411") as refusal:
-            remove_half_made_ports(tmp_path)
+            remove_incomplete_ports(tmp_path)
     finally:
         tmp_path.chmod(stat.S_IRWXU)
     assert f"remove {path}" in refusal.value.hint

@@ -225,7 +225,7 @@ def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
     from composer.cli.support.progress import Progress, summary
     from composer.plan import tear_down
     from composer.runtime.host import Host
-    from composer.runtime.process.errors import StartRefused
+    from composer.runtime.process import StartRefused
 
     progress = Progress(sys.stderr)
     host = Host(system, plan, tear_down(system), options, progress.show)

@@ -9,11 +9,12 @@ from composer.cli.support.callback_table import callback_table
 from composer.cli.support.terminal import columns, use_color
 from composer.runtime.supervision.events import (
     BroughtUp,
+    CallbackFailed,
     Event,
-    Fault,
     Logged,
     NodeFailed,
     NodeSummary,
+    NodeTransitionFailed,
     Outcome,
     Restarted,
     RolledBack,
@@ -21,7 +22,6 @@ from composer.runtime.supervision.events import (
     StateChanged,
     Stopping,
     Stuck,
-    TransitionRefused,
 )
 
 _GREEN, _YELLOW, _RED, _DIM = "32", "33", "31", "2"
@@ -29,7 +29,7 @@ _CALLBACKS = 10  # of the busiest callbacks, in the summary
 
 
 class Progress:
-    """Prints one line an event. Faults are in the nodes' logs already."""
+    """Prints one line an event. Exceptions of callbacks are in the nodes' logs already."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -37,7 +37,7 @@ class Progress:
 
     def show(self, event: Event) -> None:
         """Print the event."""
-        if isinstance(event, Fault):
+        if isinstance(event, CallbackFailed):
             return
         if isinstance(event, BroughtUp):
             tell_ready(str(event))
@@ -52,7 +52,7 @@ class Progress:
 
 def _severity(event: Event) -> str:
     match event:
-        case TransitionRefused() | RollingBack() | Stuck() | NodeFailed():
+        case NodeTransitionFailed() | RollingBack() | Stuck() | NodeFailed():
             return "ERROR"
         case _:
             return "INFO"
@@ -60,7 +60,7 @@ def _severity(event: Event) -> str:
 
 def _code(event: Event) -> str:
     match event:
-        case TransitionRefused() | RollingBack() | Stuck() | NodeFailed():
+        case NodeTransitionFailed() | RollingBack() | Stuck() | NodeFailed():
             return _RED
         case BroughtUp() | Restarted():
             return _GREEN

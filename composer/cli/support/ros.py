@@ -42,8 +42,8 @@ def require_ros(command: str) -> None:
             hint='pip install "ros2-composer[ros]"   or: source /opt/ros/jazzy/setup.bash',
         )
     keep_stdout_for_data()
+    from composer.runtime.process import StartRefused
     from composer.runtime.process.environment import prepare_environment
-    from composer.runtime.process.errors import StartRefused
 
     try:
         prepare_environment()
@@ -77,10 +77,10 @@ def ros_session(
     ``carries_messages`` says that messages of topics come or go, which may be large.
     """
     require_ros(command)
-    from composer.remote.session import Deadline, RosError, Session, suit_commands
+    from composer.remote.session import Deadline, RosError, Session, use_command_profile
 
     if not carries_messages:
-        suit_commands()
+        use_command_profile()
     deadline = Deadline(timeout_s)
     try:
         with Session() as session:

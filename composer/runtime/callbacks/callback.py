@@ -47,7 +47,7 @@ class Callback(CallbackTimer):
         try:
             result = self._handle() if message is NOTHING else self._handle(message)
         except BaseException as error:
-            self._core.faults.take(self._name, error)
+            self._core.error_log.exception(self._name, error)
             result = None
         rest = None if result is None else self._core.rest_of(self._name, result)
         if not began_s:

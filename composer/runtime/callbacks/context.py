@@ -11,7 +11,7 @@ from rclpy.node import Node
 
 from composer.behavior import CallCancelled
 from composer.runtime.callbacks.chains import NodeChains
-from composer.runtime.callbacks.log import Faults, Log
+from composer.runtime.callbacks.log import ErrorLog, Log
 from composer.runtime.callbacks.mutation_check import MutationCheck
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.event_counts import AnnouncedEvents
@@ -45,7 +45,7 @@ class NodeContext:
     gate: Gate
     strand: Strand
     log: Log
-    faults: Faults
+    error_log: ErrorLog
     statistics: Statistics
     names: dict[str, Any]
     delivery: Delivery
@@ -84,7 +84,7 @@ class NodeContext:
         try:
             result = function(*arguments)
         except BaseException as error:
-            self.faults.take(name, error)
+            self.error_log.exception(name, error)
             return None
         return None if result is None else self.rest_of(name, result)
 
@@ -110,4 +110,4 @@ class NodeContext:
         if isinstance(error, CallCancelled) and not self.gate.incoming:
             self.log.debug(f"{name}: {error}")
         else:
-            self.faults.take(name, error)
+            self.error_log.exception(name, error)

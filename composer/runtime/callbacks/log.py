@@ -98,7 +98,7 @@ class Log:
         self.write(LogLevel.FATAL, message)
 
 
-class Faults:
+class ErrorLog:
     """Takes the exceptions of user code: counts them, logs them, and lets the node go on.
 
     The first fault of a callback comes with its traceback; after that a callback that fails all
@@ -115,11 +115,11 @@ class Faults:
         self._silent_until_s: dict[str, float] = {}
         self._unsaid: dict[str, int] = {}
 
-    def take(self, callback: str, error: BaseException) -> None:
+    def exception(self, callback: str, error: BaseException) -> None:
         """Log that ``callback`` raised ``error``."""
-        self.note(callback, describe(error), traceback_of(error))
+        self.error(callback, describe(error), traceback_of(error))
 
-    def note(self, callback: str, text: str, details: str = "") -> None:
+    def error(self, callback: str, text: str, details: str = "") -> None:
         """Log that ``callback`` did something wrong; ``details`` only the first time."""
         self._statistics.errors += 1
         now_s = time.monotonic()

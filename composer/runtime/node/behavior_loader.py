@@ -26,21 +26,21 @@ Method = Callable[..., Any]
 _IMPORTING = threading.RLock()
 
 
-class BehaviorError(Exception):
+class BehaviorLoadError(Exception):
     """A behaviour that cannot be loaded; the text says which and why."""
 
 
 def behavior_class(reference: BehaviorReference) -> type[Any]:
     """Return the class that ``module:Class`` names.
 
-    A module beside the YAML file is looked for first, then one among the project's node types,
-    then an installed one. Raises BehaviorError when there is no such module or class, and whatever
-    importing the module raises.
+    Looks for the module next to the YAML file, then among the project's node types, then among
+    installed modules. Raises BehaviorLoadError if there is no such module or class, and anything
+    that importing the module raises.
     """
     module = _module(reference)
     found = getattr(module, reference.class_name, None)
     if not isinstance(found, type):
-        raise BehaviorError(
+        raise BehaviorLoadError(
             f"behavior '{reference.text}': {module.__file__} has no class '{reference.class_name}'"
         )
     return found
@@ -61,7 +61,7 @@ def _module(reference: BehaviorReference) -> ModuleType:
     try:
         return importlib.import_module(reference.module)
     except ModuleNotFoundError as error:
-        raise BehaviorError(
+        raise BehaviorLoadError(
             f"behavior '{reference.text}': there is no '{parts[-1]}.py' in {reference.folder} "
             "or among the project's node types, and no such installed module"
         ) from error
@@ -79,7 +79,7 @@ def _module_of_file(path: Path) -> ModuleType:
 def _imported(name: str, path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise BehaviorError(f"{path} is not a Python file")
+        raise BehaviorLoadError(f"{path} is not a Python file")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # dataclasses and pickles look their module up there
     try:

@@ -19,7 +19,7 @@ from composer.behavior import TransitionFailed
 from composer.model import BehaviorReference, Event, LogLevel, Node
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.log import Faults, Log, Write, describe
+from composer.runtime.callbacks.log import ErrorLog, Log, Write, describe
 from composer.runtime.callbacks.mutation_check import MutationCheck, SeenMessages
 from composer.runtime.clock.clock import Clock
 from composer.runtime.clock.sim_time import SimulatedTime
@@ -123,7 +123,7 @@ class RunningNode:
         self._ros = make_ros_node(model)
         offers = model.introspection
         log = Log(self._ros, options.log_level, listener.write_log, rosout=offers.rosout)
-        faults = Faults(log, self.statistics, listener.on_fault)
+        error_log = ErrorLog(log, self.statistics, listener.on_fault)
         self._core = NodeContext(
             node=self._ros,
             loop=loop,
@@ -131,13 +131,13 @@ class RunningNode:
             gate=Gate(model.full_name, Pending(loop.call_later)),
             strand=SerialStrand(loop.call_soon) if options.parallel else InlineStrand(),
             log=log,
-            faults=faults,
+            error_log=error_log,
             statistics=self.statistics,
             names={"parameters": {}, "state": {}, "node": model.full_name},
             delivery=options.delivery,
             chains=options.chains.of(model),
             events=options.shared.events,
-            mutations=_mutation_check(options.seen_messages, faults),
+            mutations=_mutation_check(options.seen_messages, error_log),
         )
         # What is always on has a gate of its own and shares the rest.
         standby_gate = Gate(model.full_name, Pending(loop.call_later))
@@ -389,5 +389,5 @@ def _rest(gate: Gate, state: str, is_open: bool, ports: Iterable[RunningPort]) -
     gate.close()
 
 
-def _mutation_check(seen: SeenMessages | None, faults: Faults) -> MutationCheck | None:
-    return None if seen is None else MutationCheck(seen, faults.note)
+def _mutation_check(seen: SeenMessages | None, error_log: ErrorLog) -> MutationCheck | None:
+    return None if seen is None else MutationCheck(seen, error_log.error)

@@ -206,7 +206,7 @@ class ActionClientPort:
             self._core.log.debug(f"action client '{self._name}': {error}")
         except CallError as error:
             if Event.FAILURE not in self._reactions:
-                self._core.faults.note(f"action client '{self._name}'", str(error))
+                self._core.error_log.error(f"action client '{self._name}'", str(error))
 
     def _on_feedback(self, goal: Any, on_feedback: OnFeedback | None, feedback: Any) -> None:
         if self._core.gate.incoming:
@@ -233,7 +233,7 @@ class ActionClientPort:
         try:
             reaction.run(**values)
         except Exception as error:
-            self._core.faults.take(f"action client '{self._name}' on_{event}", error)
+            self._core.error_log.exception(f"action client '{self._name}' on_{event}", error)
 
 
 def _copy(done: Future[Ended], view: Future[Ended]) -> None:

@@ -171,7 +171,7 @@ class ActionServerPort:
             self._end(goal, None, canceled=True)
         except BaseException as error:
             name = f"on_{self._name}" if self._handlers.execute else self._callback
-            self._core.faults.take(name, error)
+            self._core.error_log.exception(name, error)
             self._end(goal, None, canceled=False)
         else:
             self._finish(goal, result)
@@ -216,7 +216,9 @@ class ActionServerPort:
         """
         if result is not None and not isinstance(result, self._type.Result):
             wanted = f"{self._type.__name__}.Result"
-            self._core.faults.note(f"on_{self._name}", f"returned {result!r:.80}, not a {wanted}")
+            self._core.error_log.error(
+                f"on_{self._name}", f"returned {result!r:.80}, not a {wanted}"
+            )
             self._end(goal, None, canceled=False)
             return
         if goal.is_open:

@@ -128,7 +128,7 @@ class ClientPort:
         if isinstance(error, CallCancelled):
             self._core.log.debug(f"client '{self._name}': {error}")
         elif Event.FAILURE not in self._reactions:
-            self._core.faults.note(f"client '{self._name}'", str(error))
+            self._core.error_log.error(f"client '{self._name}'", str(error))
 
     def _react(self, event: Event, **values: Any) -> None:
         reaction = self._reactions.get(event)
@@ -141,4 +141,4 @@ class ClientPort:
         try:
             reaction.run(**values)
         except Exception as error:
-            self._core.faults.take(f"client '{self._name}' on_{event}", error)
+            self._core.error_log.exception(f"client '{self._name}' on_{event}", error)

@@ -166,11 +166,11 @@ class ServicePort:
             return
         wanted = f"{self._type.__name__}.Response"
         text = f"returned {result!r:.80}, not a {wanted}"
-        self._core.faults.note(self._callback, text)
+        self._core.error_log.error(self._callback, text)
         request.answer(self._failure(f"{self._callback} {text}"))
 
     def _failed(self, request: Request, callback: str, error: BaseException) -> None:
-        self._core.faults.take(callback, error)
+        self._core.error_log.exception(callback, error)
         request.answer(self._failure(f"{callback}: {describe(error)}"))
 
 

@@ -128,7 +128,7 @@ class SubscriptionPort:
             try:
                 self._reaction.run(message=message)
             except Exception as error:
-                self._core.faults.take(f"subscription '{self._name}'", error)
+                self._core.error_log.exception(f"subscription '{self._name}'", error)
         if self._handler is None:
             return None
         return self._core.call(self._callback, self._handler, message)

@@ -113,5 +113,5 @@ class TimerPort(Callback):
             try:
                 self._reaction.run()
             except Exception as error:
-                self._core.faults.take(str(self._traced), error)
+                self._core.error_log.exception(str(self._traced), error)
         return None if self._handler is None else self._core.call(self._name, self._handler)

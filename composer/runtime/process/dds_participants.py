@@ -22,7 +22,7 @@ _PORTS_OF_A_PARTICIPANT = 2
 _ROOM_BYTES = 4_194_304
 
 
-def participants_here(domain_id: int, table: Path = _TABLE) -> int:
+def count_participants(domain_id: int, table: Path = _TABLE) -> int:
     """Return how many participants of a domain hold a port here, this process included.
 
     0 where nobody tells, as on other systems than Linux.
@@ -37,7 +37,7 @@ def participants_here(domain_id: int, table: Path = _TABLE) -> int:
     return len(ports.intersection(range(first, last, _PORTS_OF_A_PARTICIPANT)))
 
 
-def make_room_for_announcements() -> None:
+def enlarge_receive_buffers() -> None:
     """Let the UDP sockets of this process hold all that others announce to it at once.
 
     By default they hold some 80 packets. A system of three nodes announces its endpoints with more,

@@ -43,7 +43,7 @@ _OTHER_RANGE_VARIABLES = ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
 _FILE_OF_USER = "DEFAULT_FASTRTPS_PROFILES.xml"
 
 
-def complete_discovery(environment: MutableMapping[str, str], folder: Path = Path()) -> None:
+def use_discovery_profile(environment: MutableMapping[str, str], folder: Path = Path()) -> None:
     """Choose our profile, unless the user has chosen how Fast DDS discovers.
 
     ``folder`` is where the process runs.
@@ -54,7 +54,7 @@ def complete_discovery(environment: MutableMapping[str, str], folder: Path = Pat
     environment[_VARIABLE] = str(_PROFILE)
 
 
-def suit_commands(environment: MutableMapping[str, str]) -> None:
+def use_command_profile(environment: MutableMapping[str, str]) -> None:
     """Have Fast DDS use UDP alone, and others forget us soon, unless the user has chosen otherwise.
 
     With the range LOCALHOST rmw_fastrtps adds shared memory whatever a profile says. There our
@@ -71,7 +71,7 @@ def suit_commands(environment: MutableMapping[str, str]) -> None:
         environment[_RANGE_VARIABLE] = "SYSTEM_DEFAULT"
 
 
-def leave_discovery_alone(environment: MutableMapping[str, str]) -> None:
+def use_large_system_profile(environment: MutableMapping[str, str]) -> None:
     """Take back what concerns discovery, for a process that leaves in one go (see ``departure``).
 
     With the profile a participant also says goodbye in a thread of its own, which then ends before

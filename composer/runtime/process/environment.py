@@ -12,9 +12,9 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
 
 from composer.diagnostics import nearest
-from composer.runtime.process.dds_profiles import complete_discovery
-from composer.runtime.process.errors import StartRefused
-from composer.runtime.process.shared_memory import remove_half_made_ports
+from composer.runtime.process import StartRefused
+from composer.runtime.process.dds_profiles import use_discovery_profile
+from composer.runtime.process.shared_memory import remove_incomplete_ports
 
 #: See rcl's domain_id.c; above 101 the ports of a participant may meet the ephemeral ones of Linux.
 HIGHEST_DOMAIN_ID = 232
@@ -68,9 +68,9 @@ def prepare_environment() -> None:
     the process.
     """
     complete_environment(os.environ)
-    complete_discovery(os.environ)
+    use_discovery_profile(os.environ)
     check_environment(os.environ)
-    remove_half_made_ports()
+    remove_incomplete_ports()
 
 
 def _check_domain_id(environment: Mapping[str, str]) -> None:

@@ -17,12 +17,12 @@ _STOP_ALL = "_ZN8eprosima8fastrtps4rtps10RTPSDomain7stopAllEv"
 _LIBRARY = "libfastrtps.so"
 
 
-def can_leave_at_once() -> bool:
+def supports_fast_exit() -> bool:
     """Say whether the middleware in use has a way to leave in one go."""
     return _stop_all() is not None
 
 
-def leave_at_once() -> bool:
+def leave_ros_graph() -> bool:
     """Take every participant of this process out of the ROS graph; false where that cannot be.
 
     Afterwards nothing of ROS may be touched, not even destroyed: ``os._exit`` has to follow. No

@@ -16,13 +16,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
-from composer.runtime.process.errors import StartRefused
+from composer.runtime.process import StartRefused
 
 _DEFAULT_DOMAIN = "0"
 _SUFFIX = ".lock"
 
 
-def refusal(name: str, host: str, pid: str | int) -> StartRefused:
+def already_running(name: str, host: str, pid: str | int) -> StartRefused:
     """Return why the system cannot be run. ``name`` is its manager's namespace."""
     system = name if name.count("/") > 1 else name.removeprefix("/")
     return StartRefused(
@@ -33,7 +33,7 @@ def refusal(name: str, host: str, pid: str | int) -> StartRefused:
 
 
 @contextmanager
-def claimed(name: str) -> Iterator[None]:
+def hold_instance_lock(name: str) -> Iterator[None]:
     """Hold the right to run the system for the length of a ``with`` block.
 
     ``name`` is the namespace of its manager. The operating system gives the right back however the
@@ -48,7 +48,7 @@ def claimed(name: str) -> Iterator[None]:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             host, pid = _holder(lock)
-            raise refusal(name, host, pid) from error
+            raise already_running(name, host, pid) from error
         lock.seek(0)
         lock.truncate()
         json.dump({"host": socket.gethostname(), "pid": os.getpid()}, lock)
@@ -56,7 +56,7 @@ def claimed(name: str) -> Iterator[None]:
         yield
 
 
-def claims() -> dict[str, str]:
+def local_systems() -> dict[str, str]:
     """Return the systems that composers of this user run on this host and in this domain.
 
     By name, with the process. Their nodes may take seconds to be discovered; this is known at once.

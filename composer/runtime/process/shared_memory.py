@@ -12,7 +12,7 @@ import re
 import time
 from pathlib import Path
 
-from composer.runtime.process.errors import StartRefused
+from composer.runtime.process import StartRefused
 
 #: Where Linux keeps it; shm_open(3).
 SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - nothing is put there
@@ -25,7 +25,7 @@ _PATIENCE_S = 1.0
 _STEP_S = 0.02
 
 
-def remove_half_made_ports(folder: Path = SHARED_MEMORY) -> None:
+def remove_incomplete_ports(folder: Path = SHARED_MEMORY) -> None:
     """Remove the segments that would hang a new participant.
 
     Waits for those that somebody may be filling just now, a second at most. Raises StartRefused

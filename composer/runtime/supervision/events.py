@@ -27,7 +27,7 @@ class StateChanged:
 
 
 @dataclass(frozen=True, slots=True)
-class TransitionRefused:
+class NodeTransitionFailed:
     """A transition of the plan did not get where it was to."""
 
     elapsed_s: float
@@ -112,7 +112,7 @@ class BroughtUp:
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class CallbackFailed:
     """User code raised or returned what it must not; the full story is in the log."""
 
     elapsed_s: float
@@ -163,8 +163,8 @@ class Logged:
 
 
 Event: TypeAlias = (
-    "Logged | StateChanged | TransitionRefused | RollingBack | RolledBack | BroughtUp | NodeFailed"
-    " | Restarted | Commanded | Fault | Stopping | Stuck"
+    "Logged | StateChanged | NodeTransitionFailed | RollingBack | RolledBack | BroughtUp"
+    " | NodeFailed | Restarted | Commanded | CallbackFailed | Stopping | Stuck"
 )
 Report: TypeAlias = Callable[[Event], None]
 

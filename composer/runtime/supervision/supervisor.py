@@ -28,11 +28,11 @@ from composer.plan import (
 )
 from composer.runtime.supervision.events import (
     NodeFailed,
+    NodeTransitionFailed,
     Restarted,
     RolledBack,
     RollingBack,
     Stuck,
-    TransitionRefused,
 )
 from composer.runtime.supervision.health_monitor import Hanging, LoopRecovered
 from composer.runtime.supervision.main_queue import MainQueue
@@ -295,7 +295,7 @@ class Supervisor:
             self._reporter.tell(event)
         else:
             self._reporter.tell(
-                TransitionRefused(
+                NodeTransitionFailed(
                     at_s, step.full_name, step.transition, failure.state, failure.reason
                 )
             )
