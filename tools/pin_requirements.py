@@ -2,8 +2,8 @@
 
     python tools/pin_requirements.py
 
-One file serves every Python and platform that the project supports. Versions that are pinned already
-are kept where they still fit; --upgrade takes the newest. Needs uv and the package index.
+One file serves every Python and platform that the project supports. Pinned versions are kept if
+they still fit; --upgrade takes the newest. Needs uv and the package index.
 """
 
 import subprocess
