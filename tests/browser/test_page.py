@@ -13,7 +13,7 @@ from composer.graph.output import Engine, Format, render
 from composer.loading import load
 from composer.resources import systems_folder
 from tests.browser.conftest import Opened
-from tests.unit.fleets import fleet
+from tests.unit.support.fleets import fleet
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.compose import compose
-from tests.unit.fleets import fleet_text
+from tests.unit.support.fleets import fleet_text
 
 
 def test_the_default_is_mermaid_of_the_nodes_on_stdout() -> None:

@@ -20,8 +20,8 @@ from composer.graph import View, build_graph, mermaid, scene_of
 from composer.graph.picture import Graph
 from composer.loading import load
 from composer.resources import systems_folder
-from tests.unit.fleets import fleet_graph
-from tests.unit.test_graph_renderers import EVIL, evil_graph
+from tests.unit.graph.test_renderers import EVIL, evil_graph
+from tests.unit.support.fleets import fleet_graph
 
 HERE = Path(__file__).parent
 SYSTEMS = sorted(systems_folder().glob("*.yaml"))

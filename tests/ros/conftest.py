@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.ros.commands import hand_written
-from tests.ros.system_bench import Peer
+from tests.ros.support.commands import hand_written
+from tests.ros.support.in_process import Peer
 
 
 @pytest.fixture

@@ -19,7 +19,14 @@ from composer.runtime.supervision.events import (
     Stopping,
     Stuck,
 )
-from tests.ros.system_bench import Peer, RunningSystem, end_limit_s, running, system_of, wait_until
+from tests.ros.support.in_process import (
+    Peer,
+    RunningSystem,
+    end_limit_s,
+    running,
+    system_of,
+    wait_until,
+)
 
 CHAIN = """
 system: chain

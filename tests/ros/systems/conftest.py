@@ -8,7 +8,7 @@ import pytest
 import rclpy
 from rclpy.context import Context
 
-from tests.ros.systems.running import Outsider
+from tests.ros.support.system_process import Outsider
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from nav_msgs.msg import Odometry
 from rclpy.qos import QoSPresetProfiles
 
-from tests.ros.systems.running import Outsider, RunningSystem
+from tests.ros.support.system_process import Outsider, RunningSystem
 
 SENSOR_DATA = QoSPresetProfiles.SENSOR_DATA.value
 

@@ -16,7 +16,7 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.action import ActionClient
 from rclpy.qos import QoSPresetProfiles
 
-from tests.ros.systems.running import Outsider, RunningSystem
+from tests.ros.support.system_process import Outsider, RunningSystem
 
 NODES = ("/perception/sensor_simulator", "/planning/planner", "/control/motor_controller")
 MAX_VELOCITY = 1.0  # the motor controller's default, in m/s

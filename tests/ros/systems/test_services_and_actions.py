@@ -11,7 +11,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
-from tests.ros.systems.running import Outsider, RunningSystem
+from tests.ros.support.system_process import Outsider, RunningSystem
 
 SUCCEEDED = 4
 STATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

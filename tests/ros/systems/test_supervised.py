@@ -6,7 +6,7 @@ import re
 
 from std_srvs.srv import Trigger
 
-from tests.ros.systems.running import Outsider, RunningSystem
+from tests.ros.support.system_process import Outsider, RunningSystem
 
 #: The planner uses every tenth scan and comes up after the sensor, so it may miss the first scans.
 IN_ORDER = (

@@ -8,7 +8,7 @@ from pathlib import Path
 from rclpy.qos import DurabilityPolicy, QoSPresetProfiles, QoSProfile
 from std_msgs.msg import String
 
-from tests.ros.systems.running import REPOSITORY, Outsider, RunningSystem
+from tests.ros.support.system_process import REPOSITORY, Outsider, RunningSystem
 
 
 def test_a_minimal_node_says_that_it_has_started(outsider: Outsider) -> None:

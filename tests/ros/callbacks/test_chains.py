@@ -1,0 +1,61 @@
+"""How long data takes on declared chains."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.runtime.metrics.statistics import ChainStatistics
+from tests.ros.support.in_process import RunningSystem, running, wait_until
+
+BRAKE = """
+system: brake
+nodes:
+  lidar:
+    publishers: {{scan: {{type: std_msgs/msg/Int64, qos: command}}}}
+    timers: {{step: {{period_ms: 20, publish: {{scan: {{data: "{{count}}"}}}}}}}}
+  detector:
+    behavior: detector:Detector
+    subscriptions: {{scan: {{type: std_msgs/msg/Int64, qos: command}}}}
+    publishers: {{obstacle: {{type: std_msgs/msg/Int64, qos: command}}}}
+  motor:
+    state: {{distance: 0}}
+    subscriptions:
+      obstacle: {{type: std_msgs/msg/Int64, qos: command, set: {{distance: "{{message.data}}"}}}}
+    publishers: {{force: {{type: std_msgs/msg/Int64, external: true}}}}
+    timers: {{step: {{period_ms: 5, publish: {{force: {{data: "{{state.distance}}"}}}}}}}}
+connections:
+  - {{topic: /scan, from: lidar.scan, to: detector.scan{more}}}
+  - {{topic: /obstacle, from: detector.obstacle, to: motor.obstacle{more}}}
+chains:
+  stop: {{through: [lidar.scan, detector.obstacle, motor.force], latency_ms: 1}}
+  see: {{through: [lidar.scan, detector.obstacle], latency_ms: 10000}}
+"""
+DETECTOR = """
+class Detector:
+    async def on_scan(self, message):
+        await self.clock.sleep(0.003)
+        self.publishers.obstacle.publish(message)
+"""
+
+
+def chain(system: RunningSystem, name: str) -> ChainStatistics:
+    return next(item for item in system.host._node_set._chains.statistics if item.name == name)
+
+
+@pytest.mark.parametrize("more", ["", ", delivery: dds", ", isolation: copy"])
+def test_data_is_followed_from_the_first_publisher_to_the_last(more: str, tmp_path: Path) -> None:
+    with running(BRAKE.format(more=more), tmp_path, detector=DETECTOR) as system:
+        stop, see = chain(system, "stop"), chain(system, "see")
+        wait_until(lambda: stop.times.count > 10)
+        counted = stop.times.count  # first: both grow
+        # What is sent again without anything new having been heard does not count.
+        assert counted <= system.node("lidar").sent("scan")
+    assert stop.late == stop.times.count
+    assert see.late == 0
+    assert see.times.mean_s > 0.003
+    # Not the mean: what comes late to the motor it may hear together with what comes next.
+    assert stop.times.percentile_s(0.5) > see.times.percentile_s(0.5)
+    told = {item.chain: item for item in system.stop().chains}
+    assert told["stop"].count == stop.times.count

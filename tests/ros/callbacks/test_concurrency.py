@@ -1,0 +1,212 @@
+"""When the callbacks of a node run: one at a time, unless they are reentrant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from std_msgs.msg import Int64
+
+from tests.ros.support.in_process import Peer, running, wait_until
+
+SLOW = """
+system: slow
+nodes:
+  slow:
+    behavior: slow:Slow
+    subscriptions:
+      input: {type: std_msgs/msg/Int64, external: true, qos: {depth: 2}, reentrant: REENTRANT}
+      release: {type: std_msgs/msg/Int64, external: true}
+"""
+SLOW_MODULE = """
+from composer.behavior import Behavior
+
+class Slow(Behavior):
+    def on_configure(self):
+        self.free = False
+
+    async def on_input(self, message):
+        self.log.info(f"begin {message.data}")
+        while not self.free:
+            await self.clock.sleep(0.001)
+        self.log.info(f"end {message.data}")
+
+    def on_release(self, message):
+        self.free = True
+"""
+
+
+def test_messages_wait_for_a_handler_that_awaits_and_the_oldest_makes_room(
+    tmp_path: Path, peer: Peer
+) -> None:
+    with running(SLOW.replace("REENTRANT", "false"), tmp_path, slow=SLOW_MODULE) as system:
+        source, release = peer.publisher(Int64, "/input"), peer.publisher(Int64, "/release")
+        source.publish(Int64(data=0))
+        system.wait_for_log("begin 0")
+        node = system.node("slow")
+        waiting = node._assembly.subscriptions["input"]._mailbox._messages
+        for number in range(1, 5):
+            source.publish(Int64(data=number))
+            wait_until(lambda n=number: len(waiting) + node.statistics.dropped == n)
+        release.publish(Int64())
+        system.wait_for_log("end 4")
+        counted = system.summary("/slow")
+    assert system.log() == [f"{word} {number}" for number in (0, 3, 4) for word in ("begin", "end")]
+    assert counted.dropped == 2
+
+
+def test_runs_of_a_reentrant_port_overlap(tmp_path: Path, peer: Peer) -> None:
+    with running(SLOW.replace("REENTRANT", "true"), tmp_path, slow=SLOW_MODULE) as system:
+        source, release = peer.publisher(Int64, "/input"), peer.publisher(Int64, "/release")
+        for number in range(4):
+            source.publish(Int64(data=number))
+            system.wait_for_log(f"begin {number}")
+        assert "end" not in system.log_text()
+        release.publish(Int64())
+        for number in range(4):
+            system.wait_for_log(f"end {number}")
+
+
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
+def test_what_comes_while_a_node_rests_does_not_wait_for_it(tmp_path: Path, kind: str) -> None:
+    """A handler of before still awaits something, so that nobody takes what comes out of the queue.
+
+    Nothing of it may be left for when the node is active again.
+    """
+    text = f"""
+    system: resting
+    executors: {{chosen: {{kind: {kind}}}}}
+    nodes:
+      source:
+        executor: chosen
+        behavior: resting:Source
+        publishers:
+          output: {{type: std_msgs/msg/Int64, topic: /numbers}}
+      sink:
+        executor: chosen
+        behavior: resting:Sink
+        subscriptions:
+          input: {{type: std_msgs/msg/Int64, topic: /numbers}}
+    """
+    module = """
+    from composer.behavior import Behavior
+    from rclpy.task import Future
+
+    class Source(Behavior):
+        pass
+
+    class Sink(Behavior):
+        def on_configure(self):
+            self.release = Future()
+
+        async def on_input(self, message):
+            self.log.info(f"begin {message.data}")
+            await self.release
+            self.log.info(f"end {message.data}")
+    """
+    with running(text, tmp_path, resting=module) as system:
+        source, sink = (system.node(name) for name in ("source", "sink"))
+        output = source._assembly.senders["output"]
+        output.publish(Int64(data=0))
+        system.wait_for_log("begin 0")
+        system.change("sink", "deactivate")
+        output.publish(Int64(data=1))
+        output.publish(Int64(data=2))
+        system.change("sink", "activate")
+        output.publish(Int64(data=3))
+        assert "begin 3" not in system.log_text()  # one at a time, also from before
+        sink._behavior.release.set_result(None)
+        system.wait_for_log("end 3")
+        counted = system.summary("/sink")
+    words = [f"{word} {number}" for number in (0, 3) for word in ("begin", "end")]
+    assert [line for line in system.log() if line in words or line.startswith("begin")] == words
+    assert (counted.received, counted.dropped) == (2, 2)
+
+
+def test_reentrant_callbacks_run_at_once_on_several_threads(tmp_path: Path) -> None:
+    text = """
+    system: overlapping
+    executors: {several: {kind: multi_threaded, threads: 3}}
+    nodes:
+      source:
+        behavior: overlapping:Source
+        publishers:
+          output: {type: std_msgs/msg/Int64, topic: /numbers}
+      sink:
+        executor: several
+        behavior: overlapping:Sink
+        subscriptions:
+          input: {type: std_msgs/msg/Int64, topic: /numbers, reentrant: true}
+    """
+    module = """
+    import threading
+    from composer.behavior import Behavior
+
+    class Source(Behavior):
+        pass
+
+    class Sink(Behavior):
+        def on_configure(self):
+            self.both = threading.Barrier(2, timeout=20.0)
+
+        def on_input(self, message):
+            self.both.wait()
+            self.log.info(f"met {message.data}")
+    """
+    with running(text, tmp_path, overlapping=module) as system:
+        output = system.node("source")._assembly.senders["output"]
+        output.publish(Int64(data=0))
+        output.publish(Int64(data=1))
+        for number in range(2):
+            system.wait_for_log(f"met {number}")
+
+
+def test_the_callbacks_of_a_node_take_turns_on_several_threads(tmp_path: Path, peer: Peer) -> None:
+    text = """
+    system: turns
+    executors: {several: {kind: multi_threaded, threads: 4}}
+    nodes:
+      turns:
+        executor: several
+        behavior: turns:SerialStrand
+        subscriptions:
+          input: {type: std_msgs/msg/Int64, external: true}
+        timers:
+          tick: {period_ms: 2}
+          async_tick: {period_ms: 2}
+    """
+    module = """
+    import threading
+    from time import sleep
+    from composer.behavior import Behavior
+
+    class SerialStrand(Behavior):
+        def on_configure(self):
+            self.inside = 0
+            self.most = 0
+            self.calls = 0
+            self.threads = set()
+
+        def work(self):
+            self.inside += 1
+            self.most = max(self.most, self.inside)
+            self.threads.add(threading.current_thread().name)
+            sleep(0.001)
+            self.inside -= 1
+            self.calls += 1
+            if self.calls == 300:
+                self.log.info(f"at most {self.most} at once")
+
+        def on_input(self, message): self.work()
+        def on_tick(self): self.work()
+        async def on_async_tick(self):
+            self.work()
+            await self.clock.sleep(0.001)
+            self.work()
+    """
+    with running(text, tmp_path, turns=module) as system:
+        source = peer.publisher(Int64, "/input")
+        for number in range(50):
+            source.publish(Int64(data=number))
+        line = system.wait_for_log("at once")
+    assert line == "at most 1 at once"

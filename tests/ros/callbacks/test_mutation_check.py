@@ -1,0 +1,95 @@
+"""``--check-mutation`` names who changes what is shared, and nobody else."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from composer.runtime.host import HostOptions
+from tests.ros.support.in_process import running, wait_until
+from tests.ros.support.system_process import RunningSystem as InAProcess
+
+TEXT = """
+system: changing
+nodes:
+  source:
+    behavior: changing:Source
+    publishers:
+      numbers: {type: std_msgs/msg/Int64}
+      texts: {type: std_msgs/msg/String}
+    timers: {tick: {period_ms: 20}, tock: {period_ms: 20}}
+  forger:
+    behavior: changing:Forger
+    subscriptions: {numbers: {type: std_msgs/msg/Int64}}
+  reader:
+    behavior: changing:Reader
+    subscriptions: {numbers: {type: std_msgs/msg/Int64}, texts: {type: std_msgs/msg/String}}
+"""
+MODULE = """
+from composer.behavior import Behavior
+from std_msgs.msg import Int64, String
+
+class Source(Behavior):
+    def on_configure(self):
+        self.text = String()
+
+    def on_tick(self):
+        self.publishers.numbers.publish(Int64(data=1))
+
+    def on_tock(self):
+        self.text.data += "x"  # the one that was published before
+        self.publishers.texts.publish(self.text)
+
+class Forger(Behavior):
+    async def on_numbers(self, message):
+        await self.clock.sleep(0.001)
+        message.data = 2
+
+class Reader(Behavior):
+    def on_configure(self):
+        self.heard = 0
+
+    def on_numbers(self, message):
+        self.heard += 1
+
+    def on_texts(self, message):
+        self.heard += 1
+"""
+FORGERY = "subscription 'numbers': has changed a message (Int64) after it was received by 'numbers'"
+USED_AGAIN = "timer 'tock': has changed a message (String) after it was published by 'texts'"
+
+
+def test_who_changes_a_message_is_named_and_nobody_else(tmp_path: Path) -> None:
+    options = HostOptions(check_mutation=True)
+    with running(TEXT, tmp_path, options=options, changing=MODULE) as system:
+        system.wait_for_log(FORGERY)
+        system.wait_for_log(USED_AGAIN)
+        reader = system.behavior("reader")
+        wait_until(lambda: reader.heard > 10)
+        errors = {entry.node: entry.errors for entry in system.stop().nodes}
+    assert errors["/forger"]
+    assert errors["/source"]
+    assert errors["/reader"] == 0
+    said = [line for line in system.log() if "has changed" in line]
+    assert all(line.startswith((FORGERY, USED_AGAIN)) for line in said)
+
+
+def test_without_the_check_nobody_looks(tmp_path: Path) -> None:
+    with running(TEXT, tmp_path, changing=MODULE) as system:
+        reader = system.behavior("reader")
+        wait_until(lambda: reader.heard > 10)
+        assert not any(entry.errors for entry in system.stop().nodes)
+    assert "has changed" not in system.log_text()
+
+
+def test_people_ask_for_it_on_the_command_line(tmp_path: Path) -> None:
+    path = tmp_path / "changing.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    path.with_name("changing.py").write_text(MODULE, encoding="utf-8")
+    with InAProcess(str(path), "--check-mutation") as system:
+        line = system.wait_for(re.escape(FORGERY))
+        assert "[ERROR] [forger]" in line
+        system.wait_for(re.escape(USED_AGAIN))
+        code, _ = system.stop()
+    assert code == 0
+    assert "[reader]" not in system.output

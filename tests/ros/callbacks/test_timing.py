@@ -1,0 +1,144 @@
+"""What is counted of callbacks of every kind while a system runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from composer.runtime.host import HostOptions
+from composer.runtime.metrics.statistics import CallbackStatistics
+from tests.ros.support.in_process import RunningSystem, running, wait_until
+
+EVERY_KIND = """
+system: traced
+nodes:
+  server:
+    behavior: traced:Server
+    subscriptions: {number: {type: std_msgs/msg/Int64, budget_ms: 1}}
+    services: {ask: {type: std_srvs/srv/Trigger, budget_ms: 1}}
+    action_servers: {go: {type: composer_interfaces/action/Navigate, budget_ms: 1}}
+  client:
+    publishers: {number: {type: std_msgs/msg/Int64}}
+    clients: {ask: {type: std_srvs/srv/Trigger, budget_ms: 0.000001, on_response: {log: asked}}}
+    action_clients:
+      go:
+        type: composer_interfaces/action/Navigate
+        budget_ms: 0.000001
+        on_feedback: {log: going}
+        on_result: {log: gone}
+    timers:
+      tick:
+        period_ms: 50
+        budget_ms: 0.000001
+        publish: {number: {data: "{count}"}}
+        call: {ask: {}, go: {}}
+"""
+SERVER = """
+import time
+from composer_interfaces.action import Navigate
+
+def work():
+    until_s = time.monotonic() + 0.002
+    while time.monotonic() < until_s:
+        pass
+
+class Server:
+    async def on_number(self, message):
+        work()
+        await self.clock.sleep(0.4)
+        work()
+
+    def on_ask(self, request, response):
+        work()
+        return response
+
+    async def on_go(self, goal):
+        work()
+        await self.clock.sleep(0.02)
+        goal.publish_feedback(Navigate.Feedback())
+"""
+
+
+def counted(system: RunningSystem, node: str) -> dict[str, CallbackStatistics]:
+    callbacks = system.node(node).statistics.callbacks
+    return {kind: callback for (kind, _), callback in callbacks.items()}
+
+
+def test_every_kind_of_callback_is_timed_and_held_against_its_budget(tmp_path: Path) -> None:
+    with running(EVERY_KIND, tmp_path, traced=SERVER) as system:
+        server, client = counted(system, "server"), counted(system, "client")
+        every = [*server.values(), *client.values()]
+        wait_until(lambda: all(callback.overruns > 2 for callback in every), "calls of all kinds")
+        text = system.log_text()
+    assert {*server, *client} == {
+        "subscription",
+        "service",
+        "action server",
+        "client",
+        "action client",
+        "timer",
+    }
+    for callback in every:
+        assert callback.overruns <= callback.times.count
+        assert f"{callback} took " in text
+    # What an async callback waits does not count, and what it does after waiting does.
+    times = server["subscription"].times
+    assert times.longest_s >= 0.004
+    assert times.percentile_s(0.5) < 0.36  # right within a tenth; the machine may stand still once
+    assert client["timer"].lateness.count == client["timer"].times.count
+    outcome = system.stop()
+    told = {(item.node, item.kind): item for item in outcome.callbacks}
+    assert told["/server", "service"].count == server["service"].times.count
+
+
+def test_without_tracing_only_what_has_a_budget_is_timed(tmp_path: Path) -> None:
+    text = """
+    system: untraced
+    nodes:
+      quick: {timers: {tick: {period_ms: 5, set: {}}, tock: {period_ms: 5, budget_ms: 50, set: {}}}}
+    """
+    with running(text, tmp_path, options=HostOptions(tracing=False)) as system:
+        callbacks = system.node("quick").statistics.callbacks
+        wait_until(lambda: callbacks["timer", "tock"].times.count > 20, "calls")
+    assert callbacks["timer", "tick"].times.count == 0
+    assert callbacks["timer", "tick"].lateness.count == 0
+
+
+FLOOD = """
+system: flood
+nodes:
+  source:
+    behavior: flood:Source
+    publishers: {number: {type: std_msgs/msg/Int64, qos: {depth: 5000}}}
+    timers: {tick: {period_ms: 10}}
+  sink:
+    behavior: flood:Sink
+    subscriptions: {number: {type: std_msgs/msg/Int64, qos: {depth: 5000}}}
+"""
+SOURCE_AND_SINK = """
+from std_msgs.msg import Int64
+
+class Source:
+    has_sent = False
+
+    def on_tick(self):
+        if not self.has_sent:
+            self.has_sent = True
+            for number in range(4100):
+                self.publishers.number.publish(Int64(data=number))
+
+class Sink:
+    def on_number(self, message):
+        return None if message.data < 4000 else self.later()
+
+    async def later(self):
+        pass
+"""
+
+
+def test_of_what_comes_often_each_call_counts_once_also_where_it_awaits(tmp_path: Path) -> None:
+    """While they come often, one of sixteen is timed and stands for them, where none awaits."""
+    with running(FLOOD, tmp_path, flood=SOURCE_AND_SINK) as system:
+        node = system.node("sink")
+        wait_until(lambda: node.statistics.received == 4100, "all are there")
+        times = node.statistics.callbacks["subscription", "number"].times
+        wait_until(lambda: abs(times.count - 4100) < 32, f"{times.count} counted")

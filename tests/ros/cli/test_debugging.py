@@ -1,0 +1,237 @@
+"""The debugging commands for nodes and topics, each a process, on a hand-written rclpy node."""
+
+from __future__ import annotations
+
+import json
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+import rclpy
+import yaml
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Int32
+
+from tests.ros.support.commands import (
+    PATIENCE_S,
+    compose,
+    error,
+    finished,
+    listed,
+    measured,
+    said,
+    start,
+)
+
+pytestmark = pytest.mark.usefixtures("talker")
+
+
+def test_nodes() -> None:
+    assert listed(("/lab/talker",), "node", "list") == "/lab/talker\n"
+    assert listed(("1",), "node", "list", "--count") == "1\n"
+    assert json.loads(listed(("/lab/talker",), "node", "list", "--json")) == ["/lab/talker"]
+
+
+def test_a_node_tells_what_it_offers_and_uses() -> None:
+    names = ("/lab/count", "/lab/in", "/lab/add", "/lab/navigate")
+    found = json.loads(listed(names, "node", "info", "talker", "--json"))
+    assert ["/lab/count", ["std_msgs/msg/Int32"]] in found["publishers"]
+    assert found["subscriptions"] == [["/lab/in", ["std_msgs/msg/String"]]]
+    assert ["/lab/add", ["std_srvs/srv/SetBool"]] in found["services"]
+    assert found["action_servers"] == [["/lab/navigate", ["composer_interfaces/action/Navigate"]]]
+    assert not any("_action" in name for name, _ in found["services"])
+    text = listed(names, "node", "info", "/lab/talker")
+    assert "  Action Servers:\n    /lab/navigate:  composer_interfaces/action/Navigate\n" in text
+
+
+def test_topics() -> None:
+    expected = ("/lab/count", "/lab/text", "/lab/in")
+    names = listed(expected, "topic", "list").split()
+    assert set(expected) <= set(names)
+    assert not any("_action" in name for name in names)
+    hidden = ("/lab/navigate/_action/feedback",)
+    assert hidden[0] in listed(hidden, "topic", "list", "--include-hidden")
+    found = json.loads(listed(expected, "topic", "list", "--json"))
+    types = {item["name"]: item["types"] for item in found}
+    assert types["/lab/count"] == ["std_msgs/msg/Int32"]
+
+
+def test_a_topic_tells_who_is_at_its_ends_with_which_qos() -> None:
+    found = json.loads(listed(("/lab/talker",), "topic", "info", "/lab/text", "--json"))
+    assert found["types"] == ["std_msgs/msg/String"]
+    assert found["subscriptions"] == []
+    assert found["publishers"] == [
+        {
+            "node": "/lab/talker",
+            "type": "std_msgs/msg/String",
+            "qos": {
+                "reliability": "reliable",
+                "durability": "transient_local",
+                "liveliness": "automatic",
+            },
+        }
+    ]
+    one, kept = "Publisher count: 1\n", "durability: transient_local"
+    assert one in listed((one,), "topic", "info", "lab/text")
+    assert kept in listed((kept,), "topic", "info", "-v", "/lab/text")
+
+
+def test_echo_gets_what_a_best_effort_publisher_sends() -> None:
+    lines = said("topic", "echo", "/lab/count", "--count", "5", "--json").splitlines()
+    values = [json.loads(line)["data"] for line in lines]
+    assert values == list(range(values[0], values[0] + 5))
+
+
+def test_echo_gets_what_was_published_before_and_cuts_it() -> None:
+    text = yaml.safe_load(said("topic", "echo", "/lab/text", "--once").removesuffix("---\n"))
+    assert text == {"data": "x" * 128 + "..."}
+    full = said("topic", "echo", "/lab/text", "--once", "--full-length", "--field", "data")
+    assert full == "x" * 200 + "\n---\n"
+
+
+def test_echo_filters_by_an_expression() -> None:
+    condition = "message.data > 20 and message.data < 1000000"
+    value = said("topic", "echo", "/lab/count", "--once", "--filter", condition, "--field", "data")
+    assert int(value.removesuffix("---\n")) > 20
+    assert "has no field 'x'" in error("topic", "echo", "/lab/count", "--filter", "message.x > 1")
+    done = compose("topic", "echo", "/lab/count", "--filter", "message.data >")
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("compose: --filter: ")
+
+
+def test_echo_says_what_is_wrong_with_names_and_fields() -> None:
+    assert "did you mean '/lab/count'?" in error("topic", "echo", "/lab/cuont", "--once")
+    assert "valid here: data" in error("topic", "echo", "/lab/count", "--once", "--field", "odd")
+    silent = ("topic", "echo", "/lab/in", "std_msgs/msg/String", "--timeout", "0.3")
+    assert "nothing came over '/lab/in' for 0.3 s" in error(*silent)
+
+
+def test_echo_ends_quietly_at_ctrl_c() -> None:
+    process = start("topic", "echo", "/lab/count")
+    assert process.stdout is not None
+    assert any(line.startswith("data: ") for line in process.stdout)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+
+
+def test_echo_and_hz_agree_with_a_hand_written_subscriber_to_one_percent() -> None:
+    with hand_written_subscriber() as heard:
+        # Who starts too late for the first message, or is kept from a processor at the first or
+        # the last one, looks at something else than the others: once more, with more time.
+        for lead in (150, 300, 600):
+            values, seen_s, rate = side_by_side(heard, lead)
+            by_hand_hz = (len(seen_s) - 1) / (max(seen_s.values()) - min(seen_s.values()))
+            close_hz = pytest.approx(by_hand_hz, rel=0.01)
+            if len(seen_s) == len(values) and rate["average_hz"] == close_hz:
+                break
+    assert len(set(values) & seen_s.keys()) == pytest.approx(len(seen_s), rel=0.01)
+    assert len(values) == pytest.approx(len(seen_s), rel=0.01)
+    assert rate["window"] == 249
+    assert rate["average_hz"] == close_hz
+
+
+def side_by_side(
+    heard: list[tuple[float, int]], lead: int
+) -> tuple[list[int], dict[int, float], dict[str, Any]]:
+    """Let echo and hz look at the same 250 messages, which begin in ``lead`` messages.
+
+    Returns what echo printed, when each of these was heard by hand, and what hz found.
+    """
+    first = heard[-1][1] + lead
+    since = ("--filter", f"message.data >= {first}", "--count", "250")
+    by_echo = start("topic", "echo", "/lab/count", *since, "--field", "data", "--csv")
+    by_hz = start("topic", "hz", "/lab/count", *since, "--json")
+    rate = json.loads(finished(by_hz).splitlines()[-1])
+    values = [int(line) for line in finished(by_echo).splitlines()]
+    until_s = time.monotonic() + PATIENCE_S
+    while heard[-1][1] < values[-1]:
+        assert time.monotonic() < until_s
+        time.sleep(0.02)
+    seen_s = {value: at_s for at_s, value in tuple(heard) if first <= value <= values[-1]}
+    return values, seen_s, rate
+
+
+@contextmanager
+def hand_written_subscriber() -> Iterator[list[tuple[float, int]]]:
+    """Yield a list to which a plain subscription adds the time and the number of each message.
+
+    It has begun by then, and its queue is deep enough for a moment without a processor.
+    """
+    heard: list[tuple[float, int]] = []
+    context = rclpy.Context()
+    context.init([])
+    node = rclpy.create_node("by_hand", context=context)
+    node.create_subscription(
+        Int32,
+        "/lab/count",
+        lambda message: heard.append((time.monotonic(), message.data)),
+        QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT),
+    )
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    try:
+        until_s = time.monotonic() + PATIENCE_S
+        while not heard:
+            assert time.monotonic() < until_s
+            time.sleep(0.02)
+        yield heard
+    finally:
+        executor.shutdown()
+        thread.join()
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def test_hz_tells_people_in_words() -> None:
+    assert "average rate: " in said("topic", "hz", "/lab/count", "--count", "10")
+
+
+def test_bw_counts_serialized_bytes() -> None:
+    expected = pytest.approx(8 * 50.0, rel=0.5)  # on a busy machine
+    bandwidth = ("topic", "bw", "/lab/count", "--count", "50", "--json")
+    found = measured(lambda found: found["bytes_per_s"] == expected, *bandwidth)
+    assert (found["smallest"], found["largest"]) == (8, 8)  # header of 4, int32
+    assert found["bytes_per_s"] == expected
+
+
+def test_measuring_looks_at_wanted_messages_only_and_does_not_wait_for_ever() -> None:
+    even = ("--filter", "message.data % 2 == 0", "--count", "20", "--json")
+    expected = pytest.approx(25.0, rel=0.3)  # of 50 on a busy machine
+    rate = ("topic", "hz", "/lab/count", *even)
+    found = measured(lambda found: found["average_hz"] == expected, *rate)
+    assert found["average_hz"] == expected
+    # Of a best-effort publisher a reliable subscription hears nothing. The topic has to be found
+    # within the same time.
+    silent = ("topic", "bw", "/lab/count", "--qos-reliability", "reliable", "--timeout", "5")
+    assert "nothing came over '/lab/count' for 5 s" in error(*silent)
+
+
+def test_what_is_published_arrives() -> None:
+    arguments = ("/lab/in", "std_msgs/msg/String", '{data: "number {count}"}')
+    done = compose("topic", "pub", "-r", "20", "--times", "2", "--print", "2", *arguments)
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr == "published #2: std_msgs.msg.String(data='number 1')\n"
+    last = "number 1\n---\n"  # the talker may still be at the one before
+    echo = ("topic", "echo", "/lab/heard", "--once", "--field", "data")
+    assert listed((last,), *echo) == last
+    once = ("topic", "pub", "--once", "--json", "--qos-history", "keep_all", *arguments)
+    assert json.loads(said(*once)) == {"data": "number 0"}
+
+
+def test_publishing_says_what_is_wrong() -> None:
+    topic = ("topic", "pub", "--once", "/lab/in", "std_msgs/msg/String")
+    assert "String has no field 'dta'" in error(*topic, "{dta: hello}")
+    assert "takes a text" in error(*topic, "{data: 5}")
+    assert "is not a YAML map" in error(*topic, "hello")
+    assert "is not installed" in error("topic", "pub", "/lab/in", "std_msgs/msg/Strin")
+    nobody = ("topic", "pub", "--once", "/nobody", "std_msgs/msg/String", "--timeout", "0.5")
+    assert "0 of 1 subscriptions to '/nobody'" in error(*nobody)

@@ -1,0 +1,167 @@
+"""The debugging commands for services, actions and parameters, on a hand-written rclpy node."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.ros.support.commands import (
+    PATIENCE_S,
+    compose,
+    error,
+    finished,
+    listed,
+    said,
+    start,
+)
+
+pytestmark = pytest.mark.usefixtures("talker")
+
+
+def test_services() -> None:
+    assert "/lab/add" in listed(("/lab/add\n",), "service", "list").split()
+    assert said("service", "type", "/lab/add") == "std_srvs/srv/SetBool\n"
+    assert json.loads(said("service", "type", "/lab/add", "--json")) == ["std_srvs/srv/SetBool"]
+    answer = {"success": True, "message": "switched"}
+    assert yaml.safe_load(said("service", "call", "/lab/add", "{data: true}")) == answer
+    typed = ("service", "call", "/lab/add", "std_srvs/srv/SetBool", "{data: true}", "--json")
+    assert json.loads(said(*typed)) == answer
+    assert "SetBool_Request has no field 'dta'" in error("service", "call", "/lab/add", "{dta: 1}")
+    assert "did you mean '/lab/add'?" in error("service", "call", "/lab/ad", "{data: true}")
+    gone = ("service", "call", "/lab/gone", "std_srvs/srv/SetBool", "{}", "--timeout", "0.5")
+    assert "did not answer within 0.5 s" in error(*gone)
+
+
+def test_actions() -> None:
+    assert listed(("/lab/navigate",), "action", "list", "-t").split() == [
+        "/lab/navigate",
+        "composer_interfaces/action/Navigate",
+    ]
+    info = json.loads(listed(("/lab/talker",), "action", "info", "/lab/navigate", "--json"))
+    assert info["servers"] == ["/lab/talker"]
+    assert json.loads(said("action", "info", "lab/navigate", "--json")) == info
+
+
+def test_a_goal_gives_feedback_and_a_result() -> None:
+    goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: 1.0}", "--feedback", "--json")
+    told = [json.loads(line) for line in said(*goal).splitlines()]
+    assert [item["feedback"]["progress_percent"] for item in told[:-1]] == [0.0, 1.0, 2.0]
+    assert told[-1]["status"] == "succeeded"
+    assert told[-1]["result"]["distance_traveled"] == 2.5
+
+
+def test_feedback_that_comes_together_with_the_result_is_shown() -> None:
+    goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: 1.0}", "--feedback", "--json")
+    process = start(*goal)
+    assert process.stdout is not None
+    first = json.loads(next(line for line in process.stdout if "feedback" in line))
+    process.send_signal(signal.SIGSTOP)
+    time.sleep(0.5)  # the talker tells the rest and ends the goal
+    process.send_signal(signal.SIGCONT)
+    told = [first, *map(json.loads, process.stdout)]
+    finished(process)
+    assert [item["feedback"]["progress_percent"] for item in told[:-1]] == [0.0, 1.0, 2.0]
+    assert told[-1]["status"] == "succeeded"
+
+
+def test_a_rejected_goal_is_told() -> None:
+    assert "'/lab/navigate' rejected the goal" in error(
+        "action", "send_goal", "/lab/navigate", "composer_interfaces/action/Navigate", "{}"
+    )
+
+
+def test_a_goal_that_takes_too_long_is_canceled() -> None:
+    goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: -1}", "--json")
+    done = compose(*goal, "--result-timeout", "0.3")
+    assert done.returncode == 1, done.stderr
+    assert json.loads(done.stdout)["status"] == "canceled"
+
+
+def test_ctrl_c_cancels_a_goal() -> None:
+    goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: -1}", "--feedback", "--json")
+    process = start(*goal, "--timeout", "20")
+    assert process.stdout is not None
+    assert any("feedback" in line for line in process.stdout)
+    process.send_signal(signal.SIGINT)
+    rest, err = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 1
+    last = json.loads(rest.splitlines()[-1])
+    assert (last["status"], last["result"]["message"]) == ("canceled", "stopped")
+    assert "canceling" in err
+    assert "Traceback" not in err
+
+
+def test_parameters_are_read_and_set() -> None:
+    assert {"speed", "name", "gains"} <= set(said("param", "list", "talker").split())
+    assert said("param", "get", "talker", "speed") == "1.5\n"
+    assert said("param", "set", "talker", "speed", "2") == "/lab/talker speed: 2.0\n"
+    assert json.loads(said("param", "get", "/lab/talker", "speed", "--json")) == 2.0
+    assert json.loads(said("param", "set", "talker", "name", "123", "--json")) == {
+        "/lab/talker": {"ros__parameters": {"name": "123"}}
+    }
+    assert json.loads(said("param", "get", "talker", "name", "--json")) == "123"
+    said("param", "set", "talker", "gains", "[3, 4.5]")
+    assert json.loads(said("param", "get", "talker", "gains", "--json")) == [3.0, 4.5]
+
+
+def test_a_parameter_that_is_not_taken_is_told_with_the_reason() -> None:
+    assert "out of range" in error("param", "set", "talker", "speed", "99")
+    told = compose("param", "set", "talker", "gains", "[3").stderr
+    assert told == "compose: '[3' is not YAML: expected ',' or ']', but got '<stream end>'\n"
+    assert "'speed' is a double, which 'fast' is not" in error(
+        "param", "set", "talker", "speed", "fast"
+    )
+    assert "did you mean 'speed'?" in error("param", "set", "talker", "sped", "1")
+    assert "did you mean '/lab/talker'?" in error("param", "list", "taker")
+
+
+def test_a_parameter_is_described() -> None:
+    assert json.loads(said("param", "describe", "talker", "speed", "--json")) == {
+        "name": "speed",
+        "type": "double",
+        "description": "How fast.",
+        "minimum": 0.0,
+        "maximum": 5.0,
+    }
+
+
+def test_parameters_of_all_nodes_are_listed_and_several_described() -> None:
+    everything = json.loads(listed(("/lab/talker",), "param", "list", "--json"))
+    assert {"speed", "name", "gains"} <= set(everything["/lab/talker"])
+    head = "/lab/talker:\n"
+    assert head in listed((head,), "param", "list")
+    several = json.loads(said("param", "describe", "talker", "speed", "name", "--json"))
+    assert [item["name"] for item in several] == ["speed", "name"]
+
+
+def test_what_is_dumped_can_be_loaded(tmp_path: Path) -> None:
+    file = tmp_path / "talker.yaml"
+    dumped = yaml.safe_load(said("param", "dump", "talker"))
+    values = dumped["/lab/talker"]["ros__parameters"]
+    assert values["start_type_description_service"] is True  # read-only, as in every ROS node
+    values.update(speed=0.25, name="loaded")
+    file.write_text(yaml.safe_dump(dumped))
+    taken = json.loads(said("param", "load", "talker", str(file), "--json"))
+    del values["start_type_description_service"]
+    assert taken == dumped
+    assert said("param", "get", "talker", "speed") == "0.25\n"
+
+
+def test_a_parameter_file_may_nest_names_and_use_wildcards(tmp_path: Path) -> None:
+    file = tmp_path / "robot.yaml"
+    file.write_text(
+        "/**: {ros__parameters: {speed: 1, for_others: 5}}\n"
+        "lab: {talker: {ros__parameters: {limits: {reach: 2}}}}\n"
+    )
+    assert said("param", "load", "talker", str(file)) == (
+        "/lab/talker speed: 1.0\n/lab/talker limits.reach: 2.0\n"
+    )
+    file.write_text("/other: {ros__parameters: {speed: 1.0}}\n")
+    assert "has nothing for /lab/talker" in error("param", "load", "talker", str(file))
+    file.write_text("/lab/talker: {speed: 1.0}\n")
+    assert "RC043 parameter-file" in error("param", "load", "talker", str(file))

@@ -1,0 +1,159 @@
+"""``compose diff``: a system that runs in one process, held against its file from another."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TextIO
+
+import pytest
+
+from tests.ros.support.commands import COMPOSE, PATIENCE_S, Running, compose, hand_written, running
+
+INTRUDER = "hand_written_intruder.py"
+PLANNER = "/planning/planner"
+
+
+@pytest.fixture(scope="module")
+def pipeline(tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int) -> Iterator[Running]:
+    with running(tmp_path_factory.mktemp("pipeline") / "log.txt", "pipeline") as run:
+        run.wait_for("3 of 3 nodes active")
+        yield run
+        assert run.stop()[0] == 0
+
+
+def told(done: subprocess.CompletedProcess[str]) -> list[str]:
+    """Return the differences, without hints and places."""
+    return [line for line in done.stdout.splitlines() if not line.startswith(" ")]
+
+
+def test_a_system_that_runs_as_declared_is_clean(pipeline: Running) -> None:
+    done = compose("diff", "pipeline")
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr == "pipeline: runs as declared\n"
+
+
+def test_a_changed_parameter_is_named_with_both_values_and_its_place(pipeline: Running) -> None:
+    assert compose("param", "set", PLANNER, "max_velocity", "0.5").returncode == 0
+    done = compose("diff", "pipeline")
+    assert done.returncode == 1
+    assert told(done) == [f"{PLANNER}: parameter max_velocity is 0.5, declared 1.0"]
+    assert "declared at " in done.stdout
+    assert "planner.yaml:" in done.stdout
+    assert compose("param", "set", PLANNER, "max_velocity", "1.0").returncode == 0
+
+
+def test_a_node_that_was_cleaned_up_is_named_with_the_endpoints_that_are_gone(
+    pipeline: Running,
+) -> None:
+    for transition in ("deactivate", "cleanup"):
+        assert compose("lifecycle", "set", PLANNER, transition).returncode == 0
+    done = compose("diff", "pipeline")
+    assert done.returncode == 1
+    assert told(done) == [
+        f"{PLANNER}: lifecycle state is unconfigured, declared active",
+        f"{PLANNER}: subscription /sensor_data is missing",
+        f"{PLANNER}: service /plan_trajectory is missing",
+    ]
+    for transition in ("configure", "activate"):
+        assert compose("lifecycle", "set", PLANNER, transition).returncode == 0
+
+
+def test_a_second_publisher_of_another_type_from_outside_is_named(pipeline: Running) -> None:
+    conflict = (
+        "/intruder: type of its publisher /sensor_data is std_msgs/msg/String,"
+        " declared nav_msgs/msg/Odometry"
+    )
+    with hand_written(INTRUDER):
+        done = compose("diff", "pipeline", "--json")
+        assert done.returncode == 1
+        data = json.loads(done.stdout)
+        assert (data["system"], data["clean"]) == ("pipeline", False)
+        assert [item["message"] for item in data["drift"]] == [
+            conflict,
+            "/intruder: the node is there, but not declared",
+        ]
+        assert [item["kind"] for item in data["drift"]] == ["wrong type", "extra node"]
+        ignoring = compose("diff", "pipeline", "--ignore", "/intr*")
+        assert (ignoring.returncode, told(ignoring)) == (1, [conflict])
+
+
+def test_watch_tells_what_appears_and_what_is_resolved(pipeline: Running) -> None:
+    watch = subprocess.Popen(
+        [*COMPOSE, "diff", "pipeline", "--watch", "--grace", "1.5"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert watch.stdout is not None
+        assert compose("param", "set", PLANNER, "max_velocity", "0.7").returncode == 0
+        line = read_until(watch.stdout, "drift: ")
+        assert line == f"drift: {PLANNER}: parameter max_velocity is 0.7, declared 1.0"
+        assert compose("param", "set", PLANNER, "max_velocity", "1.0").returncode == 0
+        assert read_until(watch.stdout, "resolved: ").startswith(f"resolved: {PLANNER}: parameter")
+        watch.send_signal(signal.SIGINT)
+        assert watch.communicate(timeout=PATIENCE_S)[1] == ""
+        assert watch.returncode == 0
+    finally:
+        watch.kill()
+        watch.wait()
+
+
+def read_until(stream: TextIO, begin: str) -> str:
+    return next(line.rstrip() for line in stream if line.startswith(begin))
+
+
+def test_a_system_that_is_just_starting_is_no_false_alarm(tmp_path: Path) -> None:
+    with running(tmp_path / "log.txt", "talker_listener"):
+        # On a busy machine a start may take longer than the grace time is when nobody says it.
+        limits = ("--grace", "15", "--timeout", "25")
+        done = compose("diff", "talker_listener", "--ignore", "/*/*", *limits)
+        assert (done.returncode, done.stdout) == (0, "")
+
+
+def test_nothing_that_runs_is_told_in_time() -> None:
+    started_s = time.monotonic()
+    done = compose("diff", "talker_listener", "--timeout", "4", "--ignore", "*")
+    assert time.monotonic() - started_s < 20.0
+    assert done.returncode == 1
+    assert told(done) == ["/talker: the node is not there", "/listener: the node is not there"]
+
+
+DECLARED = """
+system: talk
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+    timers: {tick: {period_ms: 100, publish: {chatter: {data: hello}}}}
+  listener: {subscriptions: {chatter: {type: std_msgs/msg/String, qos: sensor_data}}}
+"""
+
+
+def test_qos_really_offered_and_names_that_are_nearly_right(tmp_path: Path) -> None:
+    declared, other = tmp_path / "declared.yaml", tmp_path / "other.yaml"
+    declared.write_text(DECLARED)
+    changed = DECLARED.replace("command", "sensor_data").replace("  listener:", "  listner:")
+    other.write_text(changed)
+    with running(tmp_path / "log.txt", str(other), "--namespace", "/twin") as run:
+        run.wait_for("2 of 2 nodes active")
+        done = compose("diff", str(declared), "--namespace", "/twin", "--ignore", "/[!t]*")
+    assert done.returncode == 1
+    assert told(done) == [
+        "/twin/talker: reliability of publisher /twin/chatter is best_effort, declared reliable",
+        "/twin/listener: the node is not there",
+        "/twin/listner: the node is there, but not declared",
+    ]
+    assert "'/twin/listner' is there: is it meant?" in done.stdout
+
+
+def test_how_it_was_started_is_how_it_is_held(tmp_path: Path) -> None:
+    arguments = ("talker_listener", "--namespace", "/robot1", "--autostart", "inactive")
+    with running(tmp_path / "log.txt", *arguments) as run:
+        run.wait_for("0 of 2 nodes active")
+        done = compose("diff", *arguments, "--ignore", "/[!r]*")
+        assert (done.returncode, done.stdout) == (0, "")

@@ -1,0 +1,120 @@
+"""``compose graph --live``: what runs, ours and anybody's, with states and measured rates."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from tests.ros.support.commands import PATIENCE_S, compose, hand_written, running
+
+EXPECTED = (
+    "node:/other/arm",
+    "2 nodes have this name",
+    "publisher:/perception/sensor_simulator./sensor_data",
+    "client:/control/motor_controller./plan_trajectory",
+    "action_server:/control/motor_controller./navigate",
+)
+
+
+@pytest.fixture(scope="module")
+def live(
+    tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int
+) -> Iterator[dict[str, Any]]:
+    """The diagram of the pipeline and of nodes that somebody else wrote."""
+    log = tmp_path_factory.mktemp("live") / "log.txt"
+    with hand_written("hand_written.py"), running(log, "pipeline") as run:
+        run.wait_for("3 of 3 nodes active")
+        yield all_drawn()
+
+
+def all_drawn() -> dict[str, Any]:
+    """Ask again until all is there: on a busy machine discovery and answers outlast a command."""
+    until_s = time.monotonic() + PATIENCE_S
+    while True:
+        found = drawn()
+        states = [vertex["details"].get("state") for vertex in found["vertices"]]
+        text = json.dumps(found)
+        if (
+            states.count("active") >= 2
+            and "unconfigured" in states
+            and all(f'"{part}"' in text for part in EXPECTED)
+        ) or time.monotonic() > until_s:
+            return found
+
+
+def drawn() -> dict[str, Any]:
+    done = compose("graph", "--live", "-f", "json", "--measure", "1.5")
+    assert (done.returncode, done.stderr) == (0, "")
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+def vertices(live: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    return {vertex["key"]: vertex for vertex in live["vertices"]}
+
+
+def edges(live: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    return {edge["key"]: edge for edge in live["edges"]}
+
+
+def test_all_nodes_are_there_with_their_states(live: dict[str, Any]) -> None:
+    states = {
+        key: vertex["details"].get("state")
+        for key, vertex in vertices(live).items()
+        if vertex["kind"] == "node"
+    }
+    assert states["node:/planning/planner"] in ("active", "unconfigured")  # there are two of them
+    assert states["node:/control/motor_controller"] == "active"
+    assert states["node:/other/arm"] == "unconfigured"
+
+
+def test_a_name_that_two_nodes_have_is_marked(live: dict[str, Any]) -> None:
+    assert vertices(live)["node:/planning/planner"]["wrong"] == "2 nodes have this name"
+
+
+def test_topics_services_and_actions_join_them(live: dict[str, Any]) -> None:
+    found = edges(live)
+    publishes = found["publisher:/perception/sensor_simulator./sensor_data"]
+    assert publishes["target"] == "topic:/sensor_data"
+    assert publishes["details"]["type"] == "nav_msgs/msg/Odometry"
+    assert publishes["details"]["qos"]["reliability"] == "best_effort"
+    assert "depth" not in publishes["details"]["qos"]
+    assert found["client:/control/motor_controller./plan_trajectory"]["kind"] == "service"
+    assert found["action_server:/control/motor_controller./navigate"]["kind"] == "action"
+
+
+def test_rates_are_measured(live: dict[str, Any]) -> None:
+    expected = pytest.approx(30.0, rel=0.25)
+    until_s = time.monotonic() + PATIENCE_S
+    while True:
+        found = edges(live)["publisher:/perception/sensor_simulator./sensor_data"]
+        # A simulator that gets no processor for a moment sends less for that long.
+        if found["details"].get("rate_hz") == expected or time.monotonic() > until_s:
+            break
+        live = drawn()
+    assert found["details"]["rate_hz"] == expected
+    assert found["label"][0].endswith(" Hz")
+
+
+def test_what_nodes_have_for_tools_is_left_out(live: dict[str, Any]) -> None:
+    names = [key for key in vertices(live) if "parameter" in key or "rosout" in key]
+    assert names == []
+    assert not any("transition_event" in key or "get_state" in key for key in vertices(live))
+
+
+def test_views_that_need_a_declaration_are_refused() -> None:
+    done = compose("graph", "--live", "--view", "deployment")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "nodes, connections or states" in done.stderr
+
+
+def test_an_empty_graph_is_drawn_in_time() -> None:
+    started_s = time.monotonic()
+    done = compose("graph", "--live", "--timeout", "2")
+    assert time.monotonic() - started_s < 20.0
+    assert done.returncode == 0
+    assert "flowchart" in done.stdout

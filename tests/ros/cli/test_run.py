@@ -1,0 +1,208 @@
+"""``compose run`` and ``compose lifecycle`` as people use them: two terminals, real ROS."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.ros.support.commands import COMPOSE, PATIENCE_S, compose, running
+from tests.ros.support.in_process import Peer, wait_until
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return tmp_path / "stderr.txt"
+
+
+def states_in(text: str) -> list[str]:
+    """Return the state changes that were shown, as 'node state'."""
+    lines = [line.rpartition("[compose] ")[2] for line in text.splitlines() if "[compose]" in line]
+    return [line for line in lines if line.startswith("/") and len(line.split()) == 2]
+
+
+def test_a_system_comes_up_in_order_stops_by_itself_and_sums_up() -> None:
+    done = compose("run", "pipeline", "--for", "2")
+    assert (done.returncode, done.stdout) == (0, "")
+    shown = states_in(done.stderr)
+    assert shown[3:6] == [
+        "/perception/sensor_simulator active",
+        "/planning/planner active",
+        "/control/motor_controller active",
+    ]
+    assert shown[6] == "/control/motor_controller inactive"
+    assert "3 of 3 nodes active" in done.stderr
+    rows = [line.split() for line in done.stderr.splitlines()]
+    head = rows.index(["node", "state", "received", "sent", "calls", "dropped", "errors"])
+    assert rows[head + 1][:2] == ["/perception/sensor_simulator", "finalized"]
+    assert int(rows[head + 1][3]) > 5  # of 60, on a busy machine
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_tears_down_in_reverse_and_leaves_no_trace(log: Path, number: int) -> None:
+    with running(log, "pipeline") as run:
+        run.wait_for("3 of 3 nodes active")
+        code, out, err = run.stop(number)
+    assert (code, out) == (0, "")
+    assert "Traceback" not in err
+    assert states_in(err)[6:9] == [
+        "/control/motor_controller inactive",
+        "/planning/planner inactive",
+        "/perception/sensor_simulator inactive",
+    ]
+
+
+def test_a_node_is_deactivated_and_activated_from_another_terminal(log: Path) -> None:
+    with running(log, "pipeline") as run:
+        run.wait_for("3 of 3 nodes active")
+        expected = dict.fromkeys(
+            ["/control/motor_controller", "/perception/sensor_simulator", "/planning/planner"],
+            "active",
+        )
+        assert json.loads(compose("lifecycle", "nodes", "--json").stdout) == expected
+        done = compose("lifecycle", "set", "planner", "deactivate")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout == "/planning/planner: active -> inactive\n"
+        run.wait_for("[compose] /planning/planner inactive")
+        assert compose("lifecycle", "get", "planner").stdout == "inactive\n"
+        assert set(compose("lifecycle", "list", "planner").stdout.split()) == {
+            "activate",
+            "cleanup",
+            "shutdown",
+        }
+        refused = compose("lifecycle", "set", "planner", "configure")
+        assert (refused.returncode, refused.stdout) == (1, "")
+        assert "'configure' is not possible: /planning/planner is inactive" in refused.stderr
+        assert "possible now: " in refused.stderr
+        assert compose("lifecycle", "set", "/planning/planner", "activate").returncode == 0
+        assert run.stop()[0] == 0
+
+
+def test_autostart_and_namespace(log: Path) -> None:
+    arguments = ("pipeline", "--autostart", "inactive", "--namespace", "/robot1")
+    with running(log, *arguments) as run:
+        run.wait_for("0 of 3 nodes active")
+        got = compose("lifecycle", "get", "/robot1/planning/planner")
+        assert got.stdout == "inactive\n"
+        assert run.stop()[0] == 0
+
+
+def test_simulated_time_from_the_command_line_and_back_from_another_terminal(log: Path) -> None:
+    with running(log, "talker_listener", "--use-sim-time", "--for", "60") as run:
+        run.wait_for("2 of 2 nodes active")
+        assert compose("param", "get", "/talker", "use_sim_time").stdout.strip() == "true"
+        assert "Received" not in run.log.read_text()  # there is no /clock
+        assert compose("param", "set", "/talker", "use_sim_time", "false").returncode == 0
+        run.wait_for("Received: Sensor reading 0")
+
+
+def test_a_node_that_fails_ends_the_run_with_exit_code_1(tmp_path: Path) -> None:
+    (tmp_path / "sour.py").write_text(
+        "from composer.behavior import Behavior\n\n\n"
+        "class Sour(Behavior):\n"
+        "    def on_activate(self) -> None:\n"
+        "        raise RuntimeError('no milk')\n"
+    )
+    (tmp_path / "sour.yaml").write_text(
+        "system: sour\nnodes:\n  good: {}\n  bad: {behavior: 'sour:Sour'}\n"
+    )
+    done = compose("run", str(tmp_path / "sour.yaml"))
+    assert done.returncode == 1
+    assert "no milk" in done.stderr
+    assert "rolling back because of /bad" in done.stderr
+    assert states_in(done.stderr)[-1].endswith("finalized")
+
+
+def test_an_environment_that_ros_would_misread_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "-1")
+    for arguments in (["run", "minimal", "--for", "1"], ["lifecycle", "nodes"]):
+        done = compose(*arguments)
+        assert done.returncode == 1
+        assert "compose: ROS_DOMAIN_ID is '-1'" in done.stderr
+
+
+def test_an_interface_package_that_is_not_built_is_told_before_anything_starts(
+    tmp_path: Path,
+) -> None:
+    package = tmp_path / "interfaces" / "arm_interfaces"
+    (package / "msg").mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>arm_interfaces</name></package>")
+    (package / "msg" / "Grip.msg").write_text("float64 force\n")
+    (tmp_path / "composer.yaml").write_text("interfaces: [interfaces]\n")
+    system = tmp_path / "arm.yaml"
+    port = "{type: arm_interfaces/msg/Grip, qos: command, external: true}"
+    system.write_text(f"system: arm\nnodes:\n  arm: {{subscriptions: {{grip: {port}}}}}\n")
+    done = compose("run", system)
+    assert done.returncode == 1
+    assert "'arm_interfaces' of node 'arm' is not installed for this Python\n" in done.stderr
+    assert "  colcon build --packages-select arm_interfaces" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "kind"),
+    [("node list", "node"), ("topic list", "topic"), ("lifecycle nodes", "lifecycle node")],
+)
+def test_an_empty_list_is_explained(command: str, kind: str) -> None:
+    done = compose(*command.split())
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr.startswith(f"no {kind} was found: ")
+
+
+def test_no_nodes_at_all_is_told_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
+    started_s = time.monotonic()
+    done = compose("lifecycle", "get", "planner", "--timeout", "1")
+    assert time.monotonic() - started_s < 15.0
+    assert done.returncode == 1
+    assert "no lifecycle node was found at all" in done.stderr
+
+
+def test_ctrl_c_ends_a_waiting_command_without_a_traceback(peer: Peer) -> None:
+    process = subprocess.Popen(
+        [*COMPOSE, "topic", "pub", "/unheard", "std_msgs/msg/Empty", "--once", "--timeout", "60"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+    # It says nothing until it ends, but its publisher is seen: from then on it waits.
+    wait_until(lambda: peer.node.count_publishers("/unheard"), "the command")
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, out) == (130, "")
+    assert "Traceback" not in err
+
+
+LOADING = """
+import sys
+import time
+
+class Slow:
+    def find_spec(self, name, path=None, target=None):
+        if name == "rclpy":
+            print("loading", flush=True)
+            time.sleep(60)  # is to be interrupted
+
+sys.meta_path.insert(0, Slow())
+from composer.cli import main
+sys.exit(main(["run", "pipeline"]))
+"""
+
+
+def test_ctrl_c_ends_a_run_that_is_still_loading_ros() -> None:
+    command = [sys.executable, "-c", LOADING]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "loading\n"
+        process.send_signal(signal.SIGINT)
+        _, error = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, error) == (-signal.SIGINT, "")

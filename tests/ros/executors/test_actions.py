@@ -1,0 +1,282 @@
+"""rclpy's action servers and clients on every kind of executor, to and from another process."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from action_msgs.msg import GoalStatus
+from composer_interfaces.action import Navigate
+from rcl_interfaces.srv import ListParameters
+from rclpy.action import ActionClient, ActionServer
+from rclpy.action.server import CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+
+from composer.runtime.executors import actions
+from composer.runtime.executors.tasks import sleep
+from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
+
+ERRORS = [ValueError, SystemExit, KeyboardInterrupt]
+
+
+@pytest.fixture(params=KINDS)
+def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    with bench(request.param) as running:
+        yield running
+
+
+@pytest.fixture
+def server(on: Bench) -> Iterator[ActionServer]:
+    with serving(on) as running:
+        yield running
+
+
+class serving:  # noqa: N801
+    """An action server that goes in three steps, or on and on when it is slow."""
+
+    def __init__(self, on: Bench, **options: Any) -> None:
+        self.on = on
+        callbacks: dict[str, Any] = {
+            "execute_callback": self.execute,
+            "goal_callback": self.accept,
+            "cancel_callback": lambda _: CancelResponse.ACCEPT,
+            "callback_group": ReentrantCallbackGroup(),
+            **options,
+        }
+        self.server = ActionServer(on.node, Navigate, "navigate", **callbacks)
+        on.loop.add_action_server(self.server)
+
+    def accept(self, goal: Navigate.Goal) -> GoalResponse:
+        return GoalResponse.ACCEPT if goal.max_velocity > 0 else GoalResponse.REJECT
+
+    async def execute(self, goal: Any) -> Navigate.Result:
+        for step in range(3 if goal.request.max_velocity >= 1.0 else 10_000):
+            if goal.is_cancel_requested:
+                goal.canceled()
+                return Navigate.Result(message="canceled")
+            goal.publish_feedback(Navigate.Feedback(progress_percent=float(step)))
+            await sleep(self.on.loop, 0.01)
+        goal.succeed()
+        return Navigate.Result(success=True, message="arrived")
+
+    def __enter__(self) -> ActionServer:
+        return self.server
+
+    def __exit__(self, *_: object) -> None:
+        self.on.loop.remove(self.server)
+        self.server.destroy()
+
+
+@pytest.mark.usefixtures("server")
+class TestServer:
+    def test_a_goal_of_another_process_runs_with_feedback_to_its_result(self) -> None:
+        with peer("send_goal", "navigate", 1.0, "") as process:
+            seen = json.loads(last_line(process))
+        assert seen["status"] == GoalStatus.STATUS_SUCCEEDED
+        assert seen["message"] == "arrived"
+        assert seen["feedback"] == [0.0, 1.0, 2.0]
+
+    def test_a_goal_can_be_canceled(self) -> None:
+        with peer("send_goal", "navigate", 0.1, "cancel") as process:
+            seen = json.loads(last_line(process))
+        assert seen["canceling"] == 1
+        assert seen["status"] == GoalStatus.STATUS_CANCELED
+        assert seen["message"] == "canceled"
+
+    def test_a_goal_can_be_rejected(self) -> None:
+        with peer("send_goal", "navigate", 0.0, "") as process:
+            assert json.loads(last_line(process)) == {"accepted": False}
+
+
+def own_client(on: Bench) -> ActionClient:
+    client = ActionClient(on.node, Navigate, "navigate", callback_group=ReentrantCallbackGroup())
+    on.loop.add_action_client(client)
+    wait_until(client.server_is_ready)
+    return client
+
+
+def wait_for(future: Any) -> Any:
+    wait_until(future.done)
+    return future.result()
+
+
+def test_a_client_that_is_destroyed_while_the_loop_looks_at_it_is_no_error(on: Bench) -> None:
+    """rclpy finds that it is destroyed, and adds it to its wait set nonetheless."""
+    client = ActionClient(on.node, Navigate, "nowhere", callback_group=ReentrantCallbackGroup())
+    on.loop.add_action_client(client)
+    client._client_handle.destroy_when_not_in_use()  # as destroy begins, and an executor comes by
+    for _ in range(3):
+        on.loop.run(lambda: None)
+    on.loop.remove(client)
+    client.destroy()
+    assert on.errors() == []
+
+
+def test_an_answer_waits_until_its_request_is_noted_down(
+    on: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """rclpy does that after sending, in several steps: what is done in between never goes."""
+    monkeypatch.setattr(actions, "_RETRIES", 5000)
+    has_come = threading.Event()
+    is_early = actions.ActionSource._is_early
+
+    def watched(source: actions.ActionSource, taken: Any) -> bool:
+        early = is_early(source, taken)
+        has_come.set()
+        return early
+
+    monkeypatch.setattr(actions.ActionSource, "_is_early", watched)
+    with serving(on):
+        client = own_client(on)
+
+        def add_late(future: Any) -> None:
+            has_come.wait(10.0)
+            ActionClient.add_future(client, future)
+
+        monkeypatch.setattr(client, "add_future", add_late)
+        assert not wait_for(client.send_goal_async(Navigate.Goal(max_velocity=0.0))).accepted
+        wait_until(lambda: not client._futures, "nothing is left")
+        on.loop.remove(client)
+        client.destroy()
+    assert on.reports == []
+
+
+@pytest.mark.parametrize("error", ERRORS)
+@pytest.mark.parametrize("kind", ["plain", "async"])
+def test_a_goal_whose_execution_raises_is_aborted(
+    on: Bench, error: type[BaseException], kind: str
+) -> None:
+    def fall_over(goal: Any) -> None:
+        raise error
+
+    async def fall_over_later(goal: Any) -> None:
+        await sleep(on.loop, 0.01)
+        raise error
+
+    execute = fall_over if kind == "plain" else fall_over_later
+    with serving(on, execute_callback=execute):
+        client = own_client(on)
+        handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=1.0)))
+        assert handle.accepted
+        assert wait_for(handle.get_result_async()).status == GoalStatus.STATUS_ABORTED
+        on.loop.remove(client)
+        client.destroy()
+    assert on.errors() == [error]
+
+
+@pytest.mark.parametrize("error", ERRORS)
+def test_a_goal_whose_acceptance_raises_is_rejected(on: Bench, error: type[BaseException]) -> None:
+    def fall_over(goal: Any) -> GoalResponse:
+        raise error
+
+    with serving(on, goal_callback=fall_over):
+        client = own_client(on)
+        handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=1.0)))
+        assert not handle.accepted
+        on.loop.remove(client)
+        client.destroy()
+    assert on.errors() == [error]
+
+
+def test_a_goal_that_is_taken_but_not_started_is_aborted_when_that_raises(on: Bench) -> None:
+    def fall_over(goal: Any) -> None:
+        raise ValueError("broken")
+
+    with serving(on, handle_accepted_callback=fall_over):
+        client = own_client(on)
+        handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=1.0)))
+        assert wait_for(handle.get_result_async()).status == GoalStatus.STATUS_ABORTED
+        on.loop.remove(client)
+        client.destroy()
+    assert on.errors() == [ValueError]
+
+
+def test_a_cancellation_whose_callback_raises_is_refused(on: Bench) -> None:
+    refused: list[bool] = []
+
+    def fall_over(goal: Any) -> CancelResponse:
+        raise ValueError("broken")
+
+    async def execute(goal: Any) -> Navigate.Result:
+        while not refused:
+            await sleep(on.loop, 0.01)
+        goal.succeed()
+        return Navigate.Result()
+
+    with serving(on, cancel_callback=fall_over, execute_callback=execute):
+        client = own_client(on)
+        handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=1.0)))
+        assert wait_for(handle.cancel_goal_async()).goals_canceling == []
+        refused.append(True)
+        assert wait_for(handle.get_result_async()).status == GoalStatus.STATUS_SUCCEEDED
+        on.loop.remove(client)
+        client.destroy()
+    assert on.errors() == [ValueError]
+
+
+def test_results_nobody_fetched_expire(on: Bench) -> None:
+    with serving(on, result_timeout=0.2) as server:
+        client = own_client(on)
+        handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=1.0)))
+        wait_until(lambda: handle.status == GoalStatus.STATUS_SUCCEEDED)
+        wait_until(lambda: not server._goal_handles, "the goal is forgotten")
+        unknown = wait_for(handle.get_result_async())
+        assert unknown.status == GoalStatus.STATUS_UNKNOWN
+        on.loop.remove(client)
+        client.destroy()
+    assert on.reports == []
+
+
+def answers(asking: Any) -> bool:
+    """Tell whether the answers of a server get here: it may find us later than we found it."""
+    future = asking.call_async(ListParameters.Request())
+    until = time.monotonic() + 1.0
+    while not future.done() and time.monotonic() < until:
+        time.sleep(0.002)
+    return bool(future.done())
+
+
+class TestClient:
+    """Against a server in another process."""
+
+    @pytest.fixture
+    def client(self, on: Bench) -> Iterator[ActionClient]:
+        with peer("navigate", "navigate") as process:
+            wait_for_line(process, "serving")
+            client = own_client(on)
+            # Announced in order: who knows of this one knows of all that the client is made of.
+            last = on.client(ListParameters, f"peer_{process.pid}/list_parameters")
+            wait_until(last.service_is_ready)
+            wait_until(lambda: answers(last), "the server knows of the client")
+            yield client
+            on.loop.remove(client)
+            client.destroy()
+        assert on.reports == []
+
+    def test_gets_acceptance_feedback_status_and_result(self, client: ActionClient) -> None:
+        seen: list[float] = []
+        handle = wait_for(
+            client.send_goal_async(
+                Navigate.Goal(max_velocity=1.0),
+                feedback_callback=lambda message: seen.append(message.feedback.progress_percent),
+            )
+        )
+        assert handle.accepted
+        end = wait_for(handle.get_result_async())
+        assert end.status == GoalStatus.STATUS_SUCCEEDED
+        assert end.result.message == "arrived"
+        wait_until(lambda: seen == [0.0, 1.0, 2.0])
+        wait_until(lambda: handle.status == GoalStatus.STATUS_SUCCEEDED)
+
+    def test_cancels(self, client: ActionClient) -> None:
+        handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=0.1)))
+        result = handle.get_result_async()
+        assert len(wait_for(handle.cancel_goal_async()).goals_canceling) == 1
+        assert wait_for(result).status == GoalStatus.STATUS_CANCELED
+
+    def test_hears_of_a_rejection(self, client: ActionClient) -> None:
+        assert not wait_for(client.send_goal_async(Navigate.Goal(max_velocity=0.0))).accepted

@@ -1,0 +1,338 @@
+"""What every kind of executor does alike: calls, timers, tasks, and how it starts and stops."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+from statistics import median
+
+import pytest
+import rclpy
+
+from composer.model import ExecutorKind
+from composer.runtime.executors.factory import make_loop
+from composer.runtime.executors.tasks import Future, sleep
+from tests.ros.support.loops import KINDS, Bench, bench, executor_of, wait_until
+
+
+@pytest.fixture(params=KINDS)
+def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    with bench(request.param) as running:
+        yield running
+
+
+def test_is_called_what_the_system_calls_it(on: Bench) -> None:
+    assert on.loop.name == "default"
+
+
+def test_calls_from_another_thread_begin_in_order(on: Bench) -> None:
+    seen: list[int] = []
+    lock = threading.Lock()
+
+    def note(number: int) -> None:
+        with lock:
+            seen.append(number)
+
+    for number in range(100):
+        on.loop.call_soon(lambda number=number: note(number))
+    wait_until(lambda: len(seen) == 100)
+    assert sorted(seen) == list(range(100))
+
+
+def test_calls_after_a_delay_and_not_before(on: Bench) -> None:
+    called_at: list[float] = []
+    begin = time.monotonic()
+    on.loop.call_later(0.05, lambda: called_at.append(time.monotonic()))
+    wait_until(lambda: called_at)
+    assert called_at[0] - begin >= 0.05
+
+
+def test_a_cancelled_call_does_not_come(on: Bench) -> None:
+    seen: list[str] = []
+    release = threading.Event()
+    for _ in range(3):  # as many as there are threads: the call is cancelled before its time
+        on.loop.call_soon(release.wait)
+    on.loop.call_later(0.01, lambda: seen.append("cancelled")).cancel()
+    release.set()
+    on.loop.call_later(0.05, lambda: seen.append("after"))
+    wait_until(lambda: seen)
+    assert seen == ["after"]
+
+
+@pytest.mark.parametrize("delay_s", [1e12, float("inf")])
+def test_a_delay_may_be_longer_than_anybody_waits(on: Bench, delay_s: float) -> None:
+    on.loop.call_later(delay_s, lambda: None)
+    called: list[int] = []
+    on.loop.call_later(0.01, lambda: called.append(1))
+    wait_until(lambda: called)
+    assert on.loop.run(lambda: "alive", 5.0) == "alive"
+    assert on.reports == []
+
+
+def test_a_timer_keeps_its_rate(on: Bench) -> None:
+    at: list[float] = []
+    timer = on.loop.call_every(0.01, lambda: at.append(time.monotonic()))
+    wait_until(lambda: len(at) >= 50)
+    timer.cancel()
+    assert at[49] - at[0] > 0.4
+    # The median: all may stand still for a moment on a busy machine.
+    assert median(later - earlier for earlier, later in pairwise(at)) < 0.02
+
+
+def test_a_late_timer_skips_and_keeps_its_beat(on: Bench) -> None:
+    period_s = 0.1
+    at: list[float] = []
+
+    def tick() -> None:
+        at.append(time.monotonic())
+        if len(at) == 1:
+            time.sleep(3.2 * period_s)
+
+    begin = time.monotonic()
+    timer = on.loop.call_every(period_s, tick)
+    wait_until(lambda: len(at) >= 8)
+    timer.cancel()
+    assert at[1] - at[0] >= 3.2 * period_s
+    assert at[3] - at[1] > period_s  # not bunched to make up for those missed
+    # Still at multiples of the period: one call at least is not late, however busy the machine.
+    assert min((time_s - begin) % period_s for time_s in at[1:]) < 0.15 * period_s
+
+
+def test_a_timer_cancels_itself(on: Bench) -> None:
+    seen: list[int] = []
+    known = threading.Event()
+
+    def once() -> None:
+        known.wait()
+        seen.append(1)
+        timer.cancel()
+
+    timer = on.loop.call_every(0.02, once)
+    known.set()
+    done: list[int] = []
+    on.loop.call_later(0.1, lambda: done.append(1))
+    wait_until(lambda: done)
+    assert seen == [1]
+
+
+@pytest.mark.parametrize("period_s", [0.0, -1.0, float("nan")])
+def test_a_period_must_be_positive(on: Bench, period_s: float) -> None:
+    with pytest.raises(ValueError, match="must be positive"):
+        on.loop.call_every(period_s, lambda: None)
+
+
+def test_runs_a_task_to_its_result(on: Bench) -> None:
+    async def work() -> str:
+        await sleep(on.loop, 0.02)
+        return "slept"
+
+    future = on.loop.run_task(work())
+    wait_until(future.done)
+    assert future.result() == "slept"
+
+
+def test_cancelling_a_task_s_future_ends_the_coroutine(on: Bench) -> None:
+    seen: list[str] = []
+    begun: list[bool] = []
+
+    async def work() -> None:
+        try:
+            begun.append(True)
+            await Future()
+        finally:
+            seen.append("closed")
+
+    future = on.loop.run_task(work())
+    wait_until(lambda: begun)
+    future.cancel()
+    wait_until(lambda: seen)
+    assert future.cancelled()
+    assert on.reports == []
+
+
+def test_a_task_nobody_awaits_reports_its_exception(on: Bench) -> None:
+    async def work() -> None:
+        raise ValueError("broken")
+
+    on.loop.run_task(work())
+    wait_until(lambda: on.reports)
+    assert [str(error) for _, error in on.reports] == ["broken"]
+
+
+@pytest.mark.parametrize("error", [ValueError, SystemExit, KeyboardInterrupt])
+def test_an_exception_in_a_call_is_reported_and_the_loop_goes_on(
+    on: Bench, error: type[BaseException]
+) -> None:
+    def fall_over() -> None:
+        raise error
+
+    timer = on.loop.call_every(0.01, fall_over)
+    on.loop.call_soon(fall_over)
+    wait_until(lambda: len(on.reports) >= 4)
+    timer.cancel()
+    assert set(on.errors()) == {error}
+    assert all("fall_over" in what for what, _ in on.reports)
+    assert on.loop.run(lambda: "alive", 5.0) == "alive"
+
+
+class TestRun:
+    def test_returns_what_the_function_returns(self, on: Bench) -> None:
+        thread = on.loop.run(threading.get_ident, 5.0)
+        assert thread != threading.get_ident()
+
+    def test_raises_what_the_function_raises(self, on: Bench) -> None:
+        with pytest.raises(ZeroDivisionError):
+            on.loop.run(lambda: 1 / 0, 5.0)
+        assert on.reports == []
+
+    def test_on_the_loop_it_calls_at_once(self, on: Bench) -> None:
+        assert on.loop.run(lambda: on.loop.run(lambda: "inner", 5.0), 5.0) == "inner"
+
+    def test_names_what_takes_too_long_and_where(self, on: Bench) -> None:
+        release = threading.Event()
+
+        def take_too_long() -> None:
+            release.wait()
+
+        with pytest.raises(TimeoutError) as caught:
+            on.loop.run(take_too_long, 1.0)  # so long it may take until it is begun
+        release.set()
+        assert "take_too_long' is still running after 1 s" in str(caught.value)
+        assert "release.wait()" in str(caught.value)
+
+    def test_what_was_not_begun_in_time_is_not_begun(self, on: Bench) -> None:
+        release = threading.Event()
+        seen: list[str] = []
+        for _ in range(3):  # as many as there are threads
+            on.loop.call_soon(release.wait)
+        wait_until(on.loop.where)
+        with pytest.raises(TimeoutError, match="was not begun"):
+            on.loop.run(lambda: seen.append("begun"), 0.1)
+        release.set()
+        assert on.loop.run(lambda: "after", 5.0) == "after"
+        assert seen == []
+
+
+class TestWhere:
+    def test_shows_the_callback_that_runs(self, on: Bench) -> None:
+        release = threading.Event()
+
+        def hang_here() -> None:
+            release.wait()
+
+        on.loop.call_soon(hang_here)
+        wait_until(lambda: "hang_here" in on.loop.where())
+        release.set()
+        wait_until(lambda: on.loop.where() == "")
+
+
+def used_s(on: Bench) -> float:
+    """Return the time of a processor that the threads of the loop have used, and no others.
+
+    In the process there may be what tests before have left. The clock of a thread is numbered as
+    Linux does: see clock_getcpuclockid(3).
+    """
+    return sum(time.clock_gettime(~thread_id << 3 | 6) for thread_id in on.loop.thread_ids())
+
+
+def test_idle_costs_nothing(on: Bench) -> None:
+    on.loop.run(lambda: None, 5.0)
+    before_s = used_s(on)
+    time.sleep(1.0)  # so long it is measured
+    assert used_s(on) - before_s < 0.3  # a spinning loop would use it all
+
+
+def test_waiting_for_a_busy_thread_costs_nothing(on: Bench) -> None:
+    release = threading.Event()
+    for _ in range(6):  # more than there are threads
+        on.loop.call_soon(release.wait)
+    wait_until(on.loop.where)
+    before_s = used_s(on)
+    time.sleep(0.5)  # so long it is measured
+    meanwhile_s = used_s(on) - before_s
+    release.set()
+    assert meanwhile_s < 0.2
+    assert on.loop.run(lambda: "alive", 5.0) == "alive"
+
+
+def test_a_busy_loop_starves_no_other_thread(on: Bench) -> None:
+    # Letting go of the interpreter's lock for a moment is not enough: nobody else is awake by then.
+    on.loop.run_task(_never_idle(on))
+    took_s: list[float] = []
+    while len(took_s) < 3 and not (took_s and took_s[-1] < 2.0):  # slow by chance is not so thrice
+        began_s = time.monotonic()
+        for _ in range(50):
+            time.sleep(0.001)  # each time the thread needs the lock to go on
+        took_s.append(time.monotonic() - began_s)
+    assert min(took_s) < 2.0
+
+
+async def _never_idle(on: Bench) -> None:
+    while True:
+        turn: Future[None] = Future()
+        on.loop.call_soon(lambda turn=turn: turn.set_result(None))
+        await turn
+
+
+class TestStopping:
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_a_loop_that_never_started_stops(self, kind: ExecutorKind) -> None:
+        rclpy.init()
+        try:
+            assert make_loop(executor_of(kind)).stop(1.0)
+        finally:
+            rclpy.shutdown()
+
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_a_busy_loop_does_not_hold_up_who_stops_it(self, kind: ExecutorKind) -> None:
+        rclpy.init()
+        release = threading.Event()
+        try:
+            loop = make_loop(executor_of(kind))
+            loop.start()
+            loop.call_soon(release.wait)
+            wait_until(loop.where)
+            begin = time.monotonic()
+            assert not loop.stop(0.2)
+            assert time.monotonic() - begin < 10.0  # it waits for ever
+            assert "wait" in loop.where()
+            release.set()
+            wait_until(lambda: loop.stop(0.2))
+        finally:
+            release.set()
+            rclpy.shutdown()
+
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_tasks_are_cancelled_and_clean_up(self, kind: ExecutorKind) -> None:
+        seen: list[str] = []
+        with bench(kind) as on:
+            begun: list[bool] = []
+
+            async def work() -> None:
+                begun.append(True)
+                try:
+                    await Future()
+                finally:
+                    await sleep(on.loop, 60.0)  # nobody waits that long
+                    seen.append("too late")
+
+            async def clean() -> None:
+                begun.append(True)
+                try:
+                    await Future()
+                finally:
+                    seen.append("cleaned up")
+
+            futures = [on.loop.run_task(work()), on.loop.run_task(clean())]
+            wait_until(lambda: len(begun) == 2)
+        assert seen == ["cleaned up"]
+        assert all(future.cancelled() for future in futures)
+
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_a_stopped_loop_refuses_to_run(self, kind: ExecutorKind) -> None:
+        with bench(kind) as on:
+            pass
+        with pytest.raises(RuntimeError, match="has stopped"):
+            on.loop.run(lambda: None, 5.0)

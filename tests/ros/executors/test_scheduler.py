@@ -1,0 +1,321 @@
+"""What only the composer's own loop promises: fairness, precise waits, nothing left behind."""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import threading
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from rclpy.qos import HistoryPolicy
+from std_msgs.msg import Int64, String
+from std_srvs.srv import Trigger
+
+from composer.model import ExecutorKind
+from composer.runtime.executors import readiness
+from composer.runtime.executors.entity_sources import Source
+from composer.runtime.executors.event_loop import EventLoop
+from composer.runtime.executors.source_group import Slot
+from composer.runtime.executors.tasks import Future
+from tests.ros.support.loops import Bench, bench, last_line, peer, wait_until
+
+
+@pytest.fixture
+def on() -> Iterator[Bench]:
+    with bench(ExecutorKind.EVENTS) as running:
+        yield running
+
+
+def test_calls_keep_their_order_among_many_threads(on: Bench) -> None:
+    seen: list[tuple[int, int]] = []
+
+    def post(thread: int) -> None:
+        for number in range(500):
+            on.loop.call_soon(lambda number=number: seen.append((thread, number)))
+
+    threads = [threading.Thread(target=post, args=(thread,)) for thread in range(4)]
+    for thread in threads:
+        thread.start()
+    wait_until(lambda: len(seen) == 2000)
+    for number in range(4):
+        assert [what[1] for what in seen if what[0] == number] == list(range(500))
+
+
+def test_waking_it_takes_far_less_than_a_millisecond(on: Bench) -> None:
+    delays_s: list[float] = []
+    for _ in range(50):
+        time.sleep(0.002)  # until it sleeps
+        begin = time.perf_counter()
+        on.loop.run(lambda begin=begin: delays_s.append(time.perf_counter() - begin), 5.0)
+    assert sorted(delays_s)[25] < 0.002  # the median; the machine may be busy
+
+
+def test_timers_do_not_wait_for_whole_milliseconds(on: Bench) -> None:
+    at: list[float] = []
+    timer = on.loop.call_every(0.0005, lambda: at.append(time.monotonic()))
+    wait_until(lambda: len(at) > 400)
+    timer.cancel()
+    gaps_s = sorted(later - earlier for earlier, later in pairwise(at))
+    assert gaps_s[len(gaps_s) // 2] < 0.0008
+
+
+@pytest.mark.parametrize("post", ["call_soon", "call_later in the past", "call_later at once"])
+def test_a_call_posting_itself_starves_nobody(on: Bench, post: str) -> None:
+    stop: list[bool] = []
+    seen: list[int] = []
+    ticks: list[int] = []
+
+    def again() -> None:
+        if stop:
+            return
+        if post == "call_soon":
+            on.loop.call_soon(again)
+        else:
+            on.loop.call_later(-1.0 if "past" in post else 0.0, again)
+
+    on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
+    on.loop.call_every(0.005, lambda: ticks.append(1))
+    on.loop.call_soon(again)
+    publisher = on.node.create_publisher(Int64, "numbers", 10)
+    publisher.publish(Int64(data=1))
+    wait_until(lambda: seen and len(ticks) > 20)
+    stop.append(True)
+
+
+def test_a_full_queue_starves_no_other_subscription(on: Bench) -> None:
+    flood: list[int] = []
+    served_at: list[int] = []
+    on.subscribe(Int64, "flood", lambda message: flood.append(1), history=HistoryPolicy.KEEP_ALL)
+    on.subscribe(Int64, "rare", lambda message: served_at.append(len(flood)))
+    floods = on.node.create_publisher(Int64, "flood", 2000)
+    rare = on.node.create_publisher(Int64, "rare", 10)
+    wait_until(lambda: floods.get_subscription_count() and rare.get_subscription_count())
+
+    def publish_all() -> None:
+        for number in range(2000):
+            floods.publish(Int64(data=number))
+        rare.publish(Int64(data=0))
+
+    on.loop.run(publish_all, 10.0)
+    wait_until(lambda: len(flood) == 2000)
+    assert len(served_at) == 1
+    assert served_at[0] < 200  # not behind the two thousand
+
+
+def test_an_answer_behind_those_for_others_is_found_at_once(on: Bench) -> None:
+    """A client is sent all answers of its service, and a take passes over one for another."""
+    requests: list[Any] = []
+    on.serve(Trigger, "ask", lambda _, reply: requests.append(reply))
+    clients = [on.client(Trigger, "ask") for _ in range(2)]
+    wait_until(lambda: all(client.service_is_ready() for client in clients))
+    futures = []
+    for client in (clients[0], clients[0], clients[0], clients[1]):
+        futures.append(client.call_async(Trigger.Request()))
+        wait_until(lambda: len(requests) == len(futures))
+    answers_there = readiness.Signal()
+    probe = on.node.create_client(Trigger, "ask")
+    answers_there.attach(probe.handle, readiness.RESPONSE)
+    seen: list[int] = []
+
+    def answer_all() -> None:  # and keep the loop from looking until everybody has got them
+        for number, reply in enumerate(requests):
+            reply(Trigger.Response(message=str(number)))
+        until_s = time.monotonic() + 5.0
+        while sum(seen) < len(requests) and time.monotonic() < until_s:
+            seen.append(answers_there.count())
+
+    on.loop.run(answer_all, 10.0)
+    wait_until(lambda: all(future.done() for future in futures))
+    assert [future.result().message for future in futures] == ["0", "1", "2", "3"]
+    answers_there.close()
+    on.node.destroy_client(probe)
+
+
+def slot_of(on: Bench, subscription: object) -> Slot:
+    assert isinstance(on.loop, EventLoop)
+    return on.loop._slots_of[subscription]
+
+
+def takes_of(slot: Slot) -> list[bool]:
+    """Return what says from now on, for each take of the slot's source, whether something came."""
+    takes: list[bool] = []
+    source: Any = slot.sources[0]
+    take = source.take
+
+    def counted() -> Any:
+        taken = take()
+        takes.append(taken is not None)
+        return taken
+
+    source.take = counted
+    return takes
+
+
+def test_what_a_full_queue_dropped_is_not_looked_for_again(on: Bench) -> None:
+    seen: list[int] = []
+    subscription = on.subscribe(
+        Int64, "numbers", lambda message: seen.append(message.data), depth=3
+    )
+    takes = takes_of(slot_of(on, subscription))
+    publisher = on.node.create_publisher(Int64, "numbers", 50)
+    wait_until(publisher.get_subscription_count)
+
+    def publish() -> None:
+        for number in range(50):
+            publisher.publish(Int64(data=number))
+
+    on.loop.run(publish, 10.0)
+    wait_until(lambda: seen[-1:] == [49])
+    on.loop.run(lambda: None, 5.0)
+    assert seen == [47, 48, 49]
+    assert takes.count(True) == 3
+    assert takes.count(False) <= 2, "one look into the empty queue, and perhaps one at the start"
+
+
+def test_a_message_is_taken_once_and_nothing_is_looked_for_after_it(on: Bench) -> None:
+    seen: list[int] = []
+    subscription = on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
+    publisher = on.node.create_publisher(Int64, "numbers", 10)
+    wait_until(publisher.get_subscription_count)
+    for _ in range(2):  # once round, so that it has looked for what came before
+        on.loop.run(lambda: None, 5.0)
+    takes = takes_of(slot_of(on, subscription))
+    for number in range(20):
+        publisher.publish(Int64(data=number))
+        wait_until(lambda number=number: seen[-1:] == [number])
+    assert takes == [True] * 20
+
+
+class Striking(tuple[Source, ...]):
+    """Sources that cannot be gone through the first time, as if the thread were struck there."""
+
+    struck = False
+
+    def __iter__(self) -> Iterator[Source]:
+        if not self.struck:
+            self.struck = True
+            raise SystemExit
+        return super().__iter__()
+
+
+def test_an_exception_between_two_callbacks_loses_nothing(on: Bench) -> None:
+    seen: list[int] = []
+    subscription = on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
+    publisher = on.node.create_publisher(Int64, "numbers", 10)
+    wait_until(publisher.get_subscription_count)
+    slot = slot_of(on, subscription)
+    slot.sources = Striking(slot.sources)
+
+    def publish() -> None:
+        for number in range(5):
+            publisher.publish(Int64(data=number))
+
+    on.loop.run(publish, 5.0)
+    wait_until(lambda: seen == [0, 1, 2, 3, 4])
+    assert on.errors() == [SystemExit]
+
+
+def test_destroying_before_removing_is_survived(on: Bench) -> None:
+    """The wrong order: the destruction is put off until the loop has let go."""
+    for _ in range(20):
+        subscription = on.subscribe(Int64, "numbers", lambda message: None)
+        publisher = on.node.create_publisher(Int64, "numbers", 10)
+        on.node.destroy_subscription(subscription)
+        publisher.publish(Int64(data=1))
+        on.loop.run(lambda: None, 5.0)
+        on.loop.remove(subscription)
+        on.node.destroy_publisher(publisher)
+    assert on.reports == []
+
+
+def test_a_callback_may_remove_and_destroy_its_own_subscription(on: Bench) -> None:
+    seen: list[int] = []
+
+    def once(message: Int64) -> None:
+        seen.append(message.data)
+        on.loop.remove(subscription)
+        on.node.destroy_subscription(subscription)
+
+    subscription = on.subscribe(Int64, "numbers", once)
+    publisher = on.node.create_publisher(Int64, "numbers", 10)
+
+    def publish() -> None:
+        for number in range(5):
+            publisher.publish(Int64(data=number))
+
+    on.loop.run(publish, 5.0)
+    wait_until(lambda: seen)
+    on.loop.run(lambda: None, 5.0)
+    assert seen == [0]
+    assert on.reports == []
+
+
+def test_no_file_descriptor_is_left_behind() -> None:
+    def descriptors() -> int:
+        return len(os.listdir("/proc/self/fd"))  # noqa: PTH208  a directory of links that vanish
+
+    counts = []
+    for _ in range(4):
+        with bench(ExecutorKind.EVENTS) as on:
+            for _ in range(10):
+                kept = on.subscribe(String, "texts", lambda message: None)
+                on.serve(Trigger, "ask", lambda request, reply: None)
+                on.client(Trigger, "ask")
+                on.loop.remove(kept)
+        del on, kept
+        gc.collect()
+        counts.append(descriptors())
+    wait_until(lambda: descriptors() <= counts[1])
+
+
+def test_stopping_in_a_flood_ends_cleanly() -> None:
+    with peer("flood", "flood", 10_000_000, 10):  # never over: it is killed
+        for _ in range(3):
+            with bench(ExecutorKind.EVENTS) as on:
+                seen: list[int] = []
+                on.subscribe(Int64, "flood", lambda message, seen=seen: seen.append(1))
+                wait_until(lambda seen=seen: seen)
+            assert on.reports == []
+
+
+def test_taking_under_a_flood_of_another_process_never_locks_up(on: Bench) -> None:
+    """With a Python callback on the middleware's thread this stood still within a second."""
+    seen: list[int] = []
+    on.subscribe(Int64, "flood", lambda message: seen.append(message.data), depth=10)
+    with peer("flood", "flood", 20_000, 10) as process:
+        assert json.loads(last_line(process)) == 20_000
+    assert on.loop.run(lambda: "alive", 5.0) == "alive"
+    assert len(seen) > 100
+    assert seen == sorted(seen)
+
+
+def test_a_cancelled_task_in_a_stopping_loop_is_not_reported() -> None:
+    with bench(ExecutorKind.EVENTS) as on:
+
+        async def wait() -> None:
+            await Future()
+
+        future = on.loop.run_task(wait())
+    assert future.cancelled()
+    assert on.reports == []
+
+
+def test_a_failing_exception_handler_does_not_end_the_loop(
+    on: Bench, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def fall_over() -> None:
+        raise ValueError("broken")
+
+    class Full(list[tuple[str, BaseException]]):
+        def append(self, _: object) -> None:
+            raise RuntimeError("no room for reports")
+
+    on.loop._on_exception = lambda *report: Full().append(report)  # type: ignore[attr-defined]
+    on.loop.call_soon(fall_over)
+    assert on.loop.run(lambda: "alive", 5.0) == "alive"
+    assert "no room for reports" in capfd.readouterr().err

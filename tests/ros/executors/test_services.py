@@ -1,0 +1,256 @@
+"""Services and clients on every kind of executor, to and from another process."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import rclpy
+from builtin_interfaces.msg import Time
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import GetLoggerLevels, SetParameters
+from rclpy.lifecycle import LifecycleNode
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
+from type_description_interfaces.srv import GetTypeDescription
+
+from composer.runtime.executors.tasks import Future, sleep, within, wrap_future
+from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
+
+ERRORS = [ValueError, SystemExit, KeyboardInterrupt]
+
+
+@pytest.fixture(params=KINDS)
+def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    with bench(request.param) as running:
+        yield running
+
+
+def call(on: Bench, client: Any, request: Any) -> Any:
+    """Call from a task of the loop and wait for the answer."""
+
+    async def ask() -> Any:
+        return await client.call_async(request)
+
+    wait_until(client.service_is_ready)
+    future = on.loop.run_task(ask())
+    wait_until(future.done)
+    return future.result()
+
+
+def test_a_request_of_another_process_is_answered(on: Bench) -> None:
+    on.serve(Trigger, "ask", lambda _, reply: reply(Trigger.Response(success=True, message="now")))
+    with peer("call", "ask", 3) as process:
+        assert json.loads(last_line(process)) == [[True, "now"]] * 3
+
+
+def test_answers_may_come_later_and_in_any_order(on: Bench) -> None:
+    waiting: list[Any] = []
+
+    def keep(request: Trigger.Request, reply: Any) -> None:
+        waiting.append(reply)
+        if len(waiting) == 3:
+            on.loop.call_later(0.05, answer)
+
+    def answer() -> None:
+        for number, reply in reversed(list(enumerate(waiting))):
+            reply(Trigger.Response(success=True, message=f"answer {number}"))
+
+    on.serve(Trigger, "ask", keep)
+    with peer("call", "ask", 3) as process:
+        answers = json.loads(last_line(process))
+    assert answers == [[True, f"answer {number}"] for number in range(3)]
+
+
+def test_a_request_is_answered_once(on: Bench) -> None:
+    replies: list[Any] = []
+    on.serve(Trigger, "ask", lambda _, reply: replies.append(reply))
+    client = on.client(Trigger, "ask")
+    wait_until(client.service_is_ready)
+    future = client.call_async(Trigger.Request())
+    wait_until(lambda: replies)
+    with pytest.raises(TypeError):
+        replies[0]("nonsense")
+    replies[0](Trigger.Response(success=True))
+    with pytest.raises(RuntimeError, match="answered already"):
+        replies[0](Trigger.Response())
+    wait_until(future.done)
+    assert future.result().success
+
+
+@pytest.mark.parametrize("error", ERRORS)
+def test_when_the_callback_raises_the_caller_gets_an_answer(
+    on: Bench, error: type[BaseException]
+) -> None:
+    def fall_over(request: Trigger.Request, reply: Any) -> None:
+        raise error
+
+    on.serve(Trigger, "ask", fall_over)
+    client = on.client(Trigger, "ask")
+    for _ in range(2):
+        assert not call(on, client, Trigger.Request()).success
+    wait_until(lambda: len(on.reports) == 2)  # on several threads an answer may be faster
+    assert on.errors() == [error] * 2
+    assert "service 'ask'" in on.reports[0][0]
+
+
+def test_a_client_gets_the_answer_of_another_process(on: Bench) -> None:
+    client = on.client(Trigger, "ask")
+    with peer("serve", "ask") as process:
+        wait_for_line(process, "serving")
+        wait_until(client.service_is_ready)
+        seen: list[str] = []
+
+        def ask() -> None:  # again and again: the server may find the client later than that it
+            future = client.call_async(Trigger.Request())
+            future.add_done_callback(lambda done: seen.append(done.result().message))
+
+        timer = on.loop.call_every(0.2, ask)
+        wait_until(lambda: seen)
+        timer.cancel()
+    assert set(seen) == {"from the peer"}
+
+
+def test_a_call_nobody_answers_times_out_and_is_forgotten(on: Bench) -> None:
+    on.serve(Trigger, "ask", lambda _, reply: None)
+    client = on.client(Trigger, "ask")
+    wait_until(client.service_is_ready)
+
+    async def ask() -> Any:
+        answer = wrap_future(client.call_async(Trigger.Request()))
+        return await within(on.loop, answer, 0.1)
+
+    future = on.loop.run_task(ask())
+    wait_until(future.done)
+    with pytest.raises(TimeoutError):
+        future.result()
+    wait_until(lambda: not client._pending_requests)
+
+
+def test_an_answer_after_the_timeout_harms_nobody(on: Bench) -> None:
+    replies: list[Any] = []
+    on.serve(Trigger, "ask", lambda _, reply: replies.append(reply))
+    client = on.client(Trigger, "ask")
+    wait_until(client.service_is_ready)
+    client.call_async(Trigger.Request()).cancel()
+    wait_until(lambda: len(replies) == 1)
+    replies[0](Trigger.Response(success=True))
+    second = client.call_async(Trigger.Request())
+    wait_until(lambda: len(replies) == 2)
+    replies[1](Trigger.Response(success=True, message="second"))
+    wait_until(second.done)
+    assert second.result().message == "second"
+    assert on.reports == []
+
+
+def test_an_exception_in_a_done_callback_is_reported(on: Bench) -> None:
+    on.serve(Trigger, "ask", lambda _, reply: reply(Trigger.Response()))
+    client = on.client(Trigger, "ask")
+    wait_until(client.service_is_ready)
+
+    def fall_over(_: object) -> None:
+        raise ValueError("broken")
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        client.call_async(Trigger.Request()).add_done_callback(fall_over)
+        wait_until(lambda: on.reports)
+    assert on.errors() == [ValueError]
+    assert "fall_over" in on.reports[0][0]
+
+
+def test_a_hundred_calls_at_once_are_all_answered(on: Bench) -> None:
+    on.serve(Trigger, "ask", lambda _, reply: reply(Trigger.Response(success=True)))
+    client = on.client(Trigger, "ask")
+    wait_until(client.service_is_ready)
+
+    async def ask_all() -> int:
+        answers = 0
+        for _ in range(10):
+            futures = [client.call_async(Trigger.Request()) for _ in range(10)]
+            for future in futures:
+                answers += (await future).success
+        return answers
+
+    outcome: Future[int] = on.loop.run_task(ask_all())
+    wait_until(outcome.done)
+    assert outcome.result() == 100
+
+
+@pytest.fixture
+def managed(on: Bench) -> Iterator[None]:
+    """A lifecycle node of rclpy, ``/managed``, on the same loop."""
+    node = LifecycleNode("managed")
+    on.loop.add_node(node)
+    yield
+    on.loop.remove_node(node)
+    node.destroy_node()
+
+
+@pytest.mark.usefixtures("managed")
+class TestWhatALifecycleNodeBringsAlong:
+    def test_lifecycle_services_answer(self, on: Bench) -> None:
+        client = on.client(GetState, "managed/get_state")
+        assert call(on, client, GetState.Request()).current_state.label == "unconfigured"
+
+    @pytest.mark.parametrize("transition_id", [3, 250])
+    def test_an_illegal_transition_is_refused_and_ends_nothing(
+        self, on: Bench, transition_id: int
+    ) -> None:
+        client = on.client(ChangeState, "managed/change_state")
+        request = ChangeState.Request()
+        request.transition.id = transition_id
+        assert not call(on, client, request).success
+        wait_until(lambda: on.reports)  # on several threads the answer may be faster
+        assert len(on.reports) == 1
+        state = call(on, on.client(GetState, "managed/get_state"), GetState.Request())
+        assert state.current_state.label == "unconfigured"
+
+
+class TestWhatEveryNodeBringsAlong:
+    def test_parameters_can_be_set(self, on: Bench) -> None:
+        on.node.declare_parameter("speed", 1.0)
+        client = on.client(SetParameters, "bench/set_parameters")
+        value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=2.5)
+        request = SetParameters.Request(parameters=[Parameter(name="speed", value=value)])
+        assert call(on, client, request).results[0].successful
+        assert on.node.get_parameter("speed").value == 2.5
+
+    def test_logger_levels_can_be_asked_for(self, on: Bench) -> None:
+        client = on.client(GetLoggerLevels, "bench/get_logger_levels")
+        answer = call(on, client, GetLoggerLevels.Request(names=["bench"]))
+        assert [level.name for level in answer.levels] == ["bench"]
+
+    def test_types_can_be_asked_for(self, on: Bench) -> None:
+        client = on.client(GetTypeDescription, "bench/get_type_description")
+        request = GetTypeDescription.Request(type_name="std_srvs/srv/Trigger", type_hash="wrong")
+        assert "parse type hash" in call(on, client, request).failure_reason
+
+    def test_the_clock_follows_simulated_time(self, on: Bench) -> None:
+        on.node.set_parameters([rclpy.parameter.Parameter("use_sim_time", value=True)])
+        publisher = on.node.create_publisher(Clock, "/clock", 10)
+        wait_until(publisher.get_subscription_count)
+        publisher.publish(Clock(clock=Time(sec=1234)))
+        wait_until(lambda: on.node.get_clock().now().nanoseconds == 1234 * 10**9)
+
+    @pytest.mark.parametrize("kind", ["plain", "async"])
+    def test_a_service_the_node_came_with_is_served_by_its_own_callback(
+        self, on: Bench, kind: str
+    ) -> None:
+        def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            response.message = "plain"
+            return response
+
+        async def answer_later(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            await sleep(on.loop, 0.01)
+            response.message = "async"
+            return response
+
+        on.loop.remove_node(on.node)
+        on.node.create_service(Trigger, "own", answer if kind == "plain" else answer_later)
+        on.loop.add_node(on.node)
+        assert call(on, on.client(Trigger, "own"), Trigger.Request()).message == kind

@@ -1,0 +1,195 @@
+"""Topics on every kind of executor, to and from another process."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+from statistics import median
+
+import pytest
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+from std_msgs.msg import Int64, String
+
+from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
+
+
+@pytest.fixture(params=KINDS)
+def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    with bench(request.param) as running:
+        yield running
+
+
+def test_messages_of_another_process_arrive_in_order(on: Bench) -> None:
+    seen: list[int] = []
+    on.subscribe(Int64, "numbers", lambda message: seen.append(message.data), depth=300)
+    with peer("flood", "numbers", 200, 300):
+        wait_until(lambda: len(seen) == 200)
+    assert sorted(seen) == list(range(200))
+    assert on.reports == []
+
+
+def test_messages_reach_another_process(on: Bench) -> None:
+    publisher = on.node.create_publisher(String, "texts", 1000)
+    numbers = iter(range(1_000_000))
+    with peer("collect", "texts", 5) as process:
+        wait_until(publisher.get_subscription_count)
+        timer = on.loop.call_every(
+            0.01, lambda: publisher.publish(String(data=f"text {next(numbers)}"))
+        )
+        seen = json.loads(last_line(process))
+        timer.cancel()
+    first = int(seen[0].removeprefix("text "))
+    assert seen == [f"text {first + further}" for further in range(5)]
+
+
+def test_a_late_joiner_gets_what_was_latched(on: Bench) -> None:
+    with peer("latched", "state", "kept") as process:
+        wait_for_line(process, "published")
+        seen: list[str] = []
+        on.subscribe(
+            String,
+            "state",
+            lambda message: seen.append(message.data),
+            depth=1,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL,
+        )
+        wait_until(lambda: seen)
+    assert seen == ["kept"]
+
+
+def test_what_arrived_before_the_subscription_was_added_is_served(on: Bench) -> None:
+    arrived = on.loop.run(lambda: _publish_before_adding(on), 10.0)
+    wait_until(lambda: len(arrived) == 3)
+    assert arrived == [0, 1, 2]
+
+
+def _publish_before_adding(on: Bench) -> list[int]:
+    """Runs on the loop, which therefore serves nothing meanwhile."""
+    arrived: list[int] = []
+    publisher = on.node.create_publisher(Int64, "early", 10)
+    subscription = on.node.create_subscription(Int64, "early", lambda _: None, 10)
+    wait_until(publisher.get_subscription_count)
+    for number in range(3):
+        publisher.publish(Int64(data=number))
+    on.loop.add_subscription(subscription, lambda taken: arrived.append(taken[0].data))
+    return arrived
+
+
+def test_keep_all_loses_nothing_of_a_burst(on: Bench) -> None:
+    seen: list[int] = []
+    on.subscribe(
+        Int64, "burst", lambda message: seen.append(message.data), history=HistoryPolicy.KEEP_ALL
+    )
+    with peer("flood", "burst", 3000, 3000):
+        wait_until(lambda: len(seen) == 3000)
+    assert sorted(seen) == list(range(3000))
+
+
+@pytest.mark.parametrize("error", [ValueError, SystemExit, KeyboardInterrupt])
+def test_an_exception_in_a_callback_is_reported_and_the_next_message_comes(
+    on: Bench, error: type[BaseException]
+) -> None:
+    seen: list[int] = []
+
+    def fall_over(message: Int64) -> None:
+        seen.append(message.data)
+        raise error
+
+    on.subscribe(Int64, "numbers", fall_over)
+    publisher = on.node.create_publisher(Int64, "numbers", 10)
+    for number in range(3):
+        publisher.publish(Int64(data=number))
+        wait_until(lambda number=number: number in seen)
+    wait_until(lambda: len(on.reports) == 3)
+    assert on.errors() == [error] * 3
+    assert all("'numbers'" in what and "fall_over" in what for what, _ in on.reports)
+
+
+def test_after_removal_no_message_comes(on: Bench) -> None:
+    seen: list[int] = []
+    subscription = on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
+    kept: list[int] = []
+    on.subscribe(Int64, "numbers", lambda message: kept.append(message.data))
+    publisher = on.node.create_publisher(Int64, "numbers", 10)
+    publisher.publish(Int64(data=1))
+    wait_until(lambda: seen and kept)
+    on.loop.remove(subscription)
+    on.loop.remove(subscription)  # harmless
+    on.loop.run(lambda: None, 5.0)
+    publisher.publish(Int64(data=2))
+    wait_until(lambda: len(kept) == 2)
+    assert seen == [1]
+    on.node.destroy_subscription(subscription)
+
+
+def test_a_slow_subscription_does_not_hold_up_a_timer(on: Bench) -> None:
+    """A flood of messages, each of them slow, against a timer of 100 Hz."""
+    flood: list[int] = []
+    ticks: list[float] = []
+
+    def work(message: Int64) -> None:
+        flood.append(message.data)
+        time.sleep(0.001)
+
+    on.subscribe(Int64, "flood", work, depth=5000)
+    on.loop.call_every(0.01, lambda: ticks.append(time.monotonic()))
+    with peer("flood", "flood", 1500, 5000):
+        wait_until(lambda: len(flood) > 10)
+        before = len(ticks)
+        wait_until(lambda: len(flood) > 1000)
+        meanwhile = ticks[before:]
+    # The median: all may stand still for a moment on a busy machine.
+    assert median(later - earlier for earlier, later in pairwise(meanwhile)) < 0.02
+
+
+def test_qos_events_reach_their_callback(on: Bench) -> None:
+    policies: list[object] = []
+    on.node.create_subscription(
+        String,
+        "latched",
+        lambda _: None,
+        QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
+        event_callbacks=SubscriptionEventCallbacks(incompatible_qos=policies.append),
+    )
+    on.node.create_publisher(String, "latched", 10)
+    wait_until(lambda: policies)
+    assert policies[0].total_count == 1  # type: ignore[attr-defined]
+    time.sleep(0.05)  # nothing more is to come: there is no state to wait for
+    assert len(policies) == 1
+
+
+def test_entities_come_and_go_in_a_flood(on: Bench) -> None:
+    """Created, added, removed and destroyed on other threads while messages pour in."""
+    stop = threading.Event()
+    total: list[int] = []
+
+    def churn() -> None:
+        while not stop.is_set():
+            created = [
+                on.subscribe(Int64, "flood", lambda message: total.append(message.data))
+                for _ in range(3)
+            ]
+            time.sleep(0.003)
+            for subscription in created:
+                on.loop.remove(subscription)
+                on.node.destroy_subscription(subscription)
+
+    with peer("flood", "flood", 20_000, 10) as process:
+        steady: list[int] = []
+        on.subscribe(Int64, "flood", lambda message: steady.append(message.data))
+        threads = [threading.Thread(target=churn) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        try:
+            last_line(process)
+        finally:
+            stop.set()
+            for thread in threads:
+                thread.join()
+    assert on.loop.run(lambda: "alive", 5.0) == "alive"
+    wait_until(lambda: steady)
+    assert on.reports == []

@@ -1,0 +1,170 @@
+"""Actions between co-located nodes: straight, with the same outcomes as by DDS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from action_msgs.srv import CancelGoal
+
+from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
+
+TEXT = """
+system: going
+delivery: DELIVERY
+executors: {own: {kind: KIND}}
+nodes:
+  server:
+    behavior: going:Server
+    executor: own
+    action_servers: {go: {type: composer_interfaces/action/Navigate, reentrant: true}}
+  client:
+    behavior: going:Client
+    action_clients: {go: {type: composer_interfaces/action/Navigate, timeout_ms: 20000}}
+"""
+MODULE = """
+from composer.behavior import Behavior, BehaviorError
+from composer_interfaces.action import Navigate
+
+class Server(Behavior):
+    def on_configure(self):
+        self.goals = []
+        self.feedback = []
+        self.results = []
+
+    def accept_go(self, goal):
+        return goal.max_velocity >= 0.0
+
+    async def on_go(self, goal):
+        self.goals.append(goal.request)
+        step = 0
+        while step < 3 or goal.request.max_velocity == 0.0:
+            if goal.is_cancel_requested:
+                return Navigate.Result(message="turned back")
+            self.feedback.append(Navigate.Feedback(progress_percent=float(step)))
+            goal.publish_feedback(self.feedback[-1])
+            step += 1
+            await self.clock.sleep(0.001)
+        self.results.append(Navigate.Result(success=True, message="arrived"))
+        return self.results[-1]
+
+class Client(Behavior):
+    def on_configure(self):
+        self.goals = []
+        self.feedback = []
+        self.results = []
+        self.outcomes = []
+        self.sent = None
+
+    async def go(self, max_velocity):
+        self.goals.append(Navigate.Goal(max_velocity=max_velocity))
+        try:
+            self.sent = await self.action_clients.go.send_goal(
+                self.goals[-1], on_feedback=self.feedback.append
+            )
+            ended = await self.sent.result()
+        except BehaviorError as error:
+            self.outcomes.append(type(error).__name__)
+        else:
+            self.results.append(ended.result)
+            self.outcomes.append((ended.status, ended.result.message))
+
+    async def turn_back(self):
+        assert await self.sent.cancel()
+"""
+COPIED = """
+connections:
+  - {action: /go, server: server.go, clients: client.go, isolation: copy}
+"""
+
+
+def go(system: RunningSystem, max_velocity: float) -> Any:
+    """Have the client send a goal and return its behaviour; 0 m/s never arrives."""
+    client = system.node("client")
+    client._behavior.feedback.clear()
+    client._behavior.sent = None
+    client._core.spawn(client._behavior.go(max_velocity))
+    return client._behavior
+
+
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
+@pytest.mark.parametrize("delivery", ["auto", "dds"])
+def test_every_outcome_of_a_goal_is_the_same_either_way(
+    tmp_path: Path, kind: str, delivery: str
+) -> None:
+    text = TEXT.replace("KIND", kind).replace("DELIVERY", delivery)
+    with running(text, tmp_path, going=MODULE) as system:
+        server = system.behavior("server")
+        client = go(system, 1.0)
+        wait_until(lambda: client.outcomes)
+        assert client.outcomes[-1] == ("succeeded", "arrived")
+        assert [item.progress_percent for item in client.feedback] == [0.0, 1.0, 2.0]
+        straight = delivery == "auto"
+        assert (server.goals[0] is client.goals[0]) is straight
+        assert (server.results[0] is client.results[0]) is straight
+
+        go(system, -1.0)
+        wait_until(lambda: len(client.outcomes) == 2)
+        assert client.outcomes[-1] == "GoalRejected"
+
+        go(system, 0.0)
+        wait_until(lambda: client.feedback and client.sent)  # feedback may be the first to come
+        system.node("client")._core.spawn(client.turn_back())
+        wait_until(lambda: len(client.outcomes) == 3)
+        assert client.outcomes[-1] == ("canceled", "turned back")
+
+        go(system, 0.0)
+        wait_until(lambda: client.feedback)
+        system.change("server", "deactivate")
+        wait_until(lambda: len(client.outcomes) == 4)
+        assert client.outcomes[-1][0] == "canceled"  # whether the sleep ends first or not
+        go(system, 1.0)
+        wait_until(lambda: len(client.outcomes) == 5)
+        assert client.outcomes[-1] == "GoalRejected"
+
+        system.change("server", "activate")
+        go(system, 0.0)
+        wait_until(lambda: client.feedback)
+        system.change("client", "deactivate")
+        wait_until(lambda: len(client.outcomes) == 6)
+        assert client.outcomes[-1] == "CallCancelled"
+        goals = system.node("server")._assembly.action_servers["go"]._goals
+        wait_until(lambda: not goals, "the end of the goal nobody waits for")
+
+
+def test_somebody_outside_can_cancel_a_goal_of_the_process(tmp_path: Path) -> None:
+    text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto")
+    with running(text, tmp_path, going=MODULE) as system:
+        client = go(system, 0.0)
+        wait_until(lambda: client.feedback)
+        peer = Peer()
+        try:
+            answer = peer.call(CancelGoal, "/go/_action/cancel_goal")  # all of them
+        finally:
+            peer.close()
+        assert len(answer.goals_canceling) == 1
+        wait_until(lambda: client.outcomes)
+        assert client.outcomes == [("canceled", "turned back")]
+
+
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
+@pytest.mark.parametrize("copied", [False, True])
+def test_the_ends_hold_the_same_objects_unless_copies_are_asked_for(
+    tmp_path: Path, kind: str, copied: bool
+) -> None:
+    text = TEXT.replace("KIND", kind).replace("DELIVERY", "auto") + (COPIED if copied else "")
+    with running(text, tmp_path, going=MODULE) as system:
+        server = system.behavior("server")
+        client = go(system, 1.0)
+        wait_until(lambda: client.outcomes)
+        assert client.outcomes == [("succeeded", "arrived")]
+        for there, here in (
+            (server.goals, client.goals),
+            (server.feedback, client.feedback),
+            (server.results, client.results),
+        ):
+            assert there == here
+            assert [one is not other for one, other in zip(there, here, strict=True)] == [
+                copied
+            ] * len(here)

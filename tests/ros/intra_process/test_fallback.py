@@ -1,0 +1,184 @@
+"""Where the middleware returns a process its own messages, all goes by DDS, and each once."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Int64
+
+from composer.runtime.intra_process.ignore_local_publications import _Options, _Subscription
+from tests.ros.support.commands import COMPOSE
+from tests.ros.support.in_process import Peer, wait_until
+from tests.ros.support.sequences import Sequences
+from tests.ros.support.system_process import RunningSystem
+
+MIDDLEWARES = Path(__file__).with_name("middlewares")
+PER_WRITER, WRITERS, LATCHED = 400, 3, 3
+#: Each middleware, and why it is not relied on.
+REASONS = {
+    "returns_all": "a publication of the process came back",
+    "unheard_of": "nothing is known of rmw_unheard_of_cpp",
+}
+SYSTEM = """
+system: fallback
+executors: {other: {}}
+qos_profiles:
+  deep: {depth: 5000}
+  latched: {extends: state, depth: 10}
+nodes:
+  writer:
+    behavior: counting:Writer
+    lifecycle: {autostart: inactive}
+    publishers:
+      stream: {type: std_msgs/msg/Int64, topic: /stream, qos: deep}
+      mode: {type: std_msgs/msg/Int64, topic: /mode, qos: latched}
+    timers: {burst: {period_ms: 5}}
+  near:
+    behavior: counting:Reader
+    subscriptions:
+      stream: {type: std_msgs/msg/Int64, topic: /stream, qos: deep}
+      mode: {type: std_msgs/msg/Int64, topic: /mode, qos: latched}
+  far:
+    behavior: counting:Reader
+    executor: other
+    subscriptions:
+      stream:
+        {type: std_msgs/msg/Int64, topic: /stream, qos: {extends: deep, reliability: best_effort}}
+      mode: {type: std_msgs/msg/Int64, topic: /mode, qos: latched}
+"""
+BEHAVIORS = f"""
+import json
+import threading
+
+from composer.behavior import Behavior
+from std_msgs.msg import Int64
+from tests.ros.support.sequences import Sequences, number
+
+PER_WRITER, WRITERS, LATCHED = {PER_WRITER}, {WRITERS}, {LATCHED}
+
+class Writer(Behavior):
+    '''Two threads publish, and a timer, in bursts, as the third; each so many messages.'''
+
+    def on_activate(self):
+        self.sent = 0
+        for mode in range(LATCHED):
+            self.publishers.mode.publish(Int64(data=mode))
+        for writer in range(1, WRITERS):
+            threading.Thread(target=self.run, args=(writer,)).start()
+
+    def run(self, writer):
+        for sequence in range(PER_WRITER):
+            self.publishers.stream.publish(Int64(data=number(writer, sequence)))
+
+    def on_burst(self):
+        for sequence in range(self.sent, min(self.sent + 20, PER_WRITER)):
+            self.publishers.stream.publish(Int64(data=number(0, sequence)))
+            self.sent += 1
+
+class Reader(Behavior):
+    def on_configure(self):
+        self.seen = Sequences()
+        self.modes = []
+
+    def on_stream(self, message):
+        self.seen.take(message.data)
+        if sum(last == PER_WRITER - 1 for last in self.seen.last.values()) == WRITERS:
+            self.log.info("complete")
+
+    def on_mode(self, message):
+        self.modes.append(message.data)
+
+    def on_deactivate(self):
+        self.log.info(json.dumps([self.seen.count, self.seen.wrong, self.modes]))
+"""
+
+
+def compiled(source: str, target: Path, *options: str) -> Path:
+    """Compile C against the headers of the ROS that is used."""
+    prefixes = os.environ["AMENT_PREFIX_PATH"].split(":")
+    folders = [folder for prefix in prefixes for folder in Path(prefix, "include").iterdir()]
+    command = ["cc", "-Wall", "-Werror", *options, *(f"-I{folder}" for folder in folders)]
+    subprocess.run([*command, MIDDLEWARES / source, "-o", target, "-ldl"], check=True)
+    return target
+
+
+@contextmanager
+def in_front_of_rmw(middleware: str | None, folder: Path) -> Iterator[None]:
+    """Have processes that are started in the block go through it."""
+    with pytest.MonkeyPatch.context() as environment:
+        if middleware is not None:
+            library = compiled(f"{middleware}.c", folder / "library.so", "-shared", "-fPIC")
+            environment.setenv("LD_PRELOAD", str(library))
+        yield
+
+
+def test_the_fields_lie_where_the_headers_say(tmp_path: Path) -> None:
+    program = compiled("print_layout.c", tmp_path / "print_layout")
+    printed = subprocess.run([program], capture_output=True, check=True, text=True).stdout
+    flag = _Subscription.options.offset + _Options.ignore_local_publications.offset
+    ours = (_Subscription.topic_name.offset, flag, ctypes.sizeof(_Subscription))
+    assert tuple(map(int, printed.split())) == ours
+
+
+@pytest.mark.parametrize("middleware", [None, *REASONS])
+def test_every_message_comes_once_whatever_the_middleware_returns(
+    middleware: str | None, tmp_path: Path, peer: Peer
+) -> None:
+    path = tmp_path / "fallback.yaml"
+    path.write_text(SYSTEM, encoding="utf-8")
+    path.with_name("counting.py").write_text(BEHAVIORS, encoding="utf-8")
+    outside = Sequences()
+    with in_front_of_rmw(middleware, tmp_path):
+        running = RunningSystem(str(path), "--log-level", "debug")
+    with running as system:
+        system.wait_for("2 of 3 nodes active")
+        peer.node.create_subscription(
+            Int64, "/stream", lambda message: outside.take(message.data), QoSProfile(depth=5000)
+        )
+        wait_until(lambda: peer.node.count_publishers("/stream"), "the publisher")
+        # What a participant has is announced in order: who answers this knows the subscription.
+        assert peer.state("/writer") == "inactive"
+        assert peer.change("/writer", "activate")
+        for reader in ("near", "far"):
+            system.wait_for(rf"\[{reader}\] complete")
+        ends = dict.fromkeys(range(WRITERS), PER_WRITER - 1)
+        wait_until(lambda: outside.last == ends, "the last messages, outside")
+        code, _ = system.stop()
+    assert code == 0, system.output
+    everything = [WRITERS * PER_WRITER, [], list(range(LATCHED))]
+    for reader in ("near", "far"):
+        said = [line for line in system.lines if f"[{reader}] [" in line]
+        assert [json.loads(line.partition(f"[{reader}] ")[2]) for line in said] == [everything]
+    assert outside.wrong == []
+    warned = [line for line in system.lines if "topics within the process go by DDS" in line]
+    by_dds = [line for line in system.lines if "uses DDS alone" in line]
+    if middleware is None:
+        assert (warned, by_dds) == ([], [])
+    else:
+        assert len(warned) == 1
+        assert "[WARN]" in warned[0]
+        assert REASONS[middleware] in warned[0]
+        assert len(by_dds) == 6  # two publishers, four subscriptions
+        assert all(line.endswith(REASONS[middleware]) for line in by_dds)
+
+
+@pytest.mark.parametrize("middleware", [None, *REASONS])
+def test_the_doctor_tells_beforehand(middleware: str | None, tmp_path: Path) -> None:
+    with in_front_of_rmw(middleware, tmp_path):
+        command = [*COMPOSE, "doctor", "--json"]
+        done = subprocess.run(command, capture_output=True, check=False, text=True, timeout=30.0)
+    (found,) = [item for item in json.loads(done.stdout) if item["area"] == "delivery"]
+    if middleware is None:
+        assert found["level"] == "ok"
+    else:
+        assert found["level"] == "note"
+        assert found["message"].endswith(REASONS[middleware])
+        assert "'delivery: dds'" in found["remedy"]

@@ -1,0 +1,80 @@
+"""More messages than a reader can take: what its depth allows comes, and the rest is counted."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+from std_msgs.msg import Int64
+
+from tests.ros.support.counting import MODULE, NUMBERS, numbers, send
+from tests.ros.support.in_process import running, wait_until
+
+
+@pytest.mark.parametrize("depth", [1, 100, 500])
+def test_a_flood_leaves_what_the_depth_allows_and_the_rest_is_counted(
+    tmp_path: Path, depth: int
+) -> None:
+    text = NUMBERS.replace("KIND", "events").replace("100", str(depth))
+    with running(text, tmp_path, counting=MODULE) as system:
+        send(system, 1000)
+        near = system.node("near")
+        wait_until(lambda: len(near._behavior.heard) == depth)
+        assert numbers(near._behavior.heard) == list(range(1000 - depth, 1000))
+        assert near.statistics.dropped == 1000 - depth
+
+
+def test_without_a_depth_nothing_of_a_flood_is_dropped(tmp_path: Path) -> None:
+    text = NUMBERS.replace("KIND", "events").replace("depth: 100", "history: keep_all")
+    with running(text, tmp_path, counting=MODULE) as system:
+        send(system, 5000)
+        near = system.node("near")
+        wait_until(lambda: len(near._behavior.heard) == 5000)
+        assert numbers(near._behavior.heard) == list(range(5000))
+        assert near.statistics.dropped == 0
+
+
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
+@pytest.mark.parametrize("depth", [1, 3, 500])
+def test_threads_that_push_each_other_out_lose_nothing_that_is_not_counted(
+    tmp_path: Path, kind: str, depth: int
+) -> None:
+    text = NUMBERS.replace("KIND", kind).replace("100", str(depth))
+    with running(text, tmp_path, counting=MODULE) as system:
+        far, publish = system.node("far"), system.behavior("source").publishers.numbers
+
+        def write(first: int) -> None:
+            for number in range(first, first + 5000):
+                publish.publish(Int64(data=number))
+
+        writers = [threading.Thread(target=write, args=(k * 5000,)) for k in range(4)]
+        for writer in writers:
+            writer.start()
+        for writer in writers:
+            writer.join()
+        wait_until(lambda: len(far._behavior.heard) + far.statistics.dropped == 20_000)
+        heard = numbers(far._behavior.heard)
+        for k in range(4):
+            from_one = [number for number in heard if number // 5000 == k]
+            assert from_one == sorted(from_one)
+        assert {number % 5000 for number in heard} & {4999}  # the very last comes
+
+
+@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+def test_a_flood_fills_no_loop_and_delays_nothing_that_comes_after(
+    tmp_path: Path, kind: str
+) -> None:
+    with running(NUMBERS.replace("KIND", kind), tmp_path, counting=MODULE) as system:
+        far, release = system.node("far"), threading.Event()
+        for _ in range(8):  # as many as it can have threads
+            far.loop.call_soon(release.wait)
+        for _ in range(20):
+            send(system, 500)  # from the thread of another loop
+        assert len(far.loop._calls) < 120  # its depth, and little else
+        release.set()
+        wait_until(lambda: len(far._behavior.heard) + far.statistics.dropped == 10_000)
+        assert numbers(far._behavior.heard)[-100:] == list(range(9_900, 10_000))
+        for number in range(10_000, 10_003):
+            send(system, 1)
+            wait_until(lambda n=number: numbers(far._behavior.heard)[-1] == n)

@@ -1,0 +1,203 @@
+"""Services between co-located nodes: answered without DDS, with the same outcomes as by DDS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from std_srvs.srv import SetBool
+
+from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
+
+TEXT = """
+system: asking
+delivery: DELIVERY
+executors: {own: {kind: KIND}}
+nodes:
+  server:
+    behavior: asking:Server
+    executor: own
+    services: {ask: {type: std_srvs/srv/SetBool}}
+  client:
+    behavior: asking:Client
+    clients: {ask: {type: std_srvs/srv/SetBool, timeout_ms: 20000}}
+"""
+MODULE = """
+from composer.behavior import Behavior, BehaviorError
+from std_srvs.srv import SetBool
+
+class Server(Behavior):
+    def on_configure(self):
+        self.asked = []
+        self.answers = []
+
+    async def on_ask(self, request, response):
+        self.asked.append(request)
+        if not request.data:
+            await self.clock.sleep(60.0)
+        response.success = True
+        response.message = f"request {len(self.asked)}"
+        self.answers.append(response)
+        return response
+
+class Client(Behavior):
+    def on_configure(self):
+        self.requests = []
+        self.answers = []
+        self.outcomes = []
+
+    async def ask(self, data, timeout_ms):
+        self.requests.append(SetBool.Request(data=data))
+        try:
+            response = await self.clients.ask.call(self.requests[-1], timeout_ms=timeout_ms)
+        except BehaviorError as error:
+            self.outcomes.append(type(error).__name__)
+        else:
+            self.answers.append(response)
+            self.outcomes.append((response.success, response.message))
+
+    def ask_and_go(self):
+        self.clients.ask.call(SetBool.Request(), timeout_ms=20.0)
+
+    async def ask_at_once(self, limits_ms):
+        calls = [self.clients.ask.call(SetBool.Request(), timeout_ms=ms) for ms in limits_ms]
+        for limit_ms, call in zip(limits_ms, calls):
+            try:
+                await call
+            except BehaviorError as error:
+                self.outcomes.append((type(error).__name__, limit_ms, str(error)))
+
+    async def ask_and_change(self):
+        request = SetBool.Request(data=True)
+        call = self.clients.ask.call(request)
+        request.data = False
+        self.answers.append(await call)
+"""
+COPIED = """
+connections:
+  - {service: /ask, server: server.ask, clients: client.ask, isolation: copy}
+"""
+REFUSED = (False, "/server is inactive, not active")
+
+
+def ask(system: RunningSystem, data: bool = True, timeout_ms: float | None = None) -> None:
+    client = system.node("client")
+    client._core.spawn(client._behavior.ask(data, timeout_ms))
+
+
+def outcomes(system: RunningSystem, count: int) -> list[Any]:
+    """Wait for so many outcomes and return them."""
+    known: list[Any] = system.behavior("client").outcomes
+    wait_until(lambda: len(known) == count, f"{count} outcomes")
+    return known
+
+
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
+@pytest.mark.parametrize("delivery", ["auto", "dds"])
+def test_every_outcome_of_a_call_is_the_same_either_way(
+    tmp_path: Path, kind: str, delivery: str
+) -> None:
+    text = TEXT.replace("KIND", kind).replace("DELIVERY", delivery)
+    with running(text, tmp_path, asking=MODULE) as system:
+        client, server = (system.behavior(name) for name in ("client", "server"))
+        ask(system)
+        assert outcomes(system, 1)[-1] == (True, "request 1")
+        assert (server.asked[0] is client.requests[0]) is (delivery == "auto")
+
+        ask(system, data=False, timeout_ms=300.0)
+        assert outcomes(system, 2)[-1] == "CallTimeout"
+        wait_until(lambda: len(server.asked) == 2, "the request that is given up")
+
+        system.change("server", "deactivate")
+        ask(system)
+        assert outcomes(system, 3)[-1] == REFUSED
+        system.change("server", "cleanup")
+        # By DDS it is known some milliseconds later, and until then it is waited for.
+        wait_until(lambda: not client.clients.ask._has_server(), "the end of the server")
+        ask(system, timeout_ms=300.0)
+        assert outcomes(system, 4)[-1] == "ServerUnavailable"
+
+        system.change("server", "configure")
+        system.change("server", "activate")
+        ask(system, data=False)
+        server = system.behavior("server")
+        wait_until(lambda: server.asked)
+        system.change("client", "deactivate")
+        assert outcomes(system, 5)[-1] == "CallCancelled"
+    counted = {entry.node: entry.calls for entry in system.end().nodes}
+    assert counted == {"/client": 4, "/server": 3}
+
+
+def test_a_server_that_ends_with_a_request_open_says_so_and_outsiders_are_served(
+    tmp_path: Path,
+) -> None:
+    text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto")
+    with running(text, tmp_path, asking=MODULE) as system:
+        peer = Peer()
+        try:
+            answer = peer.call(SetBool, "/ask", SetBool.Request(data=True))
+        finally:
+            peer.close()
+        assert (answer.success, answer.message) == (True, "request 1")
+        ask(system, data=False)
+        server = system.behavior("server")
+        wait_until(lambda: len(server.asked) == 2)
+        system.change("server", "deactivate")
+        (success, message), *_ = outcomes(system, 1)
+    assert not success
+    assert "not active" in message
+
+
+def test_calls_of_one_moment_end_each_in_its_time(tmp_path: Path) -> None:
+    text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto")
+    with running(
+        text.replace("asking:Server}", "asking:Server, reentrant: true}"), tmp_path, asking=MODULE
+    ) as system:
+        client = system.node("client")
+        client._core.spawn(client._behavior.ask_at_once((90.0, 30.0, 60.0)))
+        told = outcomes(system, 3)
+        assert told == [
+            ("CallTimeout", limit, f"service '/ask' did not answer within {limit:g} ms")
+            for limit in (90.0, 30.0, 60.0)
+        ]
+        wait_until(lambda: not client._core.gate.pending._futures, "nothing is waited for")
+
+
+@pytest.mark.parametrize("delivery", ["auto", "dds"])
+def test_a_failed_call_that_nobody_awaits_is_told_of(tmp_path: Path, delivery: str) -> None:
+    text = TEXT.replace("KIND", "events").replace("DELIVERY", delivery)
+    with running(text, tmp_path, asking=MODULE) as system:
+        client = system.node("client")
+        client.loop.run(client._behavior.ask_and_go)
+        line = system.wait_for_log("did not answer")
+        counted = system.summary("/client").errors
+    assert line == "client 'ask': service '/ask' did not answer within 20 ms"
+    assert counted == 1
+
+
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
+@pytest.mark.parametrize("copied", [False, True])
+def test_the_ends_hold_the_same_objects_unless_copies_are_asked_for(
+    tmp_path: Path, kind: str, copied: bool
+) -> None:
+    text = TEXT.replace("KIND", kind).replace("DELIVERY", "auto") + (COPIED if copied else "")
+    with running(text, tmp_path, asking=MODULE) as system:
+        client, server = (system.behavior(name) for name in ("client", "server"))
+        ask(system)
+        wait_until(lambda: client.answers)
+        assert server.asked == client.requests
+        assert server.answers == client.answers
+        assert (server.asked[0] is not client.requests[0]) is copied
+        assert (server.answers[0] is not client.answers[0]) is copied
+
+
+def test_a_copied_request_is_what_it_was_when_it_was_sent(tmp_path: Path) -> None:
+    text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto") + COPIED
+    with running(text, tmp_path, asking=MODULE) as system:
+        client, server = (system.node(name) for name in ("client", "server"))
+        client._core.spawn(client._behavior.ask_and_change())
+        wait_until(lambda: client._behavior.answers)
+        assert [request.data for request in server._behavior.asked] == [True]
+        server._behavior.answers[0].message = "changed afterwards"
+        assert client._behavior.answers[0].message == "request 1"

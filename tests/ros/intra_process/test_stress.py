@@ -1,0 +1,264 @@
+"""Whoever joins, leaves or dies outside: inside, nothing is lost, doubled or out of order.
+
+Everything is published twice, on a topic that stays in the process as far as it can, and on another
+by DDS alone. The same processes listen to both and talk on both, so that one is the control of the
+other: outside as well, no more may be missing than there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.ros.support.delivery_outsiders import STREAM, TOPICS, Missing, Outsider
+from tests.ros.support.in_process import RunningSystem, running, wait_until
+from tests.ros.support.sequences import Sequences
+
+WRITERS = ("writer", "second")
+#: Reliability and depth of those outside, by turns. The first are owed every message.
+OWED, *_ = PROFILES = (
+    ("RELIABLE", 5000),
+    ("BEST_EFFORT", 5000),
+    ("RELIABLE", 10),
+    ("BEST_EFFORT", 10),
+)
+ENOUGH = 1000  # messages that a listener has heard of each topic before it goes
+FIRST_TALKER = 100
+MOVES = 3  # of a reader inside, while each listener listens
+#: What is missing on the two topics differs by chance: both wait for the same processor.
+BY_CHANCE, BY_CHANCE_AT_ALL = 1.1, 50
+
+TEXT = """
+system: stress
+executors: {other: {}, pool: {kind: multi_threaded, threads: 2}}
+qos_profiles:
+  deep: {depth: 5000}
+  unreliable: {depth: 5000, reliability: best_effort}
+nodes:
+  writer:
+    behavior: stress:Writer
+    publishers:
+      stream: {type: std_msgs/msg/Int64, qos: deep}
+      control: {type: std_msgs/msg/Int64, qos: deep}
+    timers: {tick: {rate_hz: 1000}, burst: {period_ms: 200}}
+  second:
+    behavior: stress:Writer
+    executor: other
+    publishers:
+      stream: {type: std_msgs/msg/Int64, qos: deep}
+      control: {type: std_msgs/msg/Int64, qos: deep}
+      calm: {type: std_msgs/msg/Int64, qos: deep}
+    timers: {tick: {rate_hz: 100}, burst: {period_ms: 500}}
+  near:
+    behavior: stress:Reader
+    subscriptions:
+      stream: {type: std_msgs/msg/Int64, qos: deep}
+      control: {type: std_msgs/msg/Int64, qos: deep}
+  far:
+    behavior: stress:Reader
+    executor: other
+    subscriptions:
+      stream: {type: std_msgs/msg/Int64, qos: unreliable}
+      control: {type: std_msgs/msg/Int64, qos: unreliable}
+  guest:
+    behavior: stress:Reader
+    subscriptions:
+      stream: {type: std_msgs/msg/Int64, qos: deep}
+      control: {type: std_msgs/msg/Int64, qos: deep}
+  pooled:
+    behavior: stress:Reader
+    executor: pool
+    subscriptions: {calm: {type: std_msgs/msg/Int64, qos: deep}}
+connections:
+  - topic: /stream
+    from: [writer.stream, second.stream]
+    to: [near.stream, far.stream, guest.stream]
+  - topic: /control
+    from: [writer.control, second.control]
+    to: [near.control, far.control, guest.control]
+    delivery: dds
+  - {topic: /calm, from: second.calm, to: pooled.calm}
+"""
+MODULE = """
+import itertools
+import threading
+import time
+
+from composer.behavior import Behavior
+from std_msgs.msg import Int64
+from tests.ros.support.sequences import Sequences, number
+
+WRITERS = itertools.count(1)
+
+class Writer(Behavior):
+    '''A writer of its own for the timers and for each of two threads.'''
+
+    def on_activate(self):
+        self.next = {}
+        self.outlets = [self.publishers[name] for name in dir(self.publishers)]
+        self.ended = False
+        self.own = next(WRITERS)
+        self.threads = [threading.Thread(target=self.run, args=(next(WRITERS),)) for _ in range(2)]
+        for thread in self.threads:
+            thread.start()
+
+    def send(self, writer):
+        sequence = self.next.get(writer, 0)
+        self.next[writer] = sequence + 1
+        for publisher in self.outlets if sequence % 2 else reversed(self.outlets):
+            publisher.publish(Int64(data=number(writer, sequence)))
+
+    def run(self, writer):
+        while not self.ended:
+            self.send(writer)
+            time.sleep(0.01)
+
+    def on_tick(self):
+        if not self.ended:
+            self.send(self.own)
+
+    def on_burst(self):
+        for _ in range(0 if self.ended else 50):
+            self.send(self.own)
+
+    def end(self):
+        self.ended = True
+        for thread in self.threads:
+            thread.join()
+
+    def on_deactivate(self):
+        self.end()
+
+class Reader(Behavior):
+    def on_configure(self):
+        self.seen = {"/stream": Sequences(), "/control": Sequences(), "/calm": Sequences()}
+
+    def on_stream(self, message):
+        self.seen["/stream"].take(message.data)
+
+    def on_control(self, message):
+        self.seen["/control"].take(message.data)
+
+    def on_calm(self, message):
+        self.seen["/calm"].take(message.data)
+"""
+
+
+def behaviors(system: RunningSystem, *names: str) -> list[Any]:
+    return [system.behavior(name) for name in names]
+
+
+class Stress:
+    """Listeners and talkers that join, leave in order, and are killed, by turns."""
+
+    def __init__(self, system: RunningSystem, folder: Path) -> None:
+        self._system = system
+        self._folder = folder
+        #: By those who are owed everything, and by those whose QoS allows for losses.
+        self.owed, self.missing = Missing(), Missing()
+
+    def run(self, rounds: int) -> None:
+        """Have as many of both come and go, half of them by SIGKILL."""
+        for turn in range(rounds):
+            profile = PROFILES[turn % len(PROFILES)]
+            killed = (turn + turn // len(PROFILES)) % 2 == 1
+            heard = self._visit(profile, FIRST_TALKER + turn, killed=killed)
+            if profile == OWED:
+                self.owed.add_all(heard)
+            else:
+                self.missing.add_of_both(heard)
+            if not killed:
+                wait_until(self._is_alone, "nobody outside")
+
+    def verify(self) -> None:
+        """Have the writers end, and see that each reader has got everything there was for it."""
+        sent = {name: self._sent_by(name) for name in WRITERS}
+        everything = sent["writer"] | sent["second"]
+        for name in ("near", "far", "guest"):
+            self._verify(name, STREAM, everything)
+        self._verify("pooled", "/calm", sent["second"])
+        for name in ("near", "far", "guest"):
+            self._count_talkers(name)
+        assert self.owed.stream <= self.owed.control
+        by_chance = BY_CHANCE * self.missing.control + BY_CHANCE_AT_ALL
+        assert self.missing.stream <= by_chance, self.missing.control
+
+    def _visit(
+        self, profile: tuple[str, int], talker: int, *, killed: bool
+    ) -> dict[str, list[int]]:
+        with (
+            Outsider("listen", profile, 0, self._folder) as listening,
+            Outsider("talk", profile, talker, self._folder) as talking,
+        ):
+            wait_until(lambda: all(talker in seen.last for seen in self._seen(profile)), "a talker")
+            wait_until(lambda: listening.has_heard(1), "a listener")
+            for _ in range(MOVES):
+                self._move_the_guest()
+            wait_until(lambda: listening.has_heard(ENOUGH), "a listener")
+            codes = [outsider.go(killed=killed) for outsider in (talking, listening)]
+            assert codes == ([-9, -9] if killed else [0, 0])
+        return listening.heard
+
+    def _seen(self, profile: tuple[str, int]) -> Iterator[Sequences]:
+        """Yield what those inside have seen who match somebody outside."""
+        names = ("near", "far") if profile[0] == "RELIABLE" else ("far",)
+        for reader in behaviors(self._system, *names):
+            yield from (reader.seen[topic] for topic in TOPICS)
+
+    def _move_the_guest(self) -> None:
+        """Take one of the readers inside away, and back, while somebody outside listens."""
+        (guest,) = behaviors(self._system, "guest")
+        wait_until(lambda: guest.seen[STREAM].count > 0, "the guest")
+        self._system.change("guest", "deactivate")
+        seen = guest.seen[STREAM]
+        assert seen.disordered == []
+        assert all(writer >= FIRST_TALKER for writer in seen.missing)
+        self._count_talkers("guest")
+        self._system.change("guest", "cleanup", "configure", "activate")
+
+    def _count_talkers(self, name: str) -> None:
+        """Compare what has come in from outside, all that is missing of it being lost by DDS."""
+        (reader,) = behaviors(self._system, name)
+        stream, control = (
+            {
+                writer: count
+                for writer, count in reader.seen[topic].missing.copy().items()
+                if writer >= FIRST_TALKER
+            }
+            for topic in TOPICS
+        )
+        self.missing.add_counted(stream, control)
+
+    def _is_alone(self) -> bool:
+        """Say whether the publishers of the stream have matched nobody but the three inside."""
+        nodes = [self._system.node(name) for name in WRITERS]
+        ports = [node._assembly.publishers["stream"] for node in nodes]
+        return all(port._publisher.get_subscription_count() == 3 for port in ports)
+
+    def _sent_by(self, name: str) -> dict[int, int]:
+        """End a node that writes; return the last of each of its writers."""
+        (behavior,) = behaviors(self._system, name)
+        self._system.node(name).loop.run(behavior.end)
+        assert len(behavior.next) == 3
+        return {writer: count - 1 for writer, count in behavior.next.items()}
+
+    def _verify(self, name: str, topic: str, wanted: dict[int, int]) -> None:
+        (reader,) = behaviors(self._system, name)
+        seen = reader.seen[topic]
+        wait_until(lambda: wanted.items() <= seen.last.items(), f"all for {name}")
+        assert seen.disordered == []
+        assert not seen.missing.keys() & wanted.keys()
+        assert self._system.node(name).statistics.queue_drops == 0
+
+
+@pytest.mark.parametrize(
+    "rounds", [4, pytest.param(50, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
+)
+def test_a_stress_of_outsiders_changes_nothing(tmp_path: Path, rounds: int) -> None:
+    with running(TEXT, tmp_path, stress=MODULE) as system:
+        stress = Stress(system, tmp_path)
+        stress.run(rounds)
+        stress.verify()

@@ -1,0 +1,326 @@
+"""Messages between co-located ports: straight, in order, and by DDS to whoever is outside."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.subscription import Subscription
+from std_msgs.msg import Int64
+
+from composer.model import LogLevel
+from composer.runtime.host import HostOptions
+from composer.runtime.intra_process import match_flag as marks
+from tests.ros.support.counting import MODULE, NUMBERS, numbers, send
+from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
+
+NUMBERING_LISTENER = Path(__file__).parents[1] / "programs" / "numbering_listener.py"
+
+
+@pytest.fixture
+def outsider() -> Iterator[Callable[[], Peer]]:
+    """Joins when it is called: what goes in the process is to go without anybody outside."""
+    peers: list[Peer] = []
+
+    def join() -> Peer:
+        peers.append(Peer())
+        return peers[-1]
+
+    yield join
+    for peer in peers:
+        peer.close()
+
+
+def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -> None:
+    """Wait until as many subscriptions as that have matched the source, and it was told to look.
+
+    The middleware counts first, and tells then.
+    """
+    port = system.node("source")._assembly.publishers["numbers"]
+    outlet = port.sender
+
+    def knows() -> bool:
+        matched = port._publisher.get_subscription_count()
+        has_outsiders = matched > len(outlet._inlets)
+        will_look = not marks.MARK[0] or outlet._period is not marks.MATCHES.period
+        return is_matched(matched) and (outlet._has_outsiders is has_outsiders or will_look)
+
+    wait_until(knows, "so many subscriptions")
+
+
+@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+def test_what_is_published_is_what_is_received_and_outsiders_hear_it_too(
+    tmp_path: Path, outsider: Callable[[], Peer], kind: str
+) -> None:
+    with running(NUMBERS.replace("KIND", kind), tmp_path, counting=MODULE) as system:
+        near, far, source = (system.behavior(name) for name in ("near", "far", "source"))
+        send(system, 50)
+        wait_until(lambda: len(near.heard) == len(far.heard) == 50)
+        # By reference: nothing of it went through DDS.
+        for listener in (near, far):
+            assert all(a is b for a, b in zip(listener.heard, source.sent, strict=True))
+
+        peer = outsider()
+        outside = peer.listen(Int64, "/numbers", 100)
+        wait_for_matches(system, lambda count: count == 3)
+        send(system, 50)
+        wait_until(lambda: len(outside) == 50)
+        wait_until(lambda: len(near.heard) == len(far.heard) == 100)
+        assert numbers(outside) == list(range(50, 100))
+        assert numbers(near.heard) == numbers(far.heard) == list(range(100))
+
+        intruder = peer.publisher(Int64, "/numbers", 100)
+        wait_until(lambda: intruder.get_subscription_count() == 3)  # its own is one of them
+        intruder.publish(Int64(data=-1))
+        wait_until(lambda: len(near.heard) == len(far.heard) == 101)
+        assert near.heard[-1].data == far.heard[-1].data == -1
+        # As many ends as ROS tools are to see.
+        assert peer.node.count_publishers("/numbers") == 2
+        assert peer.node.count_subscribers("/numbers") == 3
+
+
+@pytest.mark.parametrize(("tells", "level"), [(False, "info"), (True, "info"), (True, "debug")])
+def test_every_outsider_is_seen_to_come(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tells: bool, level: str
+) -> None:
+    if not tells:  # then the middleware is asked at each message
+        monkeypatch.setattr(marks, "EVENT", lambda *_: 1)
+    context = Context()
+    context.init([])
+    node = Node("outsider", context=context)
+    apart = NUMBERS.replace("KIND", "events").replace("executors:", "namespace: /apart\nexecutors:")
+    options = HostOptions(log_level=LogLevel(level))
+    with running(apart, tmp_path, options=options, counting=MODULE) as system:
+        source = system.node("source")
+        publisher = source._assembly.publishers["numbers"]._publisher
+        for turn in range(5):
+            send(system, 10)
+            before = publisher.get_subscription_count()
+            subscription = node.create_subscription(Int64, "/apart/numbers", lambda _: None, 100)
+            wait_for_matches(system, lambda count, before=before: count > before)
+            send(system, 10)
+            first = 20 * turn + 10
+            assert [take(subscription) for _ in range(10)] == list(range(first, first + 10))
+            node.destroy_subscription(subscription)
+            # Or its end would hide that the next one begins.
+            wait_until(lambda: source._core.node.count_subscribers("/apart/numbers") == 2)
+        near = system.behavior("near")
+        wait_until(lambda: numbers(near.heard) == list(range(100)))
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def take(subscription: Subscription) -> int:
+    """Wait for the next message. No executor: its wait set would keep the subscription alive."""
+    taken: list[Any] = []
+
+    def comes() -> bool:
+        with subscription.handle:
+            message = subscription.handle.take_message(Int64, False)
+        taken.extend([] if message is None else [message[0]])
+        return bool(taken)
+
+    wait_until(comes)
+    return int(taken[0].data)
+
+
+def test_what_is_under_way_when_its_reader_leaves_active_is_dropped(tmp_path: Path) -> None:
+    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
+        system.change("near", "deactivate")
+        send(system, 3)
+        near = system.node("near")
+        wait_until(lambda: near.statistics.dropped == 3)
+        system.change("near", "activate")
+        send(system, 2)
+        wait_until(lambda: len(near._behavior.heard) == 2)
+        assert numbers(near._behavior.heard) == [3, 4]
+        # A node that is cleaned up has no subscription: nothing is kept for it.
+        system.change("near", "deactivate", "cleanup")
+        send(system, 2)
+        wait_until(lambda: len(system.behavior("far").heard) == 7)
+        system.change("near", "configure", "activate")
+        send(system, 1)
+        wait_until(lambda: len(near._behavior.heard) == 1)
+        assert numbers(near._behavior.heard) == [7]
+        assert near.statistics.dropped == 3
+        far = system.behavior("far")
+        wait_until(lambda: len(far.heard) == 8)
+        assert numbers(far.heard) == list(range(8))
+
+
+LATCHED = """
+system: latched
+nodes:
+  setter:
+    publishers: {mode: {type: std_msgs/msg/Int64, qos: {extends: state, depth: 2}}}
+    behavior: setter:Setter
+  late:
+    lifecycle: {autostart: unconfigured}
+    subscriptions:
+      mode: {type: std_msgs/msg/Int64, qos: {extends: state, depth: 5}, log: "late {message.data}"}
+  volatile:
+    lifecycle: {autostart: unconfigured}
+    subscriptions:
+      mode: {type: std_msgs/msg/Int64, log: "volatile {message.data}"}
+"""
+
+
+def test_who_joins_late_gets_what_is_latched_once_inside_and_outside(
+    tmp_path: Path, outsider: Callable[[], Peer]
+) -> None:
+    module = """
+    from composer.behavior import Behavior
+    from std_msgs.msg import Int64
+
+    class Setter(Behavior):
+        def on_activate(self):
+            for number in (1, 2, 3):
+                self.publishers.mode.publish(Int64(data=number))
+    """
+    with running(LATCHED, tmp_path, setter=module) as system:
+        for node in ("volatile", "late"):
+            system.change(node, "configure", "activate")
+        system.wait_for_log("late 3")
+        profile = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        outside = outsider().listen(Int64, "/mode", profile)
+        wait_until(lambda: len(outside) == 2)
+        assert numbers(outside) == [2, 3]
+    assert system.log() == ["late 2", "late 3"]
+
+
+def test_dds_is_used_only_while_somebody_outside_has_matched(tmp_path: Path) -> None:
+    """The middleware numbers what a publisher hands it: what stays inside has no number."""
+    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
+        for visit in range(2):
+            send(system, 20)  # to nobody outside
+            command = [sys.executable, str(NUMBERING_LISTENER)]
+            with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as listener:
+                try:
+                    wait_for_matches(system, lambda count: count == 3)
+                    send(system, 5)
+                    printed, _ = listener.communicate(timeout=20.0)
+                finally:
+                    listener.kill()
+            first = visit * 25 + 20
+            # Fast DDS prints there, too, when something is not to its liking.
+            (told,) = [line for line in printed.splitlines() if line.startswith("[[")]
+            assert json.loads(told) == [[first + step, visit * 5 + step + 1] for step in range(5)]
+            wait_for_matches(system, lambda count: count == 2)
+        wait_until(lambda: len(system.behavior("near").heard) == 50)
+        assert numbers(system.behavior("near").heard) == list(range(50))
+
+
+def test_a_publisher_that_is_not_active_reaches_nobody_inside(tmp_path: Path) -> None:
+    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
+        send(system, 2)
+        system.change("source", "deactivate")
+        send(system, 3)
+        system.change("source", "activate")
+        send(system, 1)
+        near = system.behavior("near")
+        wait_until(lambda: 5 in numbers(near.heard))
+        assert numbers(near.heard) == [0, 1, 5]
+        assert system.node("source").statistics.sent == 3
+
+
+def test_a_look_that_is_overtaken_does_not_hide_who_has_come(tmp_path: Path) -> None:
+    """Two threads publish when somebody matches: the one looks before that, the other after it."""
+    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
+        port = system.node("source")._assembly.publishers["numbers"]
+        outlet = port.sender
+        overtaking = threading.Thread(target=outlet._look_outside)
+
+        def count_matched() -> int:
+            if threading.current_thread() is overtaking:
+                return 3
+            overtaking.start()
+            overtaking.join(0.2)  # unless it has to wait
+            return 2
+
+        outlet._count_matched = count_matched
+        outlet._look_outside()
+        overtaking.join()
+        assert outlet._has_outsiders
+
+
+def test_who_joins_inside_during_a_look_is_not_taken_for_the_one_outside(tmp_path: Path) -> None:
+    """It is counted who has matched before somebody joins, and who is of the process after it."""
+    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
+        outlet = system.node("source")._assembly.publishers["numbers"].sender
+        near, far = outlet._inlets
+        outlet.leave(far)
+        joining, is_checked = threading.Thread(target=outlet.join, args=(far,)), threading.Event()
+
+        def count_matched() -> int:
+            if threading.current_thread() is joining:
+                is_checked.wait()  # what the look of before has led to
+                return 3
+            joining.start()
+            wait_until(lambda: outlet._inlets == (near, far))
+            return 2  # near, and one outside
+
+        outlet._count_matched = count_matched
+        outlet._look_outside()
+        has_outsiders = outlet._has_outsiders
+        is_checked.set()
+        joining.join()
+        assert has_outsiders
+        assert outlet._has_outsiders
+
+
+def test_nobody_goes_by_a_period_that_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The mark says that all is seen to: from then on the old period must not be found."""
+    matches = marks.Matches()
+    periods = [matches.period]
+
+    class Mark(bytearray):
+        def __setitem__(self, *_: Any) -> None:
+            periods.append(matches.period)
+
+    monkeypatch.setattr(marks, "MARK", Mark(1))
+    matches.begin_period()
+    assert len({*periods, matches.period}) == 3
+
+
+REMAPPED = """
+system: remapped
+nodes:
+  source:
+    namespace: left
+    behavior: counting:Source
+    remappings: {numbers: /lane/numbers}
+    publishers: {numbers: {type: std_msgs/msg/Int64}}
+  near:
+    namespace: right
+    behavior: counting:Listener
+    remappings: {/right/numbers: /lane/numbers}
+    subscriptions: {numbers: {type: std_msgs/msg/Int64}}
+  far:
+    namespace: left
+    behavior: counting:Listener
+    subscriptions: {numbers: {type: std_msgs/msg/Int64, external: true}}
+"""
+
+
+def test_ports_meet_by_the_names_that_remapping_gives_them(tmp_path: Path, peer: Peer) -> None:
+    with running(REMAPPED, tmp_path, counting=MODULE) as system:
+        source, near, far = (system.behavior(name) for name in ("source", "near", "far"))
+        intruder = peer.publisher(Int64, "/left/numbers")
+        outside = peer.listen(Int64, "/lane/numbers")
+        wait_for_matches(system, lambda count: count == 2)
+        send(system, 3)
+        intruder.publish(Int64(data=-1))  # where far is left: nothing else is said there
+        wait_until(lambda: len(near.heard) == len(outside) == 3)
+        wait_until(lambda: far.heard)
+        assert all(a is b for a, b in zip(near.heard, source.sent, strict=True))
+        assert numbers(outside) == [0, 1, 2]
+        assert numbers(far.heard) == [-1]

@@ -1,0 +1,218 @@
+"""Nodes that have given up endpoints for tools, and the manager that answers for them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.msg import Log, ParameterEvent
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    GetParameterTypes,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+from rclpy.lifecycle import LifecycleNode
+from rclpy.parameter import Parameter
+
+from composer.drift import NodeSeen
+from composer.remote.lifecycle import Control, TransitionRefused
+from composer.remote.parameters import ParameterRefused, Parameters, names_by_node
+from composer.remote.session import Deadline, Session
+from composer.remote.snapshot import Observer
+from tests.ros.support.commands import COMPOSE
+from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
+
+LEAN = """
+system: lean
+introspection:
+  {parameters: false, rosout: false, type_description: false, lifecycle_services: false}
+nodes:
+  talker:
+    namespace: far
+    parameters:
+      speed: {type: double, default: 1.5, maximum: 5.0}
+      label: {type: string, default: here}
+    on_activate: {log: "here I am"}
+  whole:
+    introspection:
+      {parameters: true, rosout: true, type_description: true, lifecycle_services: true}
+    parameters: {size: {type: integer, default: 3}}
+    on_activate: {log: "so am I"}
+"""
+TALKER = "/far/talker"
+OWN = {f"{TALKER}.speed", f"{TALKER}.label"}
+
+
+@pytest.fixture(scope="module")
+def system(
+    tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int
+) -> Iterator[RunningSystem]:
+    with running(LEAN, tmp_path_factory.mktemp("lean")) as system:
+        yield system
+
+
+@pytest.fixture(scope="module")
+def session(system: RunningSystem) -> Iterator[Session]:
+    with Session() as session:
+        yield session
+
+
+def services_of(peer: Peer, name: str, namespace: str) -> set[str]:
+    found = peer.node.get_service_names_and_types_by_node(name, namespace)
+    return {service for service, _ in found}
+
+
+def publishers_of(peer: Peer, topic: str) -> set[str]:
+    return {info.node_name for info in peer.node.get_publishers_info_by_topic(topic)}
+
+
+def test_what_is_given_up_is_never_created(system: RunningSystem, peer: Peer) -> None:
+    known = peer.node.get_fully_qualified_node_names
+    wait_until(lambda: {"/whole", TALKER} <= set(known()), "both nodes")
+    peer.listen(Log, "/rosout")
+    peer.listen(ParameterEvent, "/parameter_events")
+    expected = {"/whole/get_state", "/whole/get_type_description", "/whole/list_parameters"}
+    wait_until(lambda: expected <= services_of(peer, "whole", "/"), "the services of a whole node")
+    wait_until(lambda: peer.node.count_publishers("/far/talker/transition_event"), "the topic")
+    assert services_of(peer, "talker", "/far") == set()
+    for topic in ("/rosout", "/parameter_events"):
+        wait_until(lambda topic=topic: "whole" in publishers_of(peer, topic), f"{topic} of a node")
+        assert "talker" not in publishers_of(peer, topic)
+    assert {"here I am", "so am I"} <= set(system.log())
+
+
+def test_the_manager_answers_for_them_with_standard_services(
+    system: RunningSystem, peer: Peer
+) -> None:
+    def ask(kind: Any, name: str, **fields: Any) -> Any:
+        return peer.call(kind, f"/lean/manager/{name}", kind.Request(**fields))
+
+    listed = ask(ListParameters, "list_parameters").result
+    assert set(listed.names) > OWN
+    assert listed.prefixes == [TALKER]
+    names = [f"{TALKER}.speed", "/whole.size", "/nobody.speed", f"{TALKER}.nothing"]
+    values = ask(GetParameters, "get_parameters", names=names).values
+    assert [value.type for value in values] == [3, 2, 0, 0]
+    assert list(ask(GetParameterTypes, "get_parameter_types", names=names).types) == [3, 2, 0, 0]
+    described = ask(DescribeParameters, "describe_parameters", names=names).descriptors
+    assert [item.name for item in described] == names
+    assert described[0].floating_point_range[0].to_value == 5.0
+    changes = [
+        Parameter(f"{TALKER}.speed", value=2.5).to_parameter_msg(),
+        Parameter(f"{TALKER}.label", value="there").to_parameter_msg(),
+        Parameter("/nobody.speed", value=2.5).to_parameter_msg(),
+    ]
+    results = ask(SetParameters, "set_parameters", parameters=changes).results
+    assert [result.successful for result in results] == [True, True, False]
+    mixed = ask(SetParametersAtomically, "set_parameters_atomically", parameters=changes).result
+    assert not mixed.successful
+    assert "/nobody" in mixed.reason
+    alone = ask(SetParametersAtomically, "set_parameters_atomically", parameters=changes[:2])
+    assert alone.result.successful
+    for label, success in (("/nobody activate", False), (f"{TALKER} activate", False)):
+        request = ChangeState.Request()
+        request.transition.label = label
+        answer = peer.call(ChangeState, "/lean/manager/change_state", request)
+        assert answer.success is success
+
+
+def test_commands_ask_the_manager_without_being_told(session: Session) -> None:
+    control = Control(session, Deadline(20.0))
+    assert control.find("talker") == TALKER
+    assert set(control.nodes()) >= {TALKER, "/whole"}
+    assert control.states([TALKER, "/whole"]) == {TALKER: "active", "/whole": "active"}
+    with pytest.raises(TransitionRefused, match="'configure' is not possible"):
+        control.change(TALKER, "configure")
+    assert str(control.take(TALKER, "unconfigured")) == f"{TALKER}: active -> unconfigured"
+    assert str(control.take(TALKER, "active")) == f"{TALKER}: unconfigured -> active"
+    assert [legal.label for legal in control.transitions(TALKER)] == ["deactivate", "shutdown"]
+
+
+def test_parameters_are_those_of_the_node(session: Session) -> None:
+    deadline = Deadline(20.0)
+    parameters = Parameters(session, deadline, "talker")
+    assert {"label", "speed"} <= set(parameters.names())
+    assert parameters.set({"speed": 4}) == {"speed": 4.0}
+    assert parameters.values(["speed"]) == {"speed": 4.0}
+    assert [item.name for item in parameters.describe(["speed", "label"])] == ["speed", "label"]
+    with pytest.raises(ParameterRefused, match="refused speed: "):
+        parameters.set({"speed": 9.0})
+    listed = names_by_node(session, deadline)
+    assert {"label", "speed"} <= set(listed[TALKER] or ())
+    assert "size" in (listed["/whole"] or ())
+    assert "/lean/manager" not in listed
+
+
+def test_an_observer_sees_states_and_parameters(session: Session) -> None:
+    def seen(name: str) -> NodeSeen:
+        node = snapshot.node(name)
+        assert node is not None
+        return node
+
+    with Observer(session) as observer:
+        snapshot = observer.look(Deadline(20.0))
+    assert (seen(TALKER).state, seen("/whole").state) == ("active", "active")
+    speed = Parameters(session, Deadline(20.0), TALKER).values(["speed"])
+    assert (seen(TALKER).parameters or {})["speed"] == speed["speed"] > 1.0
+    assert (seen("/whole").parameters or {})["size"] == 3
+    assert not [name for name in seen("/lean/manager").parameters or {} if "speed" in name]
+
+
+def test_a_whole_node_has_what_any_lifecycle_node_has_and_nothing_twice(
+    system: RunningSystem, peer: Peer
+) -> None:
+    plain = LifecycleNode("plain", context=peer.context)
+
+    def endpoints(name: str) -> dict[str, Counter[str]]:
+        """What the node has by kinds, its own name left out, each with how often it is there."""
+        node = peer.node
+        publishers = [
+            topic
+            for topic, _ in node.get_publisher_names_and_types_by_node(name, "/")
+            for info in node.get_publishers_info_by_topic(topic)
+            if info.node_name == name
+        ]
+        services = [
+            service
+            for service, _ in node.get_service_names_and_types_by_node(name, "/")
+            for _ in range(node.count_services(service))
+        ]
+        found = {"publishers": publishers, "services": services}
+        return {
+            kind: Counter(item.replace(f"/{name}/", "~/") for item in names)
+            for kind, names in found.items()
+        }
+
+    try:
+        wait_until(lambda: {"plain", "whole"} <= set(peer.node.get_node_names()), "both nodes")
+        expected = endpoints("plain")
+        assert len(expected["services"]) == 12
+        assert set(expected["services"].values()) == set(expected["publishers"].values()) == {1}
+        wait_until(lambda: endpoints("whole") == expected, "all endpoints")
+    finally:
+        plain.destroy_node()
+
+
+def test_nobody_has_to_know_whom_a_command_asks(system: RunningSystem) -> None:
+    def said(*arguments: str) -> str:
+        command = [*COMPOSE, *arguments]
+        done = subprocess.run(command, capture_output=True, check=False, text=True, timeout=30.0)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert said("lifecycle", "set", "talker", "deactivate") == f"{TALKER}: active -> inactive\n"
+    (told,) = json.loads(said("ps", "--json"))["systems"]
+    states = {node["node"]: node["state"] for node in told["nodes"]}
+    assert states == {TALKER: "inactive", "/whole": "active"}
+    said("lifecycle", "set", "--system", "lean", "--to", "active")
+    said("param", "set", "talker", "speed", "3.5")
+    assert "3.5" in said("param", "get", "talker", "speed")
+    assert system.node("talker").state == "active"

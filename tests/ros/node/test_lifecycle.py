@@ -1,0 +1,286 @@
+"""The lifecycle tells the truth: every transition ends, every request is answered."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Coroutine
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lifecycle_msgs.msg import Transition, TransitionEvent
+from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions
+from std_srvs.srv import Trigger
+
+from composer.runtime.supervision.events import NodeFailed
+from composer.runtime.supervision.interruption import CallbackInterrupted
+from tests.ros.support.in_process import Peer, finished, running, wait_until
+
+SUBJECT = """
+system: subject
+nodes:
+  subject:
+    lifecycle: {autostart: unconfigured}
+    behavior: subject:Subject
+  other:
+    services:
+      trigger: {type: std_srvs/srv/Trigger, external: true, respond: {success: true}}
+"""
+QUIET = """
+from composer.behavior import Behavior
+
+class Subject(Behavior):
+    pass
+"""
+
+
+def test_ros_tools_see_every_state_and_transition(tmp_path: Path, peer: Peer) -> None:
+    with running(SUBJECT, tmp_path, subject=QUIET) as system:
+        events = peer.listen(TransitionEvent, "/subject/transition_event")
+        wait_until(lambda: peer.node.count_publishers("/subject/transition_event"))
+        assert peer.state("/subject") == "unconfigured"
+        for transition, state in (
+            ("configure", "inactive"),
+            ("activate", "active"),
+            ("deactivate", "inactive"),
+            ("cleanup", "unconfigured"),
+            ("shutdown", "finalized"),
+        ):
+            assert peer.change("/subject", transition)
+            assert peer.state("/subject") == state
+        wait_until(lambda: len(events) == 10)
+        states = peer.call(GetAvailableStates, "/subject/get_available_states").available_states
+        legal = peer.call(GetAvailableTransitions, "/other/get_available_transitions")
+        graph = peer.call(GetAvailableTransitions, "/other/get_transition_graph")
+    assert [(event.start_state.label, event.goal_state.label) for event in events[:4]] == [
+        ("unconfigured", "configuring"),
+        ("configuring", "inactive"),
+        ("inactive", "activating"),
+        ("activating", "active"),
+    ]
+    assert len(states) == 11
+    labels = {entry.transition.label for entry in legal.available_transitions}
+    assert labels == {"deactivate", "shutdown"}
+    assert len(graph.available_transitions) > 20
+    assert system.states("/subject") == [
+        "/subject inactive",
+        "/subject active",
+        "/subject inactive",
+        "/subject unconfigured",
+        "/subject finalized",
+    ]
+
+
+@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+def test_illegal_requests_are_refused_and_change_nothing(
+    tmp_path: Path, peer: Peer, kind: str
+) -> None:
+    text = f"""
+    system: subject
+    executors: {{default: {{kind: {kind}}}}}
+    nodes: {{subject: {{}}}}
+    """
+    with running(text, tmp_path) as system:
+        for transition in (
+            0, 99, 255, Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_CONFIGURE,
+            Transition.TRANSITION_CREATE, Transition.TRANSITION_DESTROY,
+            Transition.TRANSITION_INACTIVE_SHUTDOWN, Transition.TRANSITION_ON_CONFIGURE_SUCCESS,
+            Transition.TRANSITION_ON_ERROR_ERROR, "nonsense", "transition_success", "activate",
+        ):  # fmt: skip
+            assert not peer.change("/subject", transition)
+            assert peer.state("/subject") == "active"
+        assert (
+            "'activate' is refused: the node is active; legal now: deactivate, shutdown"
+            in system.log()
+        )
+        assert peer.change("/subject", Transition.TRANSITION_ACTIVE_SHUTDOWN)
+        assert peer.state("/subject") == "finalized"
+        assert not peer.change("/subject", "shutdown")
+
+
+def test_what_interrupts_a_transition_too_late_leaves_no_coroutine_behind(
+    tmp_path: Path,
+    peer: Peer,
+    monkeypatch: pytest.MonkeyPatch,
+    recwarn: pytest.WarningsRecorder,
+) -> None:
+    failing = QUIET.replace("pass", "def on_configure(self):\n        raise ValueError('no map')")
+    gc.collect()
+    recwarn.clear()  # what other tests have left behind is not told here
+    with running(SUBJECT, tmp_path, subject=failing) as system:
+        node = system.node("subject")
+        loop = node.loop
+        run_task = loop.run_task
+
+        def strike(work: Coroutine[Any, Any, Any]) -> Any:
+            if node.state == "errorprocessing":
+                raise CallbackInterrupted
+            return run_task(work)
+
+        monkeypatch.setattr(loop, "run_task", strike)
+        assert not peer.change("/subject", "configure")
+        assert peer.state("/subject") == "finalized"
+        gc.collect()
+    assert [str(warning.message) for warning in recwarn if "awaited" in str(warning.message)] == []
+
+
+OUTCOMES = [
+    ("pass", "success"),
+    ("return True", "success"),
+    ("return False", "failure"),
+    ("raise TransitionFailed('not now')", "failure"),
+    ("return 'nonsense'", "error"),
+    ("raise ValueError('broken')", "error"),
+    ("raise SystemExit(1)", "error"),
+    ("raise KeyboardInterrupt", "error"),
+]
+#: transition -> (how to get there, state after success, after a refusal, after an error)
+TRANSITIONS = {
+    "configure": ([], "inactive", "unconfigured", "unconfigured"),
+    "activate": (["configure"], "active", "inactive", "unconfigured"),
+    "deactivate": (["configure", "activate"], "inactive", "active", "unconfigured"),
+    "cleanup": (["configure"], "unconfigured", "inactive", "unconfigured"),
+    "shutdown": (["configure", "activate"], "finalized", "finalized", "unconfigured"),
+}
+
+
+def was_told(events: list[TransitionEvent], state: str) -> bool:
+    return bool(events) and events[-1].goal_state.label == state
+
+
+@pytest.mark.parametrize("prefix", ["", "async "])
+@pytest.mark.parametrize("transition", TRANSITIONS)
+def test_whatever_a_handler_does_the_node_ends_in_a_primary_state(
+    tmp_path: Path, peer: Peer, transition: str, prefix: str
+) -> None:
+    before, *ends = TRANSITIONS[transition]
+    module = f"""
+    from composer.behavior import Behavior, TransitionFailed
+
+    class Subject(Behavior):
+        {prefix}def on_{transition}(self):
+            if self.parameters.outcome >= 0:
+                return {prefix and "await "}getattr(self, f"outcome_{{self.parameters.outcome}}")()
+
+        def on_error(self, cause):
+            self.log.info(f"cause: {{type(cause).__name__}}")
+    """
+    for number, (body, _) in enumerate(OUTCOMES):
+        module += f"\n        {prefix}def outcome_{number}(self):\n            {body}\n"
+    text = SUBJECT.replace("    behavior: sub", "    parameters: {outcome: -1}\n    behavior: sub")
+    with running(text, tmp_path, subject=module) as system:
+        events = peer.listen(TransitionEvent, "/subject/transition_event")
+        for number, (body, outcome) in enumerate(OUTCOMES):
+            if transition == "shutdown" and outcome != "error":
+                continue  # what ends in finalized cannot be tried again
+            for step in before:
+                assert peer.change("/subject", step)
+            assert peer.set_parameter("/subject", "outcome", number) == ""
+            answer = peer.change("/subject", transition)
+            assert answer is (outcome == "success"), body
+            end = ends[("success", "failure", "error").index(outcome)]
+            assert peer.state("/subject") == end, body
+            wait_until(partial(was_told, events, end), f"the event of {end}")
+            assert peer.set_parameter("/subject", "outcome", -1) == ""
+            for step in {"inactive": ["cleanup"], "active": ["deactivate", "cleanup"]}.get(end, []):
+                assert peer.change("/subject", step)
+            assert peer.call(Trigger, "/trigger").success, "the other node goes on"
+    log = system.log_text()
+    assert f"on_{transition}: ValueError: broken\nTraceback" in log
+    assert f"on_{transition}: WrongReturn: on_{transition} returned 'nonsense'" in log
+    assert "cause: SystemExit" in log
+    if transition != "shutdown":
+        assert f"on_{transition} refuses: not now" in log
+
+
+def test_an_error_in_on_error_finalizes_the_node(tmp_path: Path, peer: Peer) -> None:
+    module = """
+    from composer.behavior import Behavior
+
+    class Subject(Behavior):
+        def on_configure(self): raise ValueError("first")
+        def on_error(self, cause): raise RuntimeError(f"second, after {cause}")
+    """
+    with running(SUBJECT, tmp_path, subject=module) as system:
+        assert not peer.change("/subject", "configure")
+        assert peer.state("/subject") == "finalized"
+        assert peer.call(Trigger, "/trigger").success
+        wait_until(lambda: system.told(NodeFailed), "the failure, before the end is asked for")
+    assert "on_error: RuntimeError: second, after first" in system.log_text()
+    assert system.end().exit_code == 1
+
+
+def test_requests_in_mid_transition_are_refused(tmp_path: Path, peer: Peer) -> None:
+    module = """
+    from composer.behavior import Behavior
+
+    class Subject(Behavior):
+        async def on_configure(self):
+            self.log.info("begin")
+            while not self.parameters.may_end:
+                await self.clock.sleep(0.01)
+    """
+    text = SUBJECT.replace("    behav", "    parameters: {may_end: false}\n    behav")
+    with running(text, tmp_path, subject=module) as system:
+        client = peer.client(ChangeState, "/subject/change_state")
+        request = ChangeState.Request(transition=Transition(label="configure"))
+        under_way = client.call_async(request)
+        system.wait_for_log("begin")
+        assert peer.state("/subject") == "configuring"
+        assert not finished(client.call_async(request)).success
+        assert not under_way.done(), "refused at once"
+        assert peer.set_parameter("/subject", "may_end", True) == ""
+        assert finished(under_way).success
+        assert peer.state("/subject") == "inactive"
+    assert "'configure' is refused: the node is configuring; legal now: none" in system.log_text()
+
+
+def test_a_handler_that_awaits_for_ever_is_an_error(tmp_path: Path, peer: Peer) -> None:
+    module = """
+    from composer.behavior import Behavior
+    from composer.runtime.executors.tasks import Future
+
+    class Subject(Behavior):
+        async def on_configure(self):
+            await Future()
+    """
+    text = SUBJECT.replace("unconfigured}", "unconfigured, timeout_ms: 200}")
+    with running(text, tmp_path, subject=module) as system:
+        assert not peer.change("/subject", "configure")
+        assert peer.state("/subject") == "unconfigured"
+    assert "on_configure: TransitionTimeout: not through after 0.2 s" in system.log_text()
+
+
+def test_cycles_leave_nothing_behind(tmp_path: Path, peer: Peer) -> None:
+    """Counted from inside; what the process and the graph show is in test_lifecycle_process."""
+    text = """
+    system: cycles
+    nodes:
+      cycled:
+        subscriptions: {input: {type: std_msgs/msg/String, external: true, log: x}}
+        publishers: {output: {type: std_msgs/msg/String, external: true}}
+        services: {trigger: {type: std_srvs/srv/Trigger, external: true}}
+        clients: {ask: {type: std_srvs/srv/Trigger, external: true}}
+        action_servers: {serve: {type: composer_interfaces/action/Navigate, external: true}}
+        action_clients: {send: {type: composer_interfaces/action/Navigate, external: true}}
+        timers: {tick: {period_ms: 1000, log: x}}
+    """
+    with running(text, tmp_path) as system:
+        node = system.node("cycled")
+        ros = node._ros
+
+        def entities() -> int:
+            kinds = (ros.publishers, ros.subscriptions, ros.clients, ros.services, ros.waitables)
+            return sum(len(list(kind)) for kind in kinds)
+
+        full = entities()
+        for _ in range(20):
+            for transition in ("deactivate", "cleanup"):
+                assert peer.change("/cycled", transition)
+            empty = entities()
+            for transition in ("configure", "activate"):
+                assert peer.change("/cycled", transition)
+            assert entities() == full
+        assert empty <= full - 6
+        assert not node._core.tasks

@@ -1,0 +1,210 @@
+"""The lifecycle of a node asked for from another process: any request, very many, very often."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.qos import QoSProfile
+from std_srvs.srv import Trigger
+
+from tests.ros.support import commands
+from tests.ros.support.in_process import Peer, finished, wait_until
+from tests.ros.support.system_process import RunningSystem
+
+SYSTEM = """
+system: subject
+nodes:
+  subject:
+    lifecycle: {autostart: unconfigured}
+    subscriptions: {input: {type: std_msgs/msg/String, external: true, log: x}}
+    publishers: {output: {type: std_msgs/msg/String, external: true}}
+    services: {trigger: {type: std_srvs/srv/Trigger, external: true, respond: {success: true}}}
+    clients: {ask: {type: std_srvs/srv/Trigger, external: true}}
+    action_servers:
+      serve:
+        {type: composer_interfaces/action/Navigate, external: true, result: {success: true}}
+    action_clients: {send: {type: composer_interfaces/action/Navigate, external: true}}
+    timers: {tick: {period_ms: 1000, log: x}}
+  other:
+    services: {alive: {type: std_srvs/srv/Trigger, external: true, respond: {success: true}}}
+"""
+SERVICES = "service list --include-hidden --show-types"
+#: What an outsider is shown of all that there is, and of the node.
+LISTS = (
+    "topic list --include-hidden --show-types",
+    SERVICES,
+    "action list --show-types",
+    "node list",
+    "node info /subject --include-hidden",
+)
+PORTS = ("input", "output", "trigger", "ask", "serve", "send")
+CYCLE = ("configure", "activate", "deactivate", "cleanup")
+#: Of memory that may be held in the end, so that it is 10 MB at the most after a thousand cycles.
+KILOBYTES_AT_ALL, KILOBYTES_PER_CYCLE = 2000, 8
+
+
+@contextmanager
+def running(folder: Path) -> Iterator[RunningSystem]:
+    path = folder / "subject.yaml"
+    path.write_text(SYSTEM, encoding="utf-8")
+    with RunningSystem(str(path)) as system:
+        system.wait_for("1 of 2 nodes active")
+        yield system
+
+
+class Subject:
+    """The node, as one client sees it."""
+
+    def __init__(self, peer: Peer) -> None:
+        self._change = peer.client(ChangeState, "/subject/change_state")
+        self._state = peer.client(GetState, "/subject/get_state")
+
+    def change(self, wanted: str | int) -> bool:
+        request = ChangeState.Request(transition=transition_of(wanted))
+        return bool(finished(self._change.call_async(request)).success)
+
+    @property
+    def state(self) -> str:
+        return str(finished(self._state.call_async(GetState.Request())).current_state.label)
+
+
+class Client:
+    """A node that asks for one transition after the other."""
+
+    def __init__(self, peer: Peer, requests: tuple[str | int, ...], first: int) -> None:
+        self.answers: list[bool] = []
+        self._requests = itertools.islice(itertools.cycle(requests), first, first + 125)
+        node = peer.join(f"client_{first}")
+        # With Fast DDS each client gets the answers to all of them, and keeps ten by default.
+        self._client = node.create_client(
+            ChangeState, "/subject/change_state", qos_profile=QoSProfile(depth=1000)
+        )
+        wait_until(self._client.service_is_ready)
+
+    def ask(self) -> None:
+        for wanted in self._requests:
+            request = ChangeState.Request(transition=transition_of(wanted))
+            self._client.call_async(request).add_done_callback(self._take)
+            return
+
+    def _take(self, future: Any) -> None:
+        self.answers.append(bool(future.result().success))
+        self.ask()
+
+
+def transition_of(wanted: str | int) -> Transition:
+    return Transition(label=wanted) if isinstance(wanted, str) else Transition(id=wanted)
+
+
+def test_any_request_is_answered_however_many_there_are(tmp_path: Path, peer: Peer) -> None:
+    """Wrong ids, wrong states, and a thousand requests from eight nodes at once."""
+    illegal = (
+        0, 8, 99, 255, "nonsense", "transition_success", "transition_error", "destroy",
+        Transition.TRANSITION_CREATE, Transition.TRANSITION_DESTROY,
+        Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_ACTIVE_SHUTDOWN,
+        Transition.TRANSITION_ON_CONFIGURE_SUCCESS, Transition.TRANSITION_ON_ERROR_ERROR,
+    )  # fmt: skip
+    with running(tmp_path) as system:
+        subject = Subject(peer)
+        for wanted in illegal:
+            assert not subject.change(wanted), wanted
+            assert subject.state == "unconfigured", wanted
+
+        requests = (*CYCLE, "nonsense", 99, 0, Transition.TRANSITION_DESTROY)
+        clients = [Client(peer, requests, first) for first in range(8)]
+        for client in clients:
+            client.ask()
+        wait_until(lambda: all(len(client.answers) == 125 for client in clients), "the answers")
+        answers = [answer for client in clients for answer in client.answers]
+        assert any(answers)
+        assert subject.state in ("unconfigured", "inactive", "active")
+        assert peer.call(Trigger, "/alive").success
+        assert system.stop()[0] == 0
+    stopping = next(place for place, line in enumerate(system.lines) if "stopping:" in line)
+    told = [line for line in system.lines[:stopping] if "[compose] /subject" in line]
+    assert sum(answers) == len(told), "every success is a change of state, and no other is"
+
+
+class Usage:
+    """What the process of a system holds, and what of it the ROS graph shows."""
+
+    def __init__(self, system: RunningSystem, peer: Peer) -> None:
+        self._process = Path("/proc", str(system.process.pid))
+        self._peer = peer
+
+    @property
+    def resident_kilobytes(self) -> int:
+        for line in (self._process / "status").read_text().splitlines():
+            if line.startswith("VmRSS:"):
+                return int(line.split()[1])
+        raise AssertionError("no VmRSS")
+
+    @property
+    def open_files(self) -> Counter[str]:
+        """What every file descriptor leads to."""
+        found = Counter[str]()
+        for descriptor in (self._process / "fd").iterdir():
+            with suppress(FileNotFoundError):  # closed meanwhile
+                found[str(descriptor.readlink())] += 1
+        return found
+
+    @property
+    def graph(self) -> set[str]:
+        """Every topic and service that is known."""
+        node = self._peer.node
+        known = (*node.get_topic_names_and_types(), *node.get_service_names_and_types())
+        return {name for name, _ in known}
+
+    @property
+    def ports(self) -> set[str]:
+        """What of it the node makes when it is configured."""
+        return {name for name in self.graph if name.split("/")[1] in PORTS}
+
+
+def lists_of_an_outsider() -> dict[str, str]:
+    """What somebody sees who has just come: he knows nothing of what was there before."""
+    processes = {words: commands.start(*words.split()) for words in LISTS}
+    return {words: commands.finished(process) for words, process in processes.items()}
+
+
+@pytest.mark.parametrize(
+    "cycles", [60, pytest.param(1000, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
+)
+def test_cycles_leave_nothing_behind(tmp_path: Path, peer: Peer, cycles: int) -> None:
+    with running(tmp_path) as system:
+        subject, usage = Subject(peer), Usage(system, peer)
+
+        def cycle(times: int) -> None:
+            for _ in range(times):
+                for transition in CYCLE:
+                    assert subject.change(transition), transition
+
+        cycle(20)  # what is made once, and what an allocator keeps
+        wait_until(lambda: "/alive" in usage.graph and not usage.ports, "no ports")
+        kilobytes, files = usage.resident_kilobytes, usage.open_files
+        cycle(cycles)
+        grown = usage.resident_kilobytes - kilobytes
+        print(f"{cycles} cycles: {grown} kB more, {files} became {usage.open_files}")
+        assert grown < KILOBYTES_AT_ALL + KILOBYTES_PER_CYCLE * cycles
+        # What a frame or a cycle of references keeps for a moment is not lost; it may be among
+        # what was open before, too.
+        wait_until(lambda: usage.open_files <= files, "no more open files")
+        wait_until(lambda: not usage.ports, "no ports again")
+        worn = lists_of_an_outsider()
+        assert subject.change("configure")
+        wait_until(lambda: len(usage.ports) > 10, "it has ports again")
+        assert system.stop()[0] == 0
+    with running(tmp_path) as system:
+        fresh = lists_of_an_outsider()
+        assert "/alive" in fresh[SERVICES]
+        assert "/trigger" not in fresh[SERVICES]
+        assert worn == fresh
+        assert system.stop()[0] == 0

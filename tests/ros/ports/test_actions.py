@@ -1,0 +1,306 @@
+"""Action servers and clients of a running node, from goal to result and every way out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from action_msgs.msg import GoalStatus
+from composer_interfaces.action import Navigate
+from rclpy.action import ActionClient
+
+from tests.ros.support.in_process import Peer, finished, running, wait_until
+
+SERVER = """
+system: server
+executors: {shared: {kind: KIND}}
+nodes:
+  server:
+    executor: shared
+    action_servers:
+      navigate:
+        type: composer_interfaces/action/Navigate
+        external: true
+        accept: goal.max_velocity > 0.0
+        log: "goal to {goal.target.x}"
+        feedback:
+          count: 4
+          period_ms: 5
+          message:
+            progress_percent: "{(count + 1) * 25.0}"
+            current_position: {x: "{goal.target.x}"}
+        result: {success: true, message: "arrived at {goal.target.x}"}
+"""
+KINDS = ["events", "single_threaded", "multi_threaded"]
+
+
+class Navigator:
+    """The client side, as anybody would write it."""
+
+    def __init__(self, peer: Peer) -> None:
+        self._peer = peer
+        self.feedback: list[float] = []
+        self.client = ActionClient(peer.node, Navigate, "/navigate")
+        wait_until(self.client.server_is_ready, "the action server")
+
+    def send(self, x: float = 1.0, max_velocity: float = 1.0) -> Any:
+        goal = Navigate.Goal(max_velocity=max_velocity)
+        goal.target.x = x
+        take = self._take
+        return self._answer(lambda: self.client.send_goal_async(goal, feedback_callback=take))
+
+    def result(self, handle: Any) -> tuple[int, Navigate.Result]:
+        answer = self._answer(handle.get_result_async)
+        return answer.status, answer.result
+
+    def cancel(self, handle: Any) -> Any:
+        return self._answer(handle.cancel_goal_async)
+
+    def _answer(self, ask: Callable[[], Any]) -> Any:
+        """Ask on the thread that takes answers: it drops one whose question is not noted yet."""
+        return finished(self._peer.run(ask))
+
+    def _take(self, message: Any) -> None:
+        self.feedback.append(message.feedback.progress_percent)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_declared_action_gives_feedback_and_a_result(
+    tmp_path: Path, peer: Peer, kind: str
+) -> None:
+    with running(SERVER.replace("KIND", kind), tmp_path) as system:
+        navigator = Navigator(peer)
+        server = system.node("server")._core.node
+        wait_until(lambda: server.count_subscribers("/navigate/_action/feedback"), "who listens")
+        handle = navigator.send(3.0)
+        # With the result rclpy's client forgets the feedback that it has not taken yet.
+        wait_until(lambda: len(navigator.feedback) == 4, "all feedback")
+        status, result = navigator.result(handle)
+        assert system.log() == ["goal to 3.0"]
+    assert status == GoalStatus.STATUS_SUCCEEDED
+    assert (result.success, result.message) == (True, "arrived at 3.0")
+    assert navigator.feedback == [25.0, 50.0, 75.0, 100.0]
+
+
+def test_goals_are_rejected_by_accept_and_by_a_node_that_is_not_active(
+    tmp_path: Path, peer: Peer
+) -> None:
+    with running(SERVER.replace("KIND", "events"), tmp_path) as system:
+        navigator = Navigator(peer)
+        assert not navigator.send(max_velocity=0.0).accepted
+        system.wait_for_log("rejects a goal: it does not fulfil 'accept'")
+        assert peer.change("/server", "deactivate")
+        assert not navigator.send().accepted
+        system.wait_for_log("rejects a goal: /server is inactive, not active")
+        assert peer.change("/server", "activate")
+        assert navigator.send().accepted
+
+
+HANDLED = """
+system: handled
+executors: {shared: {kind: KIND}}
+nodes:
+  handled:
+    executor: shared
+    behavior: handled:Handled
+    action_servers:
+      navigate: {type: composer_interfaces/action/Navigate, external: true, reentrant: REENTRANT}
+"""
+PATIENT = """
+from composer.behavior import Behavior
+from composer_interfaces.action import Navigate
+
+class Handled(Behavior):
+    def accept_navigate(self, request):
+        return request.target.x < 100.0
+
+    async def on_navigate(self, goal):
+        self.log.info(f"begin {goal.request.target.x}")
+        while not goal.is_cancel_requested:
+            await self.clock.sleep(0.002)
+        return Navigate.Result(message="stopped")
+"""
+
+
+def handled(kind: str = "events", reentrant: bool = False) -> str:
+    return HANDLED.replace("KIND", kind).replace("REENTRANT", str(reentrant).lower())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_client_cancels_a_goal(tmp_path: Path, peer: Peer, kind: str) -> None:
+    with running(handled(kind), tmp_path, handled=PATIENT) as system:
+        navigator = Navigator(peer)
+        assert not navigator.send(100.0).accepted
+        handle = navigator.send(2.0)
+        system.wait_for_log("begin 2.0")
+        answer = navigator.cancel(handle)
+        status, result = navigator.result(handle)
+    assert len(answer.goals_canceling) == 1
+    assert (status, result.message) == (GoalStatus.STATUS_CANCELED, "stopped")
+
+
+def test_one_goal_at_a_time_and_those_that_wait_can_be_canceled(tmp_path: Path, peer: Peer) -> None:
+    with running(handled(), tmp_path, handled=PATIENT) as system:
+        navigator = Navigator(peer)
+        first, second, third = (navigator.send(float(number)) for number in (1, 2, 3))
+        system.wait_for_log("begin 1.0")
+        navigator.cancel(second)
+        assert navigator.result(second)[0] == GoalStatus.STATUS_CANCELED
+        assert "begin 3.0" not in system.log_text()
+        navigator.cancel(first)
+        assert navigator.result(first)[0] == GoalStatus.STATUS_CANCELED
+        system.wait_for_log("begin 3.0")
+        navigator.cancel(third)
+        assert navigator.result(third)[0] == GoalStatus.STATUS_CANCELED
+    assert "begin 2.0" not in system.log_text()
+
+
+def test_goals_of_a_reentrant_port_overlap(tmp_path: Path, peer: Peer) -> None:
+    with running(handled(reentrant=True), tmp_path, handled=PATIENT) as system:
+        navigator = Navigator(peer)
+        assert navigator.send(1.0).accepted
+        assert navigator.send(2.0).accepted
+        system.wait_for_log("begin 1.0")
+        system.wait_for_log("begin 2.0")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_deactivation_cancels_the_goals(tmp_path: Path, peer: Peer, kind: str) -> None:
+    with running(handled(kind), tmp_path, handled=PATIENT) as system:
+        navigator = Navigator(peer)
+        running_goal, waiting = navigator.send(1.0), navigator.send(2.0)
+        system.wait_for_log("begin 1.0")
+        assert peer.change("/handled", "deactivate")
+        assert peer.state("/handled") == "inactive"
+        assert navigator.result(running_goal)[0] == GoalStatus.STATUS_CANCELED
+        assert navigator.result(waiting)[0] == GoalStatus.STATUS_CANCELED
+        counted = system.summary("/handled")
+    assert counted.errors == 0
+    assert system.end().exit_code == 0
+
+
+def test_a_handler_that_does_not_end_its_goal_is_ended(tmp_path: Path, peer: Peer) -> None:
+    module = """
+    from composer.behavior import Behavior, CallCancelled
+
+    class Handled(Behavior):
+        async def on_navigate(self, goal):
+            self.log.info("begin")
+            while True:
+                try:
+                    await self.clock.sleep(0.01)
+                except CallCancelled:
+                    await never(self)
+
+    async def never(behavior):
+        from composer.runtime.executors.tasks import Future
+        await Future()
+    """
+    with running(handled(), tmp_path, handled=module) as system:
+        navigator = Navigator(peer)
+        handle = navigator.send()
+        system.wait_for_log("begin")
+        assert peer.change("/handled", "deactivate")
+        assert navigator.result(handle)[0] == GoalStatus.STATUS_CANCELED
+        assert peer.change("/handled", "cleanup")
+    assert "action server 'navigate': a goal did not end, it is canceled now" in system.log()
+
+
+@pytest.mark.parametrize(
+    "way_out",
+    [
+        ("raise ValueError('no way')", GoalStatus.STATUS_ABORTED, "ValueError: no way"),
+        ("raise SystemExit(1)", GoalStatus.STATUS_ABORTED, "SystemExit: 1"),
+        ("return 'nonsense'", GoalStatus.STATUS_ABORTED, "not a Navigate.Result"),
+        ("return None", GoalStatus.STATUS_SUCCEEDED, ""),
+        ("goal.abort()", GoalStatus.STATUS_ABORTED, ""),
+        ("goal.canceled()", GoalStatus.STATUS_CANCELED, ""),
+        ("goal.succeed(); goal.succeed()", GoalStatus.STATUS_SUCCEEDED, "on_navigate"),
+        ("goal.publish_feedback('nonsense')", GoalStatus.STATUS_ABORTED, "TypeError"),
+    ],
+)
+@pytest.mark.parametrize("prefix", ["", "async "])
+def test_every_way_out_of_a_handler_ends_the_goal(
+    tmp_path: Path, peer: Peer, prefix: str, way_out: tuple[str, int, str]
+) -> None:
+    body, status, fault = way_out
+    module = f"""
+    from composer.behavior import Behavior
+
+    class Handled(Behavior):
+        {prefix}def on_navigate(self, goal):
+            {body}
+    """
+    with running(handled(), tmp_path, handled=module) as system:
+        navigator = Navigator(peer)
+        assert navigator.result(navigator.send())[0] == status
+        counted = system.summary("/handled")
+    assert counted.errors == (1 if fault else 0)
+    assert fault in system.log_text()
+
+
+CLIENT = """
+system: client
+nodes:
+  server:
+    behavior: handled:Handled
+    action_servers:
+      navigate: {type: composer_interfaces/action/Navigate, external: true}
+  client:
+    lifecycle: {depends_on: [server]}
+    action_clients:
+      navigate:
+        type: composer_interfaces/action/Navigate
+        timeout_ms: 20000
+        on_feedback: {log: "feedback {feedback.progress_percent} of {goal.target.x}"}
+        on_result: {log: "{status}: {result.message}"}
+        on_failure: {log: "failed: {failure}"}
+    timers:
+      send: {period_ms: 20, when: count == 0, call: {navigate: {target: {x: TARGET}}}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("target", "lines"),
+    [
+        ("1.0", ["feedback 50.0 of 1.0", "succeeded: done"]),
+        ("-1.0", ["feedback 50.0 of -1.0", "aborted: "]),
+        ("100.0", ["failed: action '/navigate' did not take the goal"]),
+    ],
+)
+def test_the_reactions_of_an_action_client(
+    tmp_path: Path, peer: Peer, target: str, lines: list[str]
+) -> None:
+    module = """
+    from composer.behavior import Behavior
+    from composer_interfaces.action import Navigate
+
+    class Handled(Behavior):
+        def accept_navigate(self, request):
+            return request.target.x < 100.0
+
+        async def on_navigate(self, goal):
+            goal.publish_feedback(Navigate.Feedback(progress_percent=50.0))
+            await self.clock.sleep(0.05)
+            if goal.request.target.x < 0.0:
+                goal.abort()
+                return Navigate.Result()
+            return Navigate.Result(message="done")
+    """
+    with running(CLIENT.replace("TARGET", target), tmp_path, handled=module) as system:
+        system.wait_for_log(lines[-1])
+    assert [line for line in system.log() if "rejects" not in line] == lines
+
+
+def test_goals_are_canceled_when_the_node_that_sent_them_leaves_active(
+    tmp_path: Path, peer: Peer
+) -> None:
+    with running(CLIENT.replace("TARGET", "1.0"), tmp_path, handled=PATIENT) as system:
+        system.wait_for_log("begin 1.0")
+        assert peer.change("/client", "deactivate")
+        server = system.node("server")._assembly.action_servers["navigate"]
+        wait_until(lambda: not server._goals, "the goal has ended")
+        assert peer.state("/server") == "active"
+        assert system.summary("/client").errors == 0

@@ -1,0 +1,166 @@
+"""Service clients of a running node: answers, failures, and the end of waiting."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+from std_srvs.srv import Trigger
+
+from composer.model import PrimaryState
+from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
+
+ASKER = """
+system: asker
+nodes:
+  asker:
+    clients:
+      trigger:
+        type: std_srvs/srv/Trigger
+        external: true
+        timeout_ms: 200
+        on_response: {log: "{response.message}, number {count}"}
+    timers:
+      ask: {period_ms: 50, when: count == 0, call: {trigger: {}}}
+"""
+TOLD = '        on_failure: {log: {level: warn, message: "failed: {failure}"}}\n'
+
+
+def declared(on_failure: bool) -> str:
+    return ASKER.replace("    timers:", (TOLD if on_failure else "") + "    timers:")
+
+
+def activate_once_the_server_is_known(system: RunningSystem) -> None:
+    """Find the server first: that may take longer than the only call may."""
+    client = system.node("asker")._assembly.clients["trigger"]
+    wait_until(client._has_server, "the server")
+    system.change("asker", "activate")
+
+
+def test_a_declared_call_is_answered(tmp_path: Path, peer: Peer) -> None:
+    peer.node.create_service(
+        Trigger, "/trigger", lambda _, response: Trigger.Response(message="yes")
+    )
+    text = ASKER.replace("timeout_ms: 200", "timeout_ms: 20000")
+    with running(text, tmp_path, autostart=PrimaryState.INACTIVE) as system:
+        activate_once_the_server_is_known(system)
+        system.wait_for_log("yes, number 0")
+        assert system.summary("/asker").calls == 1
+
+
+def test_a_server_that_is_not_there_is_told_of(tmp_path: Path) -> None:
+    with running(declared(on_failure=True), tmp_path) as system:
+        line = system.wait_for_log("failed")
+    assert line == "failed: no server of service '/trigger' was there within 200 ms"
+
+
+def test_a_failure_that_nothing_is_declared_for_is_logged_and_counted(tmp_path: Path) -> None:
+    with running(ASKER, tmp_path) as system:
+        line = system.wait_for_log("within 200 ms")
+        counted = system.summary("/asker")
+    assert line == "client 'trigger': no server of service '/trigger' was there within 200 ms"
+    assert counted.errors == 1
+
+
+def test_a_server_that_does_not_answer_is_told_of(tmp_path: Path, peer: Peer) -> None:
+    held = threading.Event()
+
+    def answer_late(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        held.wait(20.0)
+        return response
+
+    peer.node.create_service(Trigger, "/trigger", answer_late)
+    text = declared(on_failure=True)
+    with running(text, tmp_path, autostart=PrimaryState.INACTIVE) as system:
+        activate_once_the_server_is_known(system)
+        line = system.wait_for_log("failed")
+        held.set()
+    assert line == "failed: service '/trigger' did not answer within 200 ms"
+
+
+CALLER = """
+system: caller
+executors: {shared: {kind: KIND}}
+nodes:
+  caller:
+    executor: shared
+    behavior: caller:Caller
+    clients:
+      trigger: {type: std_srvs/srv/Trigger, external: true, timeout_ms: 30000}
+    timers:
+      ask: {period_ms: 10}
+      rest: {period_ms: 10}
+"""
+MODULE = """
+from composer.behavior import Behavior, CallCancelled, ServerUnavailable
+
+class Caller(Behavior):
+    async def on_ask(self):
+        self.log.info("asking")
+        try:
+            await self.clients.trigger.call(self.clients.trigger.service_type.Request())
+        except CallCancelled as error:
+            self.log.info(f"cancelled: {error}")
+            raise
+
+    async def on_rest(self):
+        self.log.info("resting")
+        await self.clock.sleep(60.0)
+
+    async def on_deactivate(self):
+        try:
+            await self.clients.trigger.call(
+                self.clients.trigger.service_type.Request(), timeout_ms=20.0
+            )
+        except ServerUnavailable as error:
+            self.log.info(f"last try: {error}")
+"""
+
+
+@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+def test_calls_and_sleeps_end_when_the_node_leaves_active(
+    tmp_path: Path, peer: Peer, kind: str
+) -> None:
+    with running(CALLER.replace("KIND", kind), tmp_path, caller=MODULE) as system:
+        system.wait_for_log("asking")
+        system.wait_for_log("resting")
+        core = system.node("caller")._core
+        wait_until(lambda: len(core.gate.pending._futures) == 2, "both wait")
+        assert peer.change("/caller", "deactivate")
+        assert peer.state("/caller") == "inactive"
+        wait_until(lambda: not core.tasks, "nothing runs any more")
+        counted = system.summary("/caller")
+    assert "cancelled: /caller is deactivating, not active" in system.log()
+    assert "last try: no server of service '/trigger' was there within 20 ms" in system.log(), (
+        "a node may make calls while it deactivates"
+    )
+    assert counted.errors == 0
+
+
+def test_what_is_wrong_in_a_call_is_told_at_once(tmp_path: Path) -> None:
+    module = """
+    from composer.behavior import Behavior, CallCancelled
+
+    class Caller(Behavior):
+        async def on_configure(self):
+            try:
+                self.clients.trigger.call("nonsense")
+            except TypeError as error:
+                self.log.info(str(error))
+            try:
+                await self.clients.trigger.call(self.clients.trigger.service_type.Request())
+            except CallCancelled as error:
+                self.log.info(str(error))
+            try:
+                self.clients.triger
+            except AttributeError as error:
+                self.log.info(str(error))
+    """
+    with running(CALLER.replace("KIND", "events"), tmp_path, caller=module) as system:
+        pass
+    assert system.log() == [
+        "client 'trigger' takes a Trigger.Request, not str",
+        "/caller is configuring, not active",
+        "no client 'triger'; there is: trigger",
+    ]

@@ -1,0 +1,148 @@
+"""Missed deadlines and lost liveliness: told at once, summed up, and counted, whatever the loop."""
+
+from __future__ import annotations
+
+import re
+import time
+from pathlib import Path
+
+import pytest
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from std_msgs.msg import String
+
+from composer.model import ExecutorKind
+from composer.runtime.ports import repeated
+from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
+
+KINDS = [str(kind) for kind in ExecutorKind]
+
+
+def counts(system: RunningSystem, node: str) -> dict[str, int]:
+    return dict(system.node(node).statistics.qos_events)
+
+
+def lines(system: RunningSystem, part: str) -> list[str]:
+    return [line for line in system.log() if part in line]
+
+
+def publishers(node: Node, topic: str) -> list[str]:
+    """Return the names of those who publish, as a node knows them."""
+    return [end.node_name for end in node.get_publishers_info_by_topic(topic)]
+
+
+def told(system: RunningSystem, pattern: str) -> bool:
+    return any(re.fullmatch(pattern, line) for line in system.log())
+
+
+TIMED = """
+system: timed
+executors: {{default: {{kind: {kind}}}}}
+qos_profiles: {{beat: {{extends: command, deadline_ms: {deadline_ms}}}}}
+nodes:
+  talker:
+    parameters: {{period_ms: 20.0}}
+    publishers: {{beat: {{type: std_msgs/msg/String, qos: beat}}}}
+    timers: {{tick: {{period_ms: "{{parameters.period_ms}}", publish: {{beat: {{data: x}}}}}}}}
+  listener:
+    subscriptions: {{beat: {{type: std_msgs/msg/String, qos: beat, log: "heard"}}}}
+"""
+OF_PUBLISHER = "publisher 'beat' on /beat: nothing was published within its deadline of 200 ms"
+OF_SUBSCRIPTION = "subscription 'beat' on /beat: nothing came within its deadline of 200 ms"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_missed_deadline_within_the_process_is_told_at_once_and_then_summed_up(
+    tmp_path: Path, peer: Peer, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(repeated, "AGAIN_AFTER_S", 1.0)
+    with running(TIMED.format(kind=kind, deadline_ms=200), tmp_path) as system:
+        wait_until(lambda: len(lines(system, "heard")) > 10)
+        assert peer.set_parameter("/talker", "period_ms", 1e6) == ""
+        # A busy machine may have made the talker miss one before: that one is told alone.
+        more = r" \(\d+ times more within 1 s\)"
+        of_talker = "; it is published by /talker"
+        wait_until(lambda: told(system, re.escape(OF_PUBLISHER) + more))
+        wait_until(lambda: told(system, re.escape(OF_SUBSCRIPTION + of_talker) + more))
+        assert lines(system, OF_PUBLISHER)[0] == OF_PUBLISHER
+        assert lines(system, OF_SUBSCRIPTION)[0] == OF_SUBSCRIPTION + of_talker
+        for node in ("talker", "listener"):
+            wait_until(lambda node=node: counts(system, node)["deadline_missed"] > 2)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_deadlines_that_are_missed_all_the_time_freeze_nothing(
+    tmp_path: Path, peer: Peer, kind: str
+) -> None:
+    # Taking the status of each froze the process within two seconds.
+    with running(TIMED.format(kind=kind, deadline_ms=2), tmp_path) as system:
+        wait_until(lambda: counts(system, "listener").get("deadline_missed", 0) > 1000)
+        heard = len(lines(system, "heard"))
+        wait_until(lambda: len(lines(system, "heard")) > heard + 10)
+        system.change("listener", "deactivate", "cleanup", "configure", "activate")
+        before = counts(system, "listener")["deadline_missed"]
+        wait_until(lambda: counts(system, "listener")["deadline_missed"] > before + 100)
+
+
+def test_who_is_not_active_misses_nothing(tmp_path: Path, peer: Peer) -> None:
+    with running(TIMED.format(kind="events", deadline_ms=200), tmp_path) as system:
+        wait_until(lambda: len(lines(system, "heard")) > 10)
+        assert peer.change("/talker", "deactivate")
+        before = counts(system, "talker")
+        wait_until(lambda: counts(system, "listener").get("deadline_missed", 0) > 3)
+        assert counts(system, "talker") == before  # it is to be silent
+
+
+def test_who_keeps_a_deadline_misses_none(tmp_path: Path) -> None:
+    with running(TIMED.format(kind="events", deadline_ms=60_000), tmp_path) as system:
+        over_s = time.monotonic() + 1.0
+        wait_until(lambda: time.monotonic() > over_s, "a second of beats")
+        wait_until(lambda: lines(system, "heard"))
+        assert counts(system, "talker") == counts(system, "listener") == {}
+
+
+LISTENER = """
+system: outside
+qos_profiles:
+  beat: {extends: command, deadline_ms: 200}
+nodes:
+  listener:
+    subscriptions:
+      beat: {type: std_msgs/msg/String, qos: beat, external: true, log: "heard"}
+"""
+
+
+def test_a_deadline_that_somebody_outside_misses_is_told_with_his_name(
+    tmp_path: Path, peer: Peer
+) -> None:
+    with running(LISTENER, tmp_path) as system:
+        qos = QoSProfile(depth=10, deadline=Duration(nanoseconds=200_000_000))
+        publisher = peer.publisher(String, "/beat", qos)
+        node = system.node("listener")._core.node
+        wait_until(lambda: publishers(node, "/beat") == [peer.node.get_name()], "its name")
+        publisher.publish(String())
+        system.wait_for_log("heard")
+        name = peer.node.get_fully_qualified_name()
+        assert name in system.wait_for_log(OF_SUBSCRIPTION)
+
+
+MANUAL = """
+system: manual
+qos_profiles:
+  alive: {extends: command, liveliness: manual_by_topic, liveliness_lease_duration_ms: 300}
+nodes:
+  talker:
+    publishers: {alive: {type: std_msgs/msg/String, qos: alive, external: true}}
+    subscriptions:
+      go: {type: std_msgs/msg/String, external: true, publish: {alive: {data: x}}}
+"""
+
+
+def test_a_publisher_that_gives_no_sign_of_life_is_told(tmp_path: Path, peer: Peer) -> None:
+    with running(MANUAL, tmp_path) as system:
+        peer.publisher(String, "/go").publish(String())
+        assert system.wait_for_log("no sign of life") == (
+            "publisher 'alive' on /alive: it gave no sign of life within its lease of 300 ms"
+        )
+        assert counts(system, "talker") == {"liveliness_lost": 1}

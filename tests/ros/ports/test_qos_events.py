@@ -1,0 +1,157 @@
+"""What the middleware tells of QoS: by name in the log, and counted."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Int64, String
+
+from composer.model import ExecutorKind
+from tests.ros.support.commands import COMPOSE
+from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
+
+BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+KINDS = [str(kind) for kind in ExecutorKind]
+
+
+def counts(system: RunningSystem, node: str) -> dict[str, int]:
+    return dict(system.node(node).statistics.qos_events)
+
+
+def publishers(system: RunningSystem, name: str, topic: str) -> list[str]:
+    """Return the names of those who publish, as a node of the system knows them."""
+    node = system.node(name)._core.node
+    return [end.node_name for end in node.get_publishers_info_by_topic(topic)]
+
+
+def lines(system: RunningSystem, part: str) -> list[str]:
+    return [line for line in system.log() if part in line]
+
+
+ENDS = """
+system: ends
+executors: {{default: {{kind: {kind}}}}}
+nodes:
+  a:
+    publishers: {{output: {{type: std_msgs/msg/String, external: true, qos: command}}}}
+    subscriptions: {{input: {{type: std_msgs/msg/String, external: true, qos: command}}}}
+"""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_outsiders_with_another_qos_are_named_with_the_policy(
+    tmp_path: Path, peer: Peer, kind: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with running(ENDS.format(kind=kind), tmp_path) as system:
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        known = system.node("a")._core.node.get_node_names
+        wait_until(lambda: peer.node.get_name() in known(), "the peer's name")
+        peer.node.create_publisher(String, "/input", BEST_EFFORT)
+        peer.node.create_subscription(String, "/output", lambda _: None, latched)
+        name = peer.node.get_fully_qualified_name()
+        heard = system.wait_for_log("subscription 'input'")
+        assert heard == (
+            f"subscription 'input' hears nothing of {name} on /input: reliability is best_effort "
+            "there, reliable here; the publisher does not send lost messages again"
+        )
+        reached = system.wait_for_log("publisher 'output'")
+        assert reached == (
+            f"publisher 'output' reaches nothing of {name} on /output: durability is "
+            "transient_local there, volatile here; the publisher keeps nothing for late joiners"
+        )
+        assert counts(system, "a") == {"incompatible": 2}
+    of_rclpy = capfd.readouterr().err
+    assert not re.search(r"'/input', offering incompatible|\[a\].*incompatible QoS", of_rclpy)
+
+
+def test_an_outsider_with_another_type_is_named(tmp_path: Path, peer: Peer) -> None:
+    with running(ENDS.format(kind="events"), tmp_path) as system:
+        odd = peer.join("odd")
+        odd.create_publisher(Int64, "/input", 10)
+        name = odd.get_fully_qualified_name()
+        wait_until(lambda: publishers(system, "a", "/input") == [odd.get_name()], "its name")
+        other = Peer()  # a participant has one type for a topic
+        try:
+            # Fast DDS tells nothing of types alone.
+            other.node.create_publisher(String, "/input", BEST_EFFORT)
+            system.wait_for_log("reliability is best_effort")
+        finally:
+            other.close()
+        assert system.wait_for_log("the type there") == (
+            f"subscription 'input' hears nothing of {name} on /input: the type there is "
+            "std_msgs/msg/Int64, here std_msgs/msg/String"
+        )
+
+
+LATCHED = """
+system: latched
+qos_profiles: {{latest: {{extends: state, lifespan_ms: {lifespan_ms}}}}}
+nodes:
+  talker:
+    publishers: {{latest: {{type: std_msgs/msg/String, qos: latest}}}}
+    subscriptions:
+      say: {{type: std_msgs/msg/String, external: true, log: "said {{message.data}}",
+            publish: {{latest: {{data: "{{message.data}}"}}}}}}
+  listener:
+    subscriptions:
+      latest: {{type: std_msgs/msg/String, qos: latest, log: "heard {{message.data}}"}}
+"""
+
+
+@pytest.mark.parametrize("away", [("deactivate", "cleanup"), ("deactivate",)])
+@pytest.mark.parametrize(("lifespan_ms", "heard"), [(300, ["heard new"]), (60_000, None)])
+def test_a_lifespan_holds_between_nodes_of_the_process(
+    tmp_path: Path, peer: Peer, lifespan_ms: int, heard: list[str] | None, away: tuple[str, ...]
+) -> None:
+    with running(LATCHED.format(lifespan_ms=lifespan_ms), tmp_path) as system:
+        say = peer.publisher(String, "/say")
+        system.change("listener", *away)
+        say.publish(String(data="old"))
+        system.wait_for_log("said old")
+        over_s = time.monotonic() + 1.0
+        wait_until(lambda: time.monotonic() > over_s, "the end of a short life")
+        back = ("configure", "activate") if "cleanup" in away else ("activate",)
+        system.change("listener", *back)
+        wait_until(lambda: heard is not None or lines(system, "heard old"))
+
+        def new_is_heard() -> bool:
+            """Say it again until then: on a busy machine a short life ends on the way."""
+            say.publish(String(data="new"))
+            return "heard new" in system.log()
+
+        wait_until(new_is_heard)
+        assert [*dict.fromkeys(lines(system, "heard"))] == (heard or ["heard old", "heard new"])
+
+
+def test_ps_tells_the_counts(tmp_path: Path, peer: Peer) -> None:
+    with running(ENDS.format(kind="events"), tmp_path) as system:
+        told = peer.listen(DiagnosticArray, "/diagnostics")
+        peer.node.create_publisher(String, "/input", BEST_EFFORT)
+        system.wait_for_log("subscription 'input'")
+        wait_until(lambda: "incompatible=1" in qos_events_of(told))
+        listed = subprocess.run(
+            [*COMPOSE, "ps", "ends", "--json", "--timeout", "20"],
+            check=True,
+            capture_output=True,
+            text=True,
+            timeout=50,
+        ).stdout
+    nodes = json.loads(listed)["systems"][0]["nodes"]
+    assert [node["qos_events"] for node in nodes] == [{"incompatible": 1}]
+
+
+def qos_events_of(told: list[DiagnosticArray]) -> list[str]:
+    return [
+        value.value
+        for message in tuple(told)
+        for status in message.status
+        for value in status.values
+        if value.key == "qos_events"
+    ]

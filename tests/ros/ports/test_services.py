@@ -1,0 +1,134 @@
+"""Services of a running node: every request is answered, whatever becomes of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from std_srvs.srv import Empty, SetBool, Trigger
+
+from tests.ros.support.in_process import Peer, finished, running, wait_until
+
+STUB = """
+system: stub
+nodes:
+  stub:
+    services:
+      trigger:
+        type: std_srvs/srv/Trigger
+        external: true
+        when: count < 2
+        log: "request {count}"
+        respond: {success: true, message: "answer {count} of {node}"}
+      empty: {type: std_srvs/srv/Empty, external: true}
+"""
+
+
+def test_a_declared_response_is_sent_and_the_default_one_where_when_is_false(
+    tmp_path: Path, peer: Peer
+) -> None:
+    with running(STUB, tmp_path) as system:
+        answers = [peer.call(Trigger, "/trigger") for _ in range(3)]
+        assert system.log() == ["request 0", "request 1"]
+    assert [(answer.success, answer.message) for answer in answers] == [
+        (True, "answer 0 of /stub"),
+        (True, "answer 1 of /stub"),
+        (False, ""),
+    ]
+
+
+def test_a_node_that_is_not_active_refuses_and_says_so(tmp_path: Path, peer: Peer) -> None:
+    with running(STUB, tmp_path) as system:
+        assert peer.change("/stub", "deactivate")
+        refusal = peer.call(Trigger, "/trigger")
+        assert peer.call(Empty, "/empty") == Empty.Response()
+        system.wait_for_log("service 'empty' refuses a request: /stub is inactive, not active")
+        assert peer.change("/stub", "activate")
+        assert peer.call(Trigger, "/trigger").success
+    assert (refusal.success, refusal.message) == (False, "/stub is inactive, not active")
+
+
+HANDLED = """
+system: handled
+executors: {shared: {kind: KIND}}
+nodes:
+  handled:
+    executor: shared
+    behavior: handled:Handled
+    services:
+      set: {type: std_srvs/srv/SetBool, external: true, respond: {message: "prefilled"}}
+      plain: {type: std_srvs/srv/Trigger, external: true}
+      deferred: {type: std_srvs/srv/Trigger, external: true}
+"""
+MODULE = """
+from composer.behavior import Behavior
+
+class Handled(Behavior):
+    def on_set(self, request, response):
+        response.success = request.data
+        return response
+
+    def on_plain(self, request, response):
+        OUTCOME
+
+    async def on_deferred(self, request, response):
+        await self.clock.sleep(0.001)
+        OUTCOME
+"""
+KINDS = ["events", "single_threaded", "multi_threaded"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_handler_gets_the_declared_response_and_returns_its_own(
+    tmp_path: Path, peer: Peer, kind: str
+) -> None:
+    module = MODULE.replace("OUTCOME", 'response.message = "fine"; return response')
+    with running(HANDLED.replace("KIND", kind), tmp_path, handled=module):
+        answer = peer.call(SetBool, "/set", SetBool.Request(data=True))
+        plain, deferred = (peer.call(Trigger, name) for name in ("/plain", "/deferred"))
+    assert (answer.success, answer.message) == (True, "prefilled")
+    assert (plain.message, deferred.message) == ("fine", "fine")
+
+
+@pytest.mark.parametrize(
+    ("outcome", "reason"),
+    [
+        ("raise ValueError('no such thing')", ": ValueError: no such thing"),
+        ("raise SystemExit(1)", ": SystemExit: 1"),
+        ("return None", " returned None, not a Trigger.Response"),
+        ("return 'nonsense'", " returned 'nonsense', not a Trigger.Response"),
+    ],
+)
+def test_a_handler_that_fails_is_answered_for(
+    tmp_path: Path, peer: Peer, outcome: str, reason: str
+) -> None:
+    module = MODULE.replace("OUTCOME", outcome)
+    with running(HANDLED.replace("KIND", "events"), tmp_path, handled=module) as system:
+        answers = {name: peer.call(Trigger, f"/{name}") for name in ("plain", "deferred")}
+        assert peer.call(SetBool, "/set", SetBool.Request(data=True)).success
+        counted = system.summary("/handled")
+    for name, answer in answers.items():
+        assert (answer.success, answer.message) == (False, f"on_{name}{reason}")
+        assert f"on_{name}" in system.log_text()
+    assert counted.errors == 2
+
+
+def test_requests_that_are_under_way_when_the_node_leaves_active_are_refused(
+    tmp_path: Path, peer: Peer
+) -> None:
+    module = MODULE.replace("OUTCOME", "await_for_ever = None").replace(
+        "await self.clock.sleep(0.001)", "self.log.info('begun'); await self.clock.sleep(60.0)"
+    )
+    with running(HANDLED.replace("KIND", "events"), tmp_path, handled=module) as system:
+        client = peer.client(Trigger, "/deferred")
+        first = client.call_async(Trigger.Request())
+        system.wait_for_log("begun")
+        waiting = client.call_async(Trigger.Request())
+        port = system.node("handled")._assembly.services["deferred"]
+        wait_until(lambda: len(port._open) == 2)
+        assert peer.change("/handled", "deactivate")
+        answers = [finished(first), finished(waiting)]
+    assert [answer.success for answer in answers] == [False, False]
+    assert all("/handled is deactivating, not active" in answer.message for answer in answers)
+    assert system.end().exit_code == 0
+    assert system.end().nodes[0].errors == 0

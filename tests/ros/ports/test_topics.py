@@ -1,0 +1,202 @@
+"""Publishers and subscriptions of a running node: gated, in order, and unhurt by user code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Int64, String
+
+from tests.ros.support.in_process import Peer, running, wait_until
+
+RELAY = """
+system: relay
+nodes:
+  relay:
+    subscriptions:
+      input:
+        type: std_msgs/msg/Int64
+        external: true
+        log: "got {message.data}, the {count}th"
+        publish: {output: {data: "{message.data + 1}"}}
+    publishers:
+      output: {type: std_msgs/msg/Int64, external: true}
+"""
+
+
+def test_a_reaction_publishes_and_logs_what_it_works_out(tmp_path: Path, peer: Peer) -> None:
+    with running(RELAY, tmp_path) as system:
+        heard = peer.listen(Int64, "/output")
+        system.wait_for_listener("relay", "output")
+        peer.publisher(Int64, "/input").publish(Int64(data=41))
+        wait_until(lambda: heard)
+    assert heard[0].data == 42
+    assert system.log() == ["got 41, the 0th"]
+
+
+def test_nothing_gets_through_a_node_that_is_not_active(tmp_path: Path, peer: Peer) -> None:
+    with running(RELAY, tmp_path) as system:
+        heard = peer.listen(Int64, "/output")
+        system.wait_for_listener("relay", "output")
+        source = peer.publisher(Int64, "/input")
+        assert peer.change("/relay", "deactivate")
+        for number in range(5):
+            source.publish(Int64(data=number))
+        wait_until(lambda: system.node("relay").statistics.dropped == 5)
+        assert peer.change("/relay", "activate")
+        source.publish(Int64(data=6))
+        wait_until(lambda: heard)
+        counted = system.summary("/relay")
+    assert [message.data for message in heard] == [7]
+    assert (counted.received, counted.sent, counted.dropped) == (1, 1, 5)
+
+
+def test_what_is_latched_while_inactive_comes_with_the_activation(
+    tmp_path: Path, peer: Peer
+) -> None:
+    text = """
+    system: latched
+    nodes:
+      listener:
+        lifecycle: {autostart: inactive}
+        subscriptions:
+          mode: {type: std_msgs/msg/String, qos: state, external: true, log: "{message.data}"}
+    """
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    with running(text, tmp_path) as system:
+        source = peer.publisher(String, "/mode", latched)
+        source.publish(String(data="old"))
+        source.publish(String(data="ready"))
+        port = system.node("listener")._assembly.subscriptions["mode"]
+        wait_until(lambda: [message.data for _, message in tuple(port._latched)] == ["ready"])
+        assert system.log() == []
+        assert peer.change("/listener", "activate")
+        system.wait_for_log("ready")
+    assert system.log() == ["ready"]
+
+
+TALKATIVE = """
+system: talkative
+nodes:
+  talkative:
+    behavior: talkative:Talkative
+    publishers:
+      output: {type: std_msgs/msg/String, external: true}
+"""
+
+
+def test_a_node_has_a_first_and_a_last_word_but_none_when_it_is_not_active(
+    tmp_path: Path, peer: Peer
+) -> None:
+    module = """
+    from composer.behavior import Behavior
+    from std_msgs.msg import String
+
+    class Talkative(Behavior):
+        def on_configure(self): self.say("configure")
+        def on_activate(self): self.say("activate")
+        def on_deactivate(self): self.say("deactivate")
+        def on_cleanup(self): self.say("cleanup")
+
+        def say(self, text):
+            self.publishers.output.publish(String(data=text))
+            self.publishers.output.publish(String(data=text))
+    """
+    with running(TALKATIVE, tmp_path, talkative=module) as system:
+        assert peer.change("/talkative", "deactivate")
+        heard = peer.listen(String, "/output")
+        system.wait_for_listener("talkative", "output")
+        assert peer.change("/talkative", "activate")
+        assert peer.change("/talkative", "deactivate")
+        assert peer.change("/talkative", "cleanup")
+        wait_until(lambda: len(heard) == 4)
+        counted = system.summary("/talkative")
+    texts = [message.data for message in heard]
+    assert texts == ["activate", "activate", "deactivate", "deactivate"]
+    assert counted.dropped == 4
+    warnings = [line for line in system.log() if "drops its messages" in line]
+    assert warnings == [
+        "publisher 'output' drops its messages: /talkative is configuring, not active",
+        "publisher 'output' drops its messages: /talkative is cleaningup, not active",
+    ]
+
+
+PORTS = """
+system: ports
+nodes:
+  talker:
+    behavior: talker:Talker
+    publishers:
+      plain: {type: std_msgs/msg/Int64, topic: /a}
+      _hidden: {type: std_msgs/msg/Int64, topic: /b}
+      __entries: {type: std_msgs/msg/Int64, topic: /c}
+      class: {type: std_msgs/msg/Int64, topic: /d}
+      no identifier: {type: std_msgs/msg/Int64, topic: /e}
+      "": {type: std_msgs/msg/Int64, topic: /f}
+"""
+PORTS_MODULE = """
+class Talker(dict):  # any class will do
+    def on_activate(self):
+        for name in dir(self.publishers):
+            assert getattr(self.publishers, name) is self.publishers[name]
+            self.log.info(name)
+        try:
+            self.publishers.plan
+        except AttributeError as error:
+            self.log.info(str(error))
+"""
+
+
+def test_ports_are_attributes_of_what_a_behavior_has(tmp_path: Path) -> None:
+    with running(PORTS, tmp_path, talker=PORTS_MODULE) as system:
+        names = ["", "__entries", "_hidden", "class", "no identifier", "plain"]
+        assert system.log() == [*names, f"no publisher 'plan'; there is: {', '.join(names)}"]
+
+
+FAULTY = """
+system: faulty
+executors: {shared: {kind: KIND}}
+nodes:
+  faulty:
+    executor: shared
+    behavior: faulty:Faulty
+    subscriptions:
+      input: {type: std_msgs/msg/Int64, external: true, set: {last: "{message.data}"}}
+    state: {last: 0}
+  healthy:
+    executor: shared
+    subscriptions:
+      input: {type: std_msgs/msg/Int64, external: true, log: "healthy {message.data}"}
+"""
+FAULTY_MODULE = """
+from composer.behavior import Behavior
+
+class Faulty(Behavior):
+    def on_input(self, message):
+        if message.data == 1:
+            raise ValueError("one is too much")
+        if message.data == 2:
+            raise SystemExit(3)
+        self.log.info(f"faulty {message.data}")
+"""
+
+
+@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+def test_what_a_handler_raises_is_told_and_hurts_nobody(
+    tmp_path: Path, peer: Peer, kind: str
+) -> None:
+    text = FAULTY.replace("KIND", kind)
+    with running(text, tmp_path, faulty=FAULTY_MODULE) as system:
+        source = peer.publisher(Int64, "/input")
+        wait_until(lambda: source.get_subscription_count() == 2)
+        for number in (1, 2, 3):
+            source.publish(Int64(data=number))
+        system.wait_for_log("faulty 3")
+        system.wait_for_log("healthy 3")
+        fault = system.wait_for_log("one is too much")
+        counted = system.summary("/faulty")
+    assert fault.startswith("on_input: ValueError: one is too much\nTraceback")
+    assert 'raise ValueError("one is too much")' in fault
+    assert counted.errors == 2
+    assert system.end().exit_code == 0

@@ -1,0 +1,222 @@
+"""A running system as a process: signals, exit codes, the environment, and what is left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+from composer.resources import systems_folder
+from composer.runtime.process.shared_memory import SHARED_MEMORY
+from tests.ros.support.commands import COMPOSE
+from tests.ros.support.in_process import end_limit_s
+
+PATIENCE_S = 20.0
+
+
+class Running:
+    """A ``compose run`` in a process of its own. What it says is read from a file."""
+
+    def __init__(self, process: subprocess.Popen[bytes], said: Path) -> None:
+        self.process = process
+        self._said = said
+
+    def text(self) -> str:
+        return self._said.read_text(encoding="utf-8")
+
+    def wait_for(self, part: str) -> None:
+        until_s = time.monotonic() + PATIENCE_S
+        while True:
+            has_ended = self.process.poll() is not None  # and has said all, if so
+            if part in self.text():
+                return
+            assert not has_ended, f"ended: {self.text()}"
+            assert time.monotonic() < until_s, f"no '{part}' in {self.text()}"
+            time.sleep(0.002)
+
+    def end(self, *, impatient: bool = False) -> tuple[int, float]:
+        """Wait for the end; return the exit code and how long that took.
+
+        The impatient press Ctrl-C again and again.
+        """
+        began_s = time.monotonic()
+        while impatient and time.monotonic() < began_s + PATIENCE_S:
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(0.15)
+                break
+            self.process.send_signal(signal.SIGINT)
+        code = self.process.wait(PATIENCE_S)
+        return code, time.monotonic() - began_s
+
+
+@contextmanager
+def compose_run(folder: Path, *arguments: object, **environment: str) -> Iterator[Running]:
+    said = folder / "said.txt"
+    with said.open("wb") as output:
+        process = subprocess.Popen(
+            [*COMPOSE, "run", *map(str, arguments)],
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            env={**os.environ, **environment},
+        )
+    try:
+        yield Running(process, said)
+    finally:
+        process.kill()
+        process.wait()
+
+
+def pipeline() -> Path:
+    return systems_folder() / "pipeline.yaml"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_the_pipeline_in_order(tmp_path: Path, number: signal.Signals) -> None:
+    with compose_run(tmp_path, pipeline()) as run:
+        run.wait_for("3 of 3 nodes active")
+        run.process.send_signal(number)
+        code, took_s = run.end()
+    text = run.text()
+    assert code == 0, text
+    assert took_s < end_limit_s()
+    assert f"stopping: {number.name}" in text
+    assert "Traceback" not in text
+    order = [
+        "/control/motor_controller finalized",
+        "/planning/planner finalized",
+        "/perception/sensor_simulator finalized",
+    ]
+    places = [text.index(line) for line in order]
+    assert places == sorted(places)
+
+
+HANGING = """
+system: hanging
+nodes:
+  hanging: {behavior: "hanging:Hanging", timers: {tick: {period_ms: 10}}}
+"""
+HANGING_MODULE = """
+from time import sleep
+from composer.behavior import Behavior
+
+class Hanging(Behavior):
+    def on_tick(self):
+        self.log.info("hanging")
+        while True:
+            sleep(0.1)
+"""
+
+
+@pytest.mark.parametrize("is_impatient", [False, True])
+def test_a_process_with_a_hanging_callback_ends_in_time(
+    tmp_path: Path, *, is_impatient: bool
+) -> None:
+    path = tmp_path / "hanging.yaml"
+    path.write_text(HANGING, encoding="utf-8")
+    path.with_suffix(".py").write_text(HANGING_MODULE, encoding="utf-8")
+    with compose_run(tmp_path, path) as run:
+        run.wait_for("[hanging] hanging")
+        run.process.send_signal(signal.SIGINT)
+        run.wait_for("stopping: SIGINT")
+        code, took_s = run.end(impatient=is_impatient)
+    assert code == 1, run.text()
+    assert took_s < end_limit_s()
+    assert "/hanging is stuck and did not deactivate in" in run.text()
+    assert "on_tick" in run.text()
+
+
+@pytest.mark.parametrize(
+    ("variables", "words"),
+    [
+        ({"ROS_DOMAIN_ID": "-1"}, "ROS_DOMAIN_ID is '-1', which is no domain id"),
+        (
+            {
+                "ROS_SECURITY_ENABLE": "true",
+                "ROS_SECURITY_KEYSTORE": "keys",
+                "ROS_SECURITY_STRATEGY": "Enforce",
+            },
+            "ROS does not start",
+        ),
+        ({"RMW_IMPLEMENTATION": "rmw_nonsense"}, "installed: rmw_fastrtps_cpp"),
+    ],
+)
+def test_an_environment_that_cannot_be_is_refused(
+    tmp_path: Path, variables: dict[str, str], words: str
+) -> None:
+    system = systems_folder() / "minimal.yaml"
+    with compose_run(tmp_path, system, "--for", 1, **variables) as run:
+        code, _ = run.end()
+    assert code == 1, run.text()
+    assert words in run.text()
+    assert "Traceback" not in run.text()
+    assert "internal error" not in run.text()
+
+
+def half_made_ports(domain_id: int) -> Iterator[Path]:
+    """Leave what a process leaves that is killed while it makes a port in shared memory.
+
+    The numbers: DDS Interoperability Protocol, 9.6.1.1, metatraffic and user data by unicast.
+    """
+    for offset in range(10, 40):
+        port = SHARED_MEMORY / f"fastrtps_port{7400 + 250 * domain_id + offset}"
+        if not port.exists():
+            port.touch()
+            os.utime(port, (0, 0))
+            yield port
+
+
+def test_the_same_signal_twice_at_once_is_no_hurry(tmp_path: Path) -> None:
+    with compose_run(tmp_path, pipeline()) as run:
+        run.wait_for("3 of 3 nodes active")
+        run.process.send_signal(signal.SIGINT)
+        run.process.send_signal(signal.SIGINT)  # as make, timeout or a launcher would forward it
+        code, _ = run.end()
+    assert code == 0, run.text()
+    assert "stuck" not in run.text()
+
+
+def test_what_a_killed_process_left_half_made_hangs_nobody(
+    tmp_path: Path, ros_domain_id: int
+) -> None:
+    left = tuple(half_made_ports(ros_domain_id))
+    try:
+        with compose_run(tmp_path, pipeline(), "--for", 0.1) as run:
+            code, _ = run.end()
+        assert code == 0, run.text()
+        # Whether one that is left hangs a participant depends on which it opens.
+        assert not [port for port in left if port.exists()]
+    finally:
+        for port in left:
+            port.unlink(missing_ok=True)
+
+
+def test_node_logs_reach_the_terminal_at_their_level(tmp_path: Path) -> None:
+    path = tmp_path / "loud.yaml"
+    path.write_text(
+        dedent(
+            """
+            system: loud
+            nodes:
+              loud:
+                namespace: robot
+                on_configure: {log: {level: debug, message: "a debug line"}}
+                on_activate: {log: {level: warn, message: "a warning"}}
+            """
+        ),
+        encoding="utf-8",
+    )
+    with compose_run(tmp_path, path, "--for", 0.1, "--log-level", "info") as run:
+        assert run.end()[0] == 0
+    assert "] [WARN] [robot.loud] a warning\n" in run.text()
+    assert "a debug line" not in run.text()
+    with compose_run(tmp_path, path, "--for", 0.1, "--log-level", "debug") as run:
+        assert run.end()[0] == 0
+    assert "] [DEBUG] [robot.loud] a debug line\n" in run.text()

@@ -1,0 +1,78 @@
+"""Signals at random moments of the life of the pipeline: in order, in time, and nothing is left."""
+
+from __future__ import annotations
+
+import os
+import random
+import re
+import signal
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from tests.ros.support.in_process import end_limit_s
+from tests.ros.support.system_process import RunningSystem
+
+#: What begins each part of the pipeline's life that a signal may meet.
+MOMENTS = ("inactive$", "sensor_simulator active$", "3 of 3 nodes active")
+#: What is torn down first.
+ORDER = ("/control/motor_controller", "/planning/planner", "/perception/sensor_simulator")
+
+
+def end_at(moment: str, delay_s: float, number: signal.Signals) -> float:
+    """Run the pipeline, send a signal so long after a moment of its life; return how long it took.
+
+    The end is to be in time, in order and without a trace, and the exit code to be honest.
+    """
+    with RunningSystem("systems/pipeline.yaml", "--for", "30") as system:
+        system.wait_for(moment)
+        time.sleep(delay_s)
+        children = children_of(system.process.pid)
+        sent_s = time.monotonic()
+        os.kill(system.process.pid, number)
+        code = system.process.wait(timeout=20.0)
+        took_s = time.monotonic() - sent_s
+    case = f"{number.name} {1000.0 * delay_s:.0f} ms after '{moment}'\n{system.output}"
+    assert code == 0, case
+    assert took_s < end_limit_s(), case
+    assert "Traceback" not in system.output, case
+    for state in ("inactive", "unconfigured", "finalized"):
+        check_order(system.lines, state, case)
+    assert not children, case
+    return took_s
+
+
+def check_order(lines: list[str], state: str, case: str) -> None:
+    """Hold the tear-down against the order of the dependencies."""
+    stopping = next(place for place, line in enumerate(lines) if "stopping:" in line)
+    down = [
+        found[1] for line in lines[stopping:] if (found := re.search(rf"\] (/\S+) {state}$", line))
+    ]
+    assert down == [node for node in ORDER if node in down], case
+    if state == "finalized":
+        assert len(down) == len(ORDER), case
+
+
+def children_of(pid: int) -> str:
+    """Return the processes that a process has started and that could outlive it."""
+    children = ""
+    for task in Path("/proc", str(pid), "task").iterdir():
+        with suppress(FileNotFoundError, ProcessLookupError):  # a thread that has ended meanwhile
+            children += task.joinpath("children").read_text()
+    return children
+
+
+@pytest.mark.parametrize(
+    "times",
+    [1, pytest.param(17, marks=[pytest.mark.soak, pytest.mark.timeout(1800)])],
+)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_at_a_random_moment_ends_everything(number: signal.Signals, times: int) -> None:
+    seed = random.randrange(2**32)
+    chance = random.Random(seed)
+    took_s = [
+        end_at(moment, chance.uniform(0.0, 0.4), number) for _ in range(times) for moment in MOMENTS
+    ]
+    print(f"{number.name}: {len(took_s)} ends, seed {seed}, longest {max(took_s):.2f} s")

@@ -1,0 +1,293 @@
+"""Every fault in every callback: what becomes of the node, what is told, and who does not notice.
+
+The nodes run in a process of their own; all that happens is asked for from here. Those that hang
+have an executor each. What shares the executor of a node that hangs stands still until the watch
+has interrupted it: that is what executors are for.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from action_msgs.msg import GoalStatus
+from composer_interfaces.action import Navigate
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.srv import SetParameters
+from rclpy.action import ActionClient
+from rclpy.parameter import Parameter
+from std_msgs.msg import Int64, String
+from std_srvs.srv import Trigger
+
+from tests.ros.support.faulty_system import (
+    CALLBACKS,
+    FAULTS,
+    PLACES,
+    TRANSITIONS,
+    write_faulty_system,
+)
+from tests.ros.support.in_process import Peer, finished, wait_until
+from tests.ros.support.system_process import RunningSystem
+
+#: Where each transition begins and, when all is well, ends.
+WAYS = {
+    "configure": ("unconfigured", "inactive"),
+    "activate": ("inactive", "active"),
+    "deactivate": ("active", "inactive"),
+    "cleanup": ("inactive", "unconfigured"),
+    "shutdown": ("inactive", "finalized"),
+    "error": ("unconfigured", "unconfigured"),
+}
+#: From one primary state a step nearer to another.
+STEPS = {
+    ("unconfigured", "inactive"): "configure",
+    ("unconfigured", "active"): "configure",
+    ("inactive", "active"): "activate",
+    ("active", "inactive"): "deactivate",
+    ("active", "unconfigured"): "deactivate",
+    ("inactive", "unconfigured"): "cleanup",
+}
+CONTROL = "/control"  # the namespace of the same system where nothing fails
+ENOUGH_BEATS = 80  # that one beat more or less is well below the 5 %
+RAISED, EXITED = "ValueError: broken", "SystemExit: out"
+NONSENSE = "returned 'nonsense'"
+
+
+@dataclass(frozen=True)
+class Expected:
+    """The answer to whoever asked, the state after that, and a line of the node's log."""
+
+    answer: object
+    state: str
+    log: str | None = None
+
+
+def expected(place: str, fault: str) -> Expected:
+    """The table."""
+    if place in TRANSITIONS:
+        well = WAYS[place][1]
+        failed = "finalized" if place == "error" else "unconfigured"
+        log = {"raise": RAISED, "once": RAISED, "exit": EXITED, "nonsense": NONSENSE}
+        if fault == "none":
+            return Expected(place != "error", well)
+        return Expected(False, failed, log.get(fault, "CallbackInterrupted"))
+    if fault == "hang":
+        state, log_line = "unconfigured", "CallbackInterrupted: the callback took too long"
+    else:
+        state, log_line = "active", {"raise": RAISED, "once": RAISED, "exit": EXITED}.get(fault, "")
+    answer: object = None
+    if place == "ask":
+        returned = {"none": "None", "nonsense": "'nonsense'"}.get(fault)
+        if returned is not None:
+            log_line = f"returned {returned}, not a Trigger.Response"
+        answer = (False, f"on_ask{': ' if returned is None else ' '}{log_line}")
+    if place == "drive":
+        log_line = NONSENSE if fault == "nonsense" else log_line
+        answer = GoalStatus.STATUS_SUCCEEDED if fault == "none" else GoalStatus.STATUS_ABORTED
+    return Expected(answer, state, log_line or None)
+
+
+class Subject:
+    """One faulty node, seen from outside."""
+
+    def __init__(self, peer: Peer, name: str) -> None:
+        self.name = name
+        self._peer = peer
+        self._change = peer.client(ChangeState, f"/{name}/change_state")
+        self._state = peer.client(GetState, f"/{name}/get_state")
+        self._set = peer.client(SetParameters, f"/{name}/set_parameters")
+
+    @cached_property
+    def _ask(self) -> Any:
+        return self._peer.client(Trigger, f"/{self.name}/ask")
+
+    @cached_property
+    def _drive(self) -> Any:
+        client = ActionClient(self._peer.node, Navigate, f"/{self.name}/drive")
+        wait_until(client.server_is_ready)
+        return client
+
+    @cached_property
+    def _input(self) -> Any:
+        return self._peer.publisher(String, f"/{self.name}/input")
+
+    @property
+    def state(self) -> str:
+        # What was sent to a node that was just being made anew is asked for once more.
+        asked: list[Any] = []
+
+        def is_answered() -> bool:
+            if not asked or time.monotonic() > asked_s + len(asked):
+                asked.append(self._state.call_async(GetState.Request()))
+            return any(future.done() for future in asked)
+
+        asked_s = time.monotonic()
+        wait_until(is_answered, f"the state of {self.name}")
+        answer = next(future.result() for future in asked if future.done())
+        return str(answer.current_state.label)
+
+    def set_fault(self, fault: str) -> None:
+        message = Parameter("fault", value=fault).to_parameter_msg()
+        request = SetParameters.Request(parameters=[message])
+        assert finished(self._set.call_async(request)).results[0].successful
+
+    def change(self, transition: str) -> Any:
+        request = ChangeState.Request(transition=Transition(label=transition))
+        return self._change.call_async(request)
+
+    def go_to(self, goal: str) -> None:
+        """Take the node to a state, by legal transitions."""
+        while (state := self.state) != goal:
+            assert finished(self.change(STEPS[state, goal])).success, (self.name, state, goal)
+
+    def begin(self, place: str) -> Any:
+        """Have the callback called; return what the answer will come with."""
+        if place in TRANSITIONS:
+            return self.change("configure" if place == "error" else place)
+        if place == "ask":
+            return self._ask.call_async(Trigger.Request())
+        if place == "drive":
+            goal = finished(self._peer.run(lambda: self._drive.send_goal_async(Navigate.Goal())))
+            return self._peer.run(goal.get_result_async)
+        if place == "input":
+            self._input.publish(String())
+        return None  # the timer is called anyway, and so is what hears of changed parameters
+
+
+def answer_of(place: str, begun: Any) -> object:
+    if begun is None:
+        return None
+    answer = finished(begun)
+    if place == "ask":
+        return answer.success, answer.message
+    return answer.status if place == "drive" else answer.success
+
+
+class Metronomes:
+    """How often the node beats that must not notice, and its like where nothing fails.
+
+    Both are counted over the same times: what else the machine does meets both. What makes whole
+    nodes anew is not looked at: Fast DDS needs tens of milliseconds for each, and nothing else in
+    Python runs meanwhile.
+    """
+
+    def __init__(self, peer: Peer) -> None:
+        self._beats = {"/beat": 0, f"{CONTROL}/beat": 0}
+        self._heard = set[str]()
+        self._counts = False
+        for topic in self._beats:
+            peer.node.create_subscription(Int64, topic, partial(self._take, topic), 10)
+        wait_until(lambda: len(self._heard) == len(self._beats), "both beat")
+
+    @contextmanager
+    def counted(self) -> Iterator[None]:
+        """Count during the block, and a while longer where it is short."""
+        enough = self._beats[f"{CONTROL}/beat"] + ENOUGH_BEATS
+        self._counts = True
+        yield
+        wait_until(lambda: self._beats[f"{CONTROL}/beat"] >= enough)
+        self._counts = False
+
+    @property
+    def ratio(self) -> float:
+        """How often it has beaten for each beat where nothing fails."""
+        return self._beats["/beat"] / self._beats[f"{CONTROL}/beat"]
+
+    def _take(self, topic: str, _: Int64) -> None:
+        self._heard.add(topic)
+        if self._counts:
+            self._beats[topic] += 1
+
+
+def check(system: RunningSystem, subject: Subject, place: str, fault: str, begun: Any) -> None:
+    """Hold what came of a fault against the table."""
+    row = expected(place, fault)
+    where = f"{subject.name}: {place} {fault}"
+    assert answer_of(place, begun) == row.answer, where
+    system.wait_for(rf"\[{subject.name}\] {place} acts$")
+    if row.log is not None:
+        system.wait_for(rf"\[{subject.name}\] on_{place}: .*{re.escape(row.log)}")
+    wait_until(lambda: subject.state == row.state, f"{where}: {row.state}")
+
+
+def fail(system: RunningSystem, subject: Subject, place: str) -> None:
+    """Have one callback of a node fail as the node's name says, and see what becomes of it."""
+    subject.go_to(WAYS[place][0] if place in WAYS else "active")
+    subject.set_fault(f"{place} {subject.name}")
+    check(system, subject, place, subject.name, subject.begin(place))
+    if subject.name == "once" and place != "error":
+        retry(system, subject, place)
+    subject.set_fault("")
+
+
+def retry(system: RunningSystem, subject: Subject, place: str) -> None:
+    """What failed once works the next time."""
+    start = WAYS[place][0] if place in WAYS else "active"
+    subject.set_fault("")
+    subject.go_to(start)
+    subject.set_fault(f"{place} once")
+    answer = answer_of(place, subject.begin(place))
+    system.wait_for(rf"\[once\] {place} works again$")
+    well = {"ask": (True, ""), "drive": GoalStatus.STATUS_SUCCEEDED}
+    assert answer == well.get(place, True if place in TRANSITIONS else None), place
+    wait_until(lambda: subject.state == (WAYS[place][1] if place in WAYS else "active"))
+
+
+def hang(system: RunningSystem, hanging: Mapping[str, Subject]) -> None:
+    """Have a callback of each node hang, all at the same time."""
+    for place, subject in hanging.items():
+        subject.go_to(WAYS[place][0] if place in WAYS else "active")
+    begun = {}
+    for place, subject in hanging.items():
+        subject.set_fault(f"{place} hang")
+        begun[place] = subject.begin(place)
+    for place, subject in hanging.items():
+        check(system, subject, place, "hang", begun[place])
+        system.wait_for(rf"/hang_{place} is stuck and did not return from on_{place} within")
+
+
+def start_all(peer: Peer) -> None:
+    answer = peer.call(Trigger, "/faulty/manager/startup")
+    assert answer.success, answer.message
+
+
+@pytest.mark.timeout(120)
+def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
+    path = write_faulty_system(tmp_path)
+    with (
+        RunningSystem(str(path), "--autostart", "active", "--namespace", CONTROL) as control,
+        RunningSystem(str(path), "--autostart", "active") as system,
+    ):
+        for running in (control, system):
+            running.wait_for("nodes active after")
+        metronomes = Metronomes(peer)
+        subjects = [Subject(peer, name) for name in FAULTS]
+        hanging = {place: Subject(peer, f"hang_{place}") for place in PLACES}
+        with metronomes.counted():
+            for place in (*CALLBACKS, "configure", "activate", "deactivate", "cleanup", "error"):
+                for subject in subjects:
+                    fail(system, subject, place)
+        start_all(peer)  # those whose on_error failed are made anew
+        with metronomes.counted():
+            for subject in subjects:
+                fail(system, subject, "shutdown")
+            hang(system, hanging)
+        assert metronomes.ratio == pytest.approx(1.0, abs=0.05)
+
+        for subject in (*subjects, *hanging.values()):
+            if subject.state != "finalized":
+                subject.set_fault("")
+        start_all(peer)
+        assert {subject.state for subject in (*subjects, *hanging.values())} == {"active"}
+        assert system.stop()[0] == 0, "all that failed has been mended"
+    for place in PLACES:
+        told = system.lines.index(system.wait_for(rf"\[raise\] on_{place}: {RAISED}"))
+        assert system.lines[told + 1] == "Traceback (most recent call last):", place

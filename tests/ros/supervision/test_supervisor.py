@@ -1,0 +1,226 @@
+"""Nodes that fail are restarted, isolated, or end the system, and the others go on."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from std_msgs.msg import String
+
+from composer.runtime.supervision.events import NodeFailed, Restarted, StateChanged, Stuck
+from tests.ros.support.in_process import Peer, RunningSystem, end_limit_s, running, wait_until
+
+ROBOT = """
+system: robot
+lifecycle: {on_failure: POLICY, restart: {BUDGET}}
+executors: {own: {kind: KIND}}
+nodes:
+  motor: {lifecycle: {depends_on: [planner]}}
+  planner: {lifecycle: {depends_on: [sensor]}}
+  sensor:
+    executor: own
+    behavior: sensor:Sensor
+    parameters: {fault: ""}
+    publishers: {scan: {type: std_msgs/msg/String, external: true}}
+    timers: {tick: {period_ms: 10}}
+    lifecycle: {watch: {topic_silence_ms: 150, callback_ms: 100, max_errors: 2}, timeout_ms: 2500}
+  camera:
+    publishers: {image: {type: std_msgs/msg/String, external: true}}
+    timers: {tick: {period_ms: 10, publish: {image: {data: picture}}}}
+"""
+SENSOR = """
+import time
+from composer.behavior import Behavior
+
+LIVES = []
+
+class Sensor(Behavior):
+    def on_configure(self):
+        LIVES.append(self)
+        self.life = len(LIVES)
+        if self.parameters.fault == "configure" and self.life == 2:
+            raise ValueError("no device")
+
+    def on_deactivate(self):
+        if self.parameters.fault == "deactivate":
+            raise ValueError("stuck motor")
+
+    def on_tick(self):
+        fault = self.parameters.fault
+        if self.life > 1 and not fault.startswith("always"):
+            fault = ""
+        if fault == "raise":
+            raise ValueError("bad data")
+        if fault == "loop":
+            while True: time.sleep(0.001)  # one line, wherever it is met
+        if fault == "block":
+            time.sleep(4.0)
+        if "silent" not in fault:
+            self.publishers.scan.publish(self.publishers.scan.message_type(data=str(self.life)))
+"""
+
+
+def robot(policy: str = "restart", budget: str = "backoff_ms: 20", kind: str = "events") -> str:
+    text = ROBOT.replace("POLICY", policy).replace("BUDGET", budget)
+    return text.replace("KIND", kind)
+
+
+def since(system: RunningSystem, failed: NodeFailed) -> list[str]:
+    """Where nodes came to rest after a failure."""
+    changes = system.told(StateChanged)
+    return [str(event) for event in changes if event.elapsed_s >= failed.elapsed_s]
+
+
+AROUND_A_RESTART = [
+    "/motor inactive",
+    "/planner inactive",
+    "/sensor inactive",
+    "/sensor unconfigured",
+    "/sensor inactive",
+    "/sensor active",
+    "/planner active",
+    "/motor active",
+]
+
+
+@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        ("silent", "silent for 150 ms"),
+        ("loop", "on_tick took longer than 100 ms"),
+        ("raise", "more than 2 errors within 60 s"),
+    ],
+)
+def test_a_node_that_fails_is_restarted_and_what_needs_it_waits(
+    tmp_path: Path, peer: Peer, fault: str, reason: str, kind: str
+) -> None:
+    with running(robot(kind=kind), tmp_path, sensor=SENSOR) as system:
+        images = peer.listen(String, "/image")
+        scans = peer.listen(String, "/scan")
+        assert peer.set_parameter("/sensor", "fault", fault) == ""
+        wait_until(lambda: system.told(Restarted), "the restart")
+        assert len(system.told(NodeFailed)) == 1
+        failed = system.told(NodeFailed)[0]
+        assert (failed.node, failed.reason) == ("/sensor", reason)
+        assert failed.consequence == "restart 1 in 0.02 s"
+        assert since(system, failed) == AROUND_A_RESTART
+        wait_until(lambda: scans and scans[-1].data == "2", "messages of the second life")
+        seen = len(images)
+        wait_until(lambda: len(images) > seen, "the camera goes on")
+        if fault == "loop":
+            stuck = system.told(Stuck)[0]
+            assert "return from on_tick within 100 ms" in str(stuck)
+            assert "time.sleep(0.001)" in stuck.stack
+        assert system.stop().exit_code == 0, "what was mended is no failure"
+    assert "restart" not in "".join(system.states("/camera"))
+
+
+def test_a_restart_that_fails_is_tried_again_later(tmp_path: Path, peer: Peer) -> None:
+    module = SENSOR.replace('if fault == "raise"', 'if fault == "configure" and self.life == 1')
+    with running(robot(budget="backoff_ms: 50"), tmp_path, sensor=module) as system:
+        assert peer.set_parameter("/sensor", "fault", "configure") == ""
+        wait_until(lambda: system.told(Restarted), "the restart")
+        failures = system.told(NodeFailed)
+        assert [event.consequence for event in failures] == [
+            "restart 1 in 0.05 s",
+            "restart 2 in 0.1 s",
+        ]
+        assert failures[1].reason == "it did not configure: ValueError: no device"
+        assert since(system, failures[1])[-4:] == AROUND_A_RESTART[-4:]
+        assert system.stop().exit_code == 0
+
+
+def test_a_budget_that_is_spent_ends_the_system_in_order(tmp_path: Path, peer: Peer) -> None:
+    """Five restarts within the window, then the system gives up and says why."""
+    budget = "max_attempts: 5, window_ms: 60000, backoff_ms: 1"
+    with running(robot(budget=budget), tmp_path, sensor=SENSOR) as system:
+        assert peer.set_parameter("/sensor", "fault", "always silent") == ""
+        outcome = system.end()
+    failures = system.told(NodeFailed)
+    assert [event.consequence.partition(" in")[0] for event in failures] == [
+        *(f"restart {attempt}" for attempt in range(1, 6)),
+        "the system is given up",
+    ]
+    assert len(system.told(Restarted)) == 5
+    assert outcome.exit_code == 1
+    assert outcome.reason == (
+        "/sensor failed: silent for 150 ms; restarted 5 times within 60 s before"
+    )
+    assert since(system, failures[0])[:8] == AROUND_A_RESTART
+    assert [node.state for node in outcome.nodes] == ["finalized"] * 4
+    last = since(system, failures[-1])
+    assert last.index("/motor inactive") < last.index("/planner inactive")
+    assert last.index("/planner inactive") < last.index("/sensor inactive")
+
+
+@pytest.mark.parametrize("fault", ["silent", "loop", "deactivate"])
+def test_a_node_that_fails_is_isolated_and_the_others_go_on(
+    tmp_path: Path, peer: Peer, fault: str
+) -> None:
+    with running(robot("isolate"), tmp_path, sensor=SENSOR) as system:
+        images = peer.listen(String, "/image")
+        assert peer.set_parameter("/sensor", "fault", fault) == ""
+        if fault == "deactivate":
+            assert not peer.change("/sensor", "deactivate")
+        wait_until(lambda: peer.state("/motor") == "inactive", "what needs it stands still")
+        wait_until(lambda: peer.state("/sensor") == "unconfigured", "it is down")
+        # Where it has gone down by itself, that comes before what it needs.
+        wait_until(lambda: peer.state("/planner") == "inactive", "so does this")
+        seen = len(images)
+        wait_until(lambda: len(images) > seen, "the camera goes on")
+        failed = system.told(NodeFailed)[0]
+        assert failed.consequence == "it is isolated"
+        if fault == "deactivate":
+            assert failed.reason == "deactivate ended in an error: ValueError: stuck motor"
+
+        # Somebody mends it by hand, and what needs it comes back.
+        assert peer.set_parameter("/sensor", "fault", "") == ""
+        assert peer.change("/sensor", "configure")
+        assert peer.state("/motor") == "inactive"
+        assert peer.change("/sensor", "activate")
+        wait_until(lambda: peer.state("/motor") == "active", "what needs it is back")
+        assert peer.state("/planner") == "active"
+        assert system.stop().exit_code == 0
+
+
+def test_an_isolated_node_makes_the_end_a_failure(tmp_path: Path, peer: Peer) -> None:
+    with running(robot("isolate"), tmp_path, sensor=SENSOR) as system:
+        assert peer.set_parameter("/sensor", "fault", "silent") == ""
+        wait_until(lambda: peer.state("/motor") == "inactive")
+        assert system.stop().exit_code == 1
+
+
+def test_a_failing_node_can_end_the_system(tmp_path: Path, peer: Peer) -> None:
+    with running(robot("shutdown"), tmp_path, sensor=SENSOR) as system:
+        assert peer.set_parameter("/sensor", "fault", "silent") == ""
+        outcome = system.end()
+    assert (outcome.exit_code, outcome.reason) == (1, "/sensor failed: silent for 150 ms")
+    assert [node.state for node in outcome.nodes] == ["finalized"] * 4
+
+
+def test_a_node_that_cannot_be_interrupted_strands_its_executor_until_it_returns(
+    tmp_path: Path, peer: Peer
+) -> None:
+    text = robot("isolate").replace("  camera:\n", "  camera:\n    executor: own\n")
+    with running(text, tmp_path, sensor=SENSOR) as system:
+        assert peer.set_parameter("/sensor", "fault", "block") == ""
+        wait_until(lambda: system.told(NodeFailed), "the failure")
+        # It hangs, and is silent therefore: what is seen first is told.
+        assert system.told(NodeFailed)[0].reason in ("on_tick does not return", "silent for 150 ms")
+        wait_until(lambda: "/motor inactive" in system.states(), "what needs it stands still")
+        wait_until(lambda: "/sensor unconfigured" in system.states(), "it has returned")
+        assert peer.state("/camera") == "active"
+        assert peer.state("/planner") == "inactive"
+        assert len(system.told(NodeFailed)) == 1
+        assert system.stop().exit_code == 1
+
+
+def test_the_end_does_not_wait_for_a_restart(tmp_path: Path, peer: Peer) -> None:
+    with running(robot(budget="backoff_ms: 8000"), tmp_path, sensor=SENSOR) as system:
+        assert peer.set_parameter("/sensor", "fault", "silent") == ""
+        wait_until(lambda: "/sensor unconfigured" in system.states())
+        began_s = time.monotonic()
+        assert system.stop().exit_code == 1
+        assert time.monotonic() - began_s < end_limit_s()

@@ -1,0 +1,58 @@
+"""A source that counts, who listens to it in its loop, and who does in another one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tests.ros.support.in_process import RunningSystem
+
+NUMBERS = """
+system: numbers
+executors: {other: {kind: KIND}}
+nodes:
+  source:
+    behavior: counting:Source
+    publishers:
+      numbers: {type: std_msgs/msg/Int64, qos: {depth: 100}}
+  near:
+    behavior: counting:Listener
+    subscriptions:
+      numbers: {type: std_msgs/msg/Int64, qos: {depth: 100}}
+  far:
+    executor: other
+    behavior: counting:Listener
+    subscriptions:
+      numbers: {type: std_msgs/msg/Int64, qos: {depth: 100}}
+"""
+MODULE = """
+from composer.behavior import Behavior
+from std_msgs.msg import Int64
+
+class Source(Behavior):
+    def on_configure(self):
+        self.next = 0
+        self.sent = []
+
+    def send(self, count):
+        for _ in range(count):
+            self.sent.append(Int64(data=self.next))
+            self.publishers.numbers.publish(self.sent[-1])
+            self.next += 1
+
+class Listener(Behavior):
+    def on_configure(self):
+        self.heard = []
+
+    def on_numbers(self, message):
+        self.heard.append(message)
+"""
+
+
+def send(system: RunningSystem, count: int) -> None:
+    """Have the source publish so many at once, in a callback of its loop."""
+    source = system.node("source")
+    source.loop.run(lambda: source._behavior.send(count))
+
+
+def numbers(messages: list[Any]) -> list[int]:
+    return [message.data for message in messages]

@@ -1,0 +1,131 @@
+"""Processes that listen to two topics and talk on them, and what they have missed of each."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+
+from tests.ros.support.sequences import Sequences, number
+
+PEER = "tests.ros.programs.delivery_peer"
+ROOT = Path(__file__).parents[3]
+#: What stays in the process as far as it can, and what goes by DDS alone.
+STREAM, CONTROL = TOPICS = ("/stream", "/control")
+
+#: Who is killed is missed after 3 s, and not after 20 s.
+SOON_MISSED = """<builtin>
+          <discovery_config>
+            <leaseDuration><sec>3</sec></leaseDuration>
+            <leaseAnnouncement><sec>0</sec><nanosec>300000000</nanosec></leaseAnnouncement>
+          </discovery_config>"""
+
+
+class Outsider:
+    """Another process that listens or talks; what it has heard is read as it comes.
+
+    ``profile`` is reliability and depth; ``writer`` is who it talks as.
+    """
+
+    def __init__(self, what: str, profile: tuple[str, int], writer: int, folder: Path) -> None:
+        profile_of_tests = Path(os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"])
+        profiles = folder / "outsider.xml"
+        text = profile_of_tests.read_text(encoding="utf-8").replace("<builtin>", SOON_MISSED)
+        profiles.write_text(text, encoding="utf-8")
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", PEER, what, *map(str, (*profile, writer, *TOPICS))],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={
+                **os.environ,
+                "PYTHONPATH": f"{ROOT}:{os.environ.get('PYTHONPATH', '')}",
+                "FASTRTPS_DEFAULT_PROFILES_FILE": str(profiles),
+            },
+        )
+        self.heard: dict[str, list[int]] = {topic: [] for topic in TOPICS}
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __enter__(self) -> Outsider:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.go(killed=True)
+
+    def has_heard(self, count: int) -> bool:
+        """Say whether so many messages of each topic have come."""
+        return all(len(numbers) >= count for numbers in self.heard.values())
+
+    def go(self, *, killed: bool) -> int:
+        """End it, by SIGKILL or in order; return its exit code."""
+        assert self._process.stdin is not None
+        if killed:
+            self._process.kill()
+        else:
+            self._process.stdin.close()
+        code = self._process.wait(timeout=20.0)
+        self._reader.join()
+        return code
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            # Fast DDS tells of errors on standard output, and who is killed breaks off.
+            if line.startswith("{") and line.endswith("}\n"):
+                for topic, numbers in json.loads(line).items():
+                    self.heard[topic] += numbers
+
+
+class Missing:
+    """How many messages were missing on the stream, and how many on the control."""
+
+    def __init__(self) -> None:
+        self.stream = 0
+        self.control = 0
+
+    def add_all(self, heard: Mapping[str, Sequence[int]]) -> None:
+        """Count what is missing between the first and the last message of each topic."""
+        stream, control = (sequences_of(heard[topic]) for topic in TOPICS)
+        self.add_counted(stream.missing, control.missing)
+
+    def add_of_both(self, heard: Mapping[str, Sequence[int]]) -> None:
+        """Count what is missing of the time in which both topics were heard.
+
+        What is lost by the way is lost when the machine is busy, so the time has to be the same.
+        """
+        stream, control = (sequences_of(heard[topic]) for topic in TOPICS)
+        for writer in stream.last.keys() & control.last.keys():
+            first = number(writer, max(stream.first[writer], control.first[writer]))
+            last = number(writer, min(stream.last[writer], control.last[writer]))
+            if first < last:
+                self.stream += missing_between(first, last, heard[STREAM])
+                self.control += missing_between(first, last, heard[CONTROL])
+
+    def add_counted(self, stream: Mapping[int, int], control: Mapping[int, int]) -> None:
+        """Add up what is missing by writers."""
+        self.stream += sum(stream.values())
+        self.control += sum(control.values())
+
+
+def sequences_of(numbers: Iterable[int]) -> Sequences:
+    """Look at all numbers that have come. Nothing may have come twice or out of order."""
+    sequences = Sequences()
+    for item in numbers:
+        sequences.take(item)
+    assert sequences.disordered == []
+    return sequences
+
+
+def missing_between(first: int, last: int, heard: Iterable[int]) -> int:
+    return last - first + 1 - sum(first <= item <= last for item in heard)

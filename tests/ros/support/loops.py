@@ -1,0 +1,126 @@
+"""What the tests of loops share: a loop of each kind with a node, and a second process."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+
+from composer.model import Executor, ExecutorKind
+from composer.runtime.executors.factory import make_loop
+from composer.runtime.executors.loop import Loop, Taken
+from composer.source import Located, SourceFile, Span
+from tests.ros.support.leaving import leave
+
+PEER = Path(__file__).parents[1] / "programs" / "loop_peer.py"
+PATIENCE_S = 20.0
+KINDS = list(ExecutorKind)
+
+
+def wait_until(condition: Callable[[], object], what: str = "") -> None:
+    """Wait until ``condition()`` is true. Fails when it does not come true."""
+    until = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < until, f"did not come true: {what or condition}"
+        time.sleep(0.002)
+
+
+@dataclass
+class Bench:
+    """A running loop, a node of it, and what was reported."""
+
+    loop: Loop
+    node: Node
+    reports: list[tuple[str, BaseException]]
+
+    def errors(self) -> list[type[BaseException]]:
+        return [type(error) for _, error in self.reports]
+
+    def group(self) -> ReentrantCallbackGroup:
+        return ReentrantCallbackGroup()
+
+    def subscribe(self, kind: Any, topic: str, callback: Callable[[Any], None], **qos: Any) -> Any:
+        profile = rclpy.qos.QoSProfile(**{"depth": 10, **qos})
+        subscription = self.node.create_subscription(kind, topic, callback, profile)
+
+        @wraps(callback)
+        def call(taken: Taken) -> None:
+            callback(taken[0])
+
+        self.loop.add_subscription(subscription, call)
+        return subscription
+
+    def serve(self, kind: Any, name: str, callback: Callable[[Any, Any], None]) -> Any:
+        service = self.node.create_service(kind, name, lambda _, response: response)
+        self.loop.add_service(service, callback)
+        return service
+
+    def client(self, kind: Any, name: str) -> Any:
+        client = self.node.create_client(kind, name)
+        self.loop.add_client(client)
+        return client
+
+
+def executor_of(kind: ExecutorKind) -> Executor:
+    source = SourceFile("test", "")
+    span = Span(source, 1, 1, 1)
+    return Executor(Located("default", span), kind, span, threads=3)
+
+
+@contextmanager
+def bench(kind: ExecutorKind, name: str = "bench") -> Iterator[Bench]:
+    """Run a loop with a node for the length of the block."""
+    rclpy.init()
+    try:
+        reports: list[tuple[str, BaseException]] = []
+        loop = make_loop(executor_of(kind), lambda *report: reports.append(report))
+        node = Node(name, enable_logger_service=True)
+        loop.add_node(node)
+        loop.start()
+        try:
+            yield Bench(loop, node, reports)
+        finally:
+            loop.remove_node(node)
+            stopped = loop.stop(5.0)
+            leave(node)
+        assert stopped, "the loop did not stop"
+    finally:
+        rclpy.shutdown()
+
+
+@contextmanager
+def peer(*arguments: object) -> Iterator[subprocess.Popen[str]]:
+    """Run ``loop_peer.py``, hand-written rclpy, in a process of its own."""
+    command = [sys.executable, str(PEER), *map(str, arguments)]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True, env=os.environ.copy()
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def wait_for_line(process: subprocess.Popen[str], wanted: str) -> None:
+    """Wait until a peer prints a line; Fast DDS may print others."""
+    assert process.stdout is not None
+    assert any(line.strip() == wanted for line in process.stdout), f"never printed: {wanted}"
+
+
+def last_line(process: subprocess.Popen[str]) -> str:
+    """Wait for the end of a peer and return the last line it printed."""
+    output, _ = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0, output
+    return output.strip().splitlines()[-1]

@@ -1,0 +1,174 @@
+"""A system run as people run it, in a process of its own, and somebody outside who looks at it."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, TypeVar
+
+from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+from tests.ros.support.commands import COMPOSE
+
+T = TypeVar("T")
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+PATIENCE_S = 20.0
+
+
+class RunningSystem:
+    """``compose run`` in a process of its own; what it prints is read as it comes."""
+
+    def __init__(self, system: str, *options: str, program: Sequence[str] = COMPOSE) -> None:
+        command = [*program, "run", system, *options]
+        self.process = subprocess.Popen(
+            command,
+            cwd=REPOSITORY,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            text=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        )
+        self.lines: list[str] = []
+        self._has_ended = False
+        self._news = threading.Condition()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __enter__(self) -> RunningSystem:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._end()
+        self._reader.join()
+        if error is not None:
+            error.add_note("the system printed:\n" + self.output)
+
+    @property
+    def output(self) -> str:
+        """Everything printed so far."""
+        return "\n".join(self.lines)
+
+    def wait_for(self, pattern: str, timeout_s: float = PATIENCE_S) -> str:
+        """Wait for a printed line that matches and return it. Fails when none is to come."""
+        searched = re.compile(pattern)
+        end_s = time.monotonic() + timeout_s
+        with self._news:
+            while True:
+                for line in self.lines:
+                    if searched.search(line):
+                        return line
+                assert not self._has_ended, f"no line like {pattern!r}, it ended: {self._code()}"
+                if not self._news.wait(end_s - time.monotonic()):
+                    raise AssertionError(f"no line like {pattern!r} within {timeout_s:g} s")
+
+    def stop(self, number: signal.Signals = signal.SIGINT) -> tuple[int, float]:
+        """Send a signal; return the exit code and the seconds it took to end."""
+        sent_s = time.monotonic()
+        self.process.send_signal(number)
+        code = self.process.wait(timeout=PATIENCE_S)
+        took_s = time.monotonic() - sent_s
+        self._reader.join()
+        return code, took_s
+
+    def _end(self) -> None:
+        """Leave nothing running; what is killed would haunt the ROS graph until its lease ends."""
+        self.process.send_signal(signal.SIGINT)
+        try:
+            self.process.wait(timeout=PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            with self._news:
+                self.lines.append(line.rstrip("\n"))
+                self._news.notify_all()
+        with self._news:
+            self._has_ended = True
+            self._news.notify_all()
+
+    def _code(self) -> int:
+        return self.process.wait(timeout=PATIENCE_S)
+
+
+class Outsider:
+    """An ordinary rclpy node in another process than the system."""
+
+    def __init__(self, context: Context) -> None:
+        self.node = Node("outsider", context=context)
+        self.executor = SingleThreadedExecutor(context=context)
+        self.executor.add_node(self.node)
+
+    def close(self) -> None:
+        """Leave the ROS graph."""
+        self.executor.shutdown(timeout_sec=1.0)
+        self.node.destroy_node()
+
+    def spin_until(self, condition: Callable[[], bool], timeout_s: float = PATIENCE_S) -> None:
+        """Serve callbacks until the condition holds."""
+        end_s = time.monotonic() + timeout_s
+        while not condition():
+            if time.monotonic() > end_s:
+                raise AssertionError(f"not reached within {timeout_s:g} s")
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def spin_for(self, seconds: float) -> None:
+        """Serve callbacks for so long: for what must *not* come."""
+        end_s = time.monotonic() + seconds
+        while (left_s := end_s - time.monotonic()) > 0:
+            self.executor.spin_once(timeout_sec=min(left_s, 0.05))
+
+    def listen(self, message_type: Any, topic: str, qos: QoSProfile | int = 10) -> list[Any]:
+        """Return a list that fills with the messages of the topic."""
+        heard: list[Any] = []
+        self.node.create_subscription(message_type, topic, heard.append, qos)
+        return heard
+
+    def result(self, future: Any, timeout_s: float = PATIENCE_S) -> Any:
+        """Wait for an rclpy future and return its result."""
+        self.spin_until(future.done, timeout_s)
+        return future.result()
+
+    def call(self, service_type: Any, name: str, request: Any) -> Any:
+        """Call a service and return its response."""
+        client = self.node.create_client(service_type, name)
+        try:
+            self.spin_until(client.service_is_ready)
+            return self.result(client.call_async(request))
+        finally:
+            self.node.destroy_client(client)
+
+    def state(self, node: str) -> str:
+        """Return the label of a node's lifecycle state."""
+        response = self.call(GetState, f"{node}/get_state", GetState.Request())
+        return str(response.current_state.label)
+
+    def wait_for_state(self, node: str, state: str) -> None:
+        """Wait until the node is there and in the state."""
+        self.spin_until(lambda: self.state(node) == state)
+
+    def change_state(self, node: str, label: str) -> bool:
+        """Ask for a transition by its label."""
+        request = ChangeState.Request()
+        request.transition.label = label
+        return bool(self.call(ChangeState, f"{node}/change_state", request).success)

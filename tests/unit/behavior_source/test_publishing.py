@@ -1,0 +1,118 @@
+"""How often a node publishes, as far as its YAML and the text of its behaviour tell."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from textwrap import dedent, indent
+
+import pytest
+
+from composer.behavior_source.bodies import read_body
+from composer.behavior_source.publishing import Publishing, publishing_of
+from composer.graph.rates import publishing_rates_hz
+from composer.source import SourceFile
+from tests.unit.support.resolving import system_of
+
+
+def publishing(body: str) -> Publishing:
+    text = f"def on_tick(self):\n{indent(dedent(body), '    ')}"
+    (function,) = ast.parse(text).body
+    assert isinstance(function, ast.FunctionDef)
+    return publishing_of(function, read_body(function, {}, SourceFile("a.py", text)))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "self.publishers.out.publish(x)",
+        "x = 1\nif x:\n    x = 2\nself.publishers.out.publish(x)",
+        "for x in y:\n    z()\nself.publishers.out.publish(x)\nreturn",
+        "publish = self.publishers.out.publish\npublish(x)",
+        "out = self.publishers.out\nout.publish(x)",
+        "publishers = self.publishers\nout = publishers.out\nsend = out.publish\nsend(x)",
+    ],
+)
+def test_a_statement_that_is_always_reached_publishes_each_time(body: str) -> None:
+    assert publishing(body) == Publishing(("out",), ("out",))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "if x:\n    self.publishers.out.publish(x)",
+        "if x:\n    return\nself.publishers.out.publish(x)",
+        "for x in y:\n    self.publishers.out.publish(x)",
+        "assert x\nself.publishers.out.publish(x)",
+        "self.publishers.out.publish(x)\nself.publishers.out.publish(x)",
+        "out = self.publishers.out\nif x:\n    out.publish(x)",
+        "self.publishers.out.topic",
+    ],
+)
+def test_what_depends_on_something_is_only_named(body: str) -> None:
+    assert publishing(body) == Publishing((), ("out",))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "send(self.publishers.out)",
+        "self.send = self.publishers.out.publish",
+        "out = self.publishers.out\nsend(out)",
+        "out = self.publishers.out\nout = other\nout.publish(x)",
+        "def send(out=self.publishers.out):\n    out.publish(x)",
+    ],
+)
+def test_what_is_kept_or_given_away_may_be_used_by_anybody(body: str) -> None:
+    assert publishing(body) == Publishing((), ("out",), ("out",))
+
+
+@pytest.mark.parametrize("body", ["out.publish(x)", "self.out.publish(x)", "self.publishers"])
+def test_what_is_no_publisher_is_not_named(body: str) -> None:
+    assert publishing(body) == Publishing()
+
+
+SENDER = """
+    from composer.behavior import Behavior
+
+    class Sender(Behavior):
+        def on_tick(self):
+            self.publishers.out.publish(self.make())
+
+        def on_other(self):
+            pass
+"""
+SYSTEM = """
+    system: sending
+    nodes:
+      sender:
+        behavior: sender:Sender
+        publishers: {out: {type: std_msgs/msg/String}}
+        timers: {tick: {rate_hz: 20}, other: {rate_hz: 5}}
+"""
+
+
+def rates(folder: Path, python: str = SENDER, system: str = SYSTEM) -> dict[str, float]:
+    (folder / "sender.py").write_text(dedent(python))
+    (node,) = system_of(system, folder).nodes
+    return publishing_rates_hz(node)
+
+
+def test_the_rate_is_that_of_the_timer_whose_handler_publishes(tmp_path: Path) -> None:
+    assert rates(tmp_path) == {"out": 20.0}
+
+
+def test_no_rate_is_told_where_another_handler_publishes_too(tmp_path: Path) -> None:
+    assert rates(tmp_path, SENDER.replace("pass", "self.publishers.out.publish(1)")) == {}
+
+
+def test_no_rate_is_told_where_what_comes_in_is_answered_with_it(tmp_path: Path) -> None:
+    system = SYSTEM.replace(
+        "timers:",
+        "subscriptions: {in: {type: std_msgs/msg/String, publish: {out: {}}}}\n        timers:",
+    )
+    assert rates(tmp_path, SENDER, system) == {}
+
+
+def test_no_rate_is_told_where_there_is_no_handler(tmp_path: Path) -> None:
+    assert rates(tmp_path, SENDER.replace("on_tick", "on_tock")) == {}

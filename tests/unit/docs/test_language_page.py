@@ -1,0 +1,56 @@
+"""docs/language.md is what the schemas say, and leads nowhere that is not."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from composer.document import parse_document
+from composer.schema import SCHEMAS, check_schema, kind_of, schema
+from composer.source import SourceFile
+
+ROOT = Path(__file__).parents[3]
+PAGE = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")
+GUIDES = sorted((ROOT / "docs").rglob("*.md"))
+
+
+def test_it_is_current() -> None:
+    made = runpy.run_path(str(ROOT / "tools" / "write_language.py"))["page"]()
+    assert made == PAGE, "run: python tools/write_language.py"
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_every_key_has_its_row(name: str) -> None:
+    def keys(part: Any) -> set[str]:
+        if isinstance(part, list):
+            return set().union(*map(keys, part))
+        if not isinstance(part, dict):
+            return set()
+        inner = [value for key, value in part.items() if key not in ("examples", "default")]
+        return set(part.get("properties", {})) | set().union(*map(keys, inner))
+
+    assert {key for key in keys(schema(name)) if f"| `{key}` |" not in PAGE} == set()
+
+
+def test_the_example_is_right() -> None:
+    (example,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+    tree, findings = parse_document(SourceFile("example", example))
+    assert tree is not None
+    assert [*findings, *check_schema(tree, str(kind_of(tree)))] == []
+
+
+@pytest.mark.parametrize("page", GUIDES, ids=lambda path: path.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    anchors = {re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in headings}
+    for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"```.*?```", "", text, flags=re.DOTALL)):
+        path, _, anchor = target.partition("#")
+        if path:
+            assert target.startswith("https://") or (page.parent / path).exists(), target
+        elif anchor:
+            assert anchor in anchors, target

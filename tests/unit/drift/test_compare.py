@@ -1,0 +1,208 @@
+"""What differs between a declared system and a seen graph: no ROS needed to tell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from composer.drift import Drift, DriftKind, EndSeen, NodeSeen, Snapshot, compare
+from composer.model import PortKind, PrimaryState
+from composer.qos import Durability, QosProfile, Reliability
+from tests.unit.support.resolving import system_of
+
+SYSTEM = system_of("""
+    system: shop
+    nodes:
+      clerk:
+        namespace: front
+        parameters: {speed: 1.5, on: true, tags: [a, b]}
+        publishers: {bill: {type: std_msgs/msg/String, topic: /bill, qos: state}}
+        services: {ask: {type: std_srvs/srv/Trigger, respond: {success: true}}}
+      guard:
+        lifecycle: {autostart: inactive}
+        subscriptions: {bill: {type: std_msgs/msg/String, topic: /bill, qos: command}}
+      sleeper:
+        lifecycle: {autostart: unconfigured}
+        publishers: {dream: {type: std_msgs/msg/String}}
+""")
+STRING = "std_msgs/msg/String"
+STATE = QosProfile(durability=Durability.TRANSIENT_LOCAL)
+BILL = EndSeen(PortKind.PUBLISHER, "/bill", STRING, STATE)
+ASK = EndSeen(PortKind.SERVICE, "/front/ask", "std_srvs/srv/Trigger")
+CLERK = NodeSeen(
+    "/front/clerk", (BILL, ASK), "active", {"speed": 1.5, "on": True, "tags": ["a", "b"]}
+)
+GUARD = NodeSeen(
+    "/guard", (EndSeen(PortKind.SUBSCRIPTION, "/bill", STRING, QosProfile()),), "inactive"
+)
+SLEEPER = NodeSeen("/sleeper", (), "unconfigured")
+ALL = (CLERK, GUARD, SLEEPER)
+
+
+def differences(*nodes: NodeSeen, **options: object) -> list[str]:
+    return [drift.message for drift in found(*nodes, **options)]
+
+
+def found(*nodes: NodeSeen, **options: object) -> tuple[Drift, ...]:
+    return compare(SYSTEM, Snapshot(nodes), **options)  # type: ignore[arg-type]
+
+
+def test_what_is_as_declared_differs_in_nothing() -> None:
+    assert differences(*ALL) == []
+
+
+def test_a_missing_node_is_named_with_the_one_that_is_nearly_it() -> None:
+    clark = replace(CLERK, full_name="/front/clark")
+    missing, extra = found(clark, GUARD, SLEEPER)
+    assert missing.message == "/front/clerk: the node is not there"
+    assert missing.hint == "'/front/clark' is there: is it meant?"
+    assert missing.span is not None
+    assert extra.message == "/front/clark: the node is there, but not declared"
+
+
+def test_a_node_in_another_namespace_is_nearly_it() -> None:
+    (missing, _) = found(replace(CLERK, full_name="/clerk"), GUARD, SLEEPER)
+    assert "'/clerk' is there" in missing.hint
+
+
+def test_two_nodes_of_one_name_are_told() -> None:
+    assert differences(replace(CLERK, count=2), GUARD, SLEEPER) == [
+        "/front/clerk: 2 nodes have this name"
+    ]
+
+
+def test_others_are_extra_unless_ignored_hidden_or_the_systems_own() -> None:
+    manager = NodeSeen(
+        "/shop/manager",
+        (EndSeen(PortKind.SERVICE, "/shop/manager/is_active", "std_srvs/srv/Trigger"),),
+    )
+    assert differences(*ALL, manager, NodeSeen("/_ros2cli_7")) == []
+    assert differences(*ALL, NodeSeen("/other/manager")) == [
+        "/other/manager: the node is there, but not declared"
+    ]
+    assert differences(*ALL, NodeSeen("/rviz2"), ignored=["/rviz*"]) == []
+
+
+@pytest.mark.parametrize("name", ["/stranger", "/_ros2cli_7"])
+def test_another_type_on_a_declared_topic_is_named_whoever_has_it(name: str) -> None:
+    stranger = NodeSeen(name, (EndSeen(PortKind.PUBLISHER, "/bill", "std_msgs/msg/Int8"),))
+    assert (
+        f"{name}: type of its publisher /bill is std_msgs/msg/Int8, declared {STRING}"
+    ) in differences(*ALL, stranger, ignored=["/stranger"])
+
+
+def test_a_missing_endpoint_is_named_with_the_one_that_is_nearly_it() -> None:
+    bills = replace(BILL, name="/bills")
+    missing, extra = found(replace(CLERK, ends=(bills, ASK)), GUARD, SLEEPER)
+    assert missing.kind is DriftKind.MISSING_ENDPOINT
+    assert missing.message == "/front/clerk: publisher /bill is missing"
+    assert missing.hint == "it has '/bills': is that meant?"
+    assert extra.message == "/front/clerk: publisher /bills is there, but not declared"
+
+
+def test_a_cleaned_up_node_is_told_with_its_state_and_what_it_lacks() -> None:
+    gone = found(replace(CLERK, ends=(), state="unconfigured"), GUARD, SLEEPER)
+    assert [drift.message for drift in gone] == [
+        "/front/clerk: lifecycle state is unconfigured, declared active",
+        "/front/clerk: publisher /bill is missing",
+        "/front/clerk: service /front/ask is missing",
+    ]
+    assert gone[1].hint == "the node is unconfigured: it has no ports"
+
+
+def test_a_node_that_is_to_stay_unconfigured_lacks_nothing_until_it_is_configured() -> None:
+    assert differences(CLERK, GUARD, replace(SLEEPER, state="inactive")) == [
+        "/sleeper: lifecycle state is inactive, declared unconfigured",
+        "/sleeper: publisher /dream is missing",
+    ]
+
+
+def test_how_far_the_system_was_brought_up_may_be_said() -> None:
+    inactive = replace(CLERK, state="inactive")
+    assert differences(inactive, GUARD, SLEEPER, autostart=PrimaryState.INACTIVE) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (
+            lambda end: replace(end, type="std_msgs/msg/Int8"),
+            f"type of publisher /bill is std_msgs/msg/Int8, declared {STRING}",
+        ),
+        (
+            lambda end: replace(end, qos=replace(STATE, reliability=Reliability.BEST_EFFORT)),
+            "reliability of publisher /bill is best_effort, declared reliable",
+        ),
+        (
+            lambda end: replace(end, qos=replace(STATE, durability=Durability.VOLATILE)),
+            "durability of publisher /bill is volatile, declared transient_local",
+        ),
+        (
+            lambda end: replace(end, qos=replace(STATE, deadline_ms=20.0)),
+            "deadline_ms of publisher /bill is 20, declared no limit",
+        ),
+    ],
+)
+def test_types_and_what_is_really_offered(
+    change: Callable[[EndSeen], EndSeen], expected: str
+) -> None:
+    clerk = replace(CLERK, ends=(change(BILL), ASK))
+    assert differences(clerk, GUARD, SLEEPER) == [f"/front/clerk: {expected}"]
+
+
+def test_depth_and_history_are_not_told_so_they_are_not_compared() -> None:
+    deep = replace(BILL, qos=replace(STATE, depth=77))
+    assert differences(replace(CLERK, ends=(deep, ASK)), GUARD, SLEEPER) == []
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ({"speed": 2.5}, ["parameter speed is 2.5, declared 1.5"]),
+        ({"on": 1}, ["parameter on is 1, declared true"]),
+        ({"tags": ["a"]}, ["parameter tags is ['a'], declared ['a', 'b']"]),
+        ({"use_sim_time": True}, []),
+    ],
+)
+def test_parameter_values(values: dict[str, object], expected: list[str]) -> None:
+    assert CLERK.parameters is not None
+    clerk = replace(CLERK, parameters={**CLERK.parameters, **values})
+    assert differences(clerk, GUARD, SLEEPER) == [f"/front/clerk: {text}" for text in expected]
+
+
+def test_a_parameter_that_is_not_there() -> None:
+    clerk = replace(CLERK, parameters={"on": True, "tags": ["a", "b"]})
+    assert differences(clerk, GUARD, SLEEPER) == ["/front/clerk: parameter speed is missing"]
+
+
+def test_a_node_that_does_not_answer_is_told_as_such() -> None:
+    silent = replace(CLERK, state=None, parameters=None)
+    assert differences(silent, GUARD, SLEEPER) == [
+        "/front/clerk: it does not tell its lifecycle state",
+        "/front/clerk: it does not tell its parameters",
+    ]
+
+
+def test_a_node_without_a_lifecycle_is_not_what_is_declared() -> None:
+    assert differences(replace(CLERK, state=""), GUARD, SLEEPER) == [
+        "/front/clerk: lifecycle state is none: it is no lifecycle node, declared active"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "type_name"),
+    [
+        (PortKind.PUBLISHER, "/rosout", "rcl_interfaces/msg/Log"),
+        (PortKind.PUBLISHER, "/a/transition_event", "lifecycle_msgs/msg/TransitionEvent"),
+        (PortKind.SERVICE, "/a/get_parameters", "rcl_interfaces/srv/GetParameters"),
+        (PortKind.CLIENT, "/a/change_state", "lifecycle_msgs/srv/ChangeState"),
+    ],
+)
+def test_what_every_node_has_for_tools_is_told_from_what_it_is_for(
+    kind: PortKind, name: str, type_name: str
+) -> None:
+    assert EndSeen(kind, name, type_name).is_for_tools
+    assert not EndSeen(kind, name, "example_interfaces/msg/Other").is_for_tools
+    assert not EndSeen(kind, f"{name}_more", type_name).is_for_tools

@@ -1,0 +1,110 @@
+"""What several systems, and a running graph, look like."""
+
+from __future__ import annotations
+
+from composer.drift import EndSeen, NodeSeen, Snapshot
+from composer.graph import View, build_graph, live_scene_of, scene_of
+from composer.graph.picture import Graph
+from composer.model import PortKind
+from composer.qos import QosProfile, Reliability
+from tests.unit.support.resolving import system_of
+
+STRING = "std_msgs/msg/String"
+TALKING = """
+    system: talking
+    executors: {quick: {kind: single_threaded}}
+    nodes:
+      talker: {executor: quick, publishers: {chatter: {type: std_msgs/msg/String}}}
+      echo:
+        publishers: {loop: {type: std_msgs/msg/String}}
+        subscriptions: {back: {type: std_msgs/msg/String, topic: loop}}
+"""
+LISTENING = """
+    system: listening
+    nodes:
+      listener: {subscriptions: {chatter: {type: std_msgs/msg/String}}}
+      talker: {}
+"""
+
+
+def both(view: View) -> Graph:
+    return build_graph(scene_of([system_of(TALKING), system_of(LISTENING)]), view)
+
+
+def test_several_systems_meet_on_their_topics() -> None:
+    graph = both(View.NODES)
+    assert graph.title == "talking + listening"
+    arrows = {(edge.source, edge.target) for edge in graph.edges}
+    assert {("node:/talker", "topic:/chatter"), ("topic:/chatter", "node:/listener")} <= arrows
+    lines = {vertex.key: vertex.lines for vertex in graph.vertices}
+    assert lines["node:/listener"] == ("listener", "listening")
+
+
+def test_a_name_that_two_systems_give_is_one_node_to_ros_and_marked() -> None:
+    wrong = {vertex.key: vertex.wrong for vertex in both(View.NODES).vertices if vertex.wrong}
+    assert wrong == {"node:/talker": "two nodes are called '/talker'"}
+
+
+def test_each_system_has_its_own_executors() -> None:
+    labels = [cluster.label for cluster in both(View.DEPLOYMENT).clusters]
+    assert labels == [
+        "talking · quick: single_threaded",
+        "talking · default: events",
+        "listening · default: events",
+    ]
+
+
+def test_a_node_that_hears_itself_has_an_arrow_to_itself() -> None:
+    edges = build_graph(scene_of([system_of(TALKING)]), View.DEPLOYMENT).edges
+    assert [(edge.source, edge.target) for edge in edges] == [("node:/echo", "node:/echo")]
+
+
+def test_servers_stand_before_their_clients_in_the_bring_up() -> None:
+    text = """
+        system: shop
+        nodes:
+          client: {clients: {ask: {type: std_srvs/srv/Trigger}}}
+          server: {services: {ask: {type: std_srvs/srv/Trigger}}}
+    """
+    (edge,) = build_graph(scene_of([system_of(text)]), View.LIFECYCLE).edges
+    assert (edge.source, edge.target) == ("node:/server", "node:/client")
+    assert (edge.kind, edge.lines) == ("implied", ("serves /ask",))
+
+
+def seen() -> Snapshot:
+    best_effort = QosProfile(reliability=Reliability.BEST_EFFORT)
+    return Snapshot(
+        (
+            NodeSeen("/a/one", (EndSeen(PortKind.PUBLISHER, "/t", STRING, best_effort),), "active"),
+            NodeSeen("/a/two", (EndSeen(PortKind.SUBSCRIPTION, "/t", STRING, best_effort),), None),
+            NodeSeen("/b", (EndSeen(PortKind.PUBLISHER, "/u", STRING, QosProfile()),), count=2),
+            NodeSeen("/c", (EndSeen(PortKind.PUBLISHER, "/u", STRING, QosProfile()),)),
+            NodeSeen("/_tool", (EndSeen(PortKind.SUBSCRIPTION, "/u", STRING, QosProfile()),)),
+        )
+    )
+
+
+def test_a_running_graph_has_states_rates_and_the_qos_that_is_told() -> None:
+    graph = build_graph(live_scene_of(seen(), {"/t": 29.96, "/u": 5.0}))
+    lines = {vertex.key: vertex.lines for vertex in graph.vertices}
+    assert lines["node:/a/one"] == ("one", "active")
+    assert lines["node:/a/two"] == ("two", "state unknown")
+    assert lines["node:/c"] == ("c",)
+    assert lines["topic:/u"] == ("/u", "String", "5 Hz")  # from whom of two is not told
+    labels = {edge.key: edge.lines for edge in graph.edges}
+    assert labels["publisher:/a/one./t"] == ("30 Hz", "best_effort, volatile")
+    assert labels["subscription:/a/two./t"] == ()
+
+
+def test_of_a_running_graph_tools_are_left_out_and_a_name_of_two_is_marked() -> None:
+    graph = build_graph(live_scene_of(seen(), {}))
+    wrong = {vertex.key: vertex.wrong for vertex in graph.vertices if vertex.kind == "node"}
+    assert "node:/_tool" not in wrong
+    assert wrong["node:/b"] == "2 nodes have this name"
+
+
+def test_states_of_a_running_graph() -> None:
+    graph = build_graph(live_scene_of(seen(), {}), View.STATES)
+    lines = {vertex.key: vertex.lines for vertex in graph.vertices}
+    assert lines["state:active"] == ("active", "/a/one")
+    assert lines["state:state unknown"] == ("state unknown", "/a/two")

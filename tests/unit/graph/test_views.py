@@ -1,0 +1,150 @@
+from __future__ import annotations
+
+from pathlib import Path
+from textwrap import dedent
+
+from composer.graph import View, build_graph, scene_of
+from composer.graph.picture import Graph
+from composer.loading import load_bytes
+from tests.unit.support.resolving import system_of
+
+
+def drawn(text: str, view: View = View.NODES) -> Graph:
+    return build_graph(scene_of([system_of(text)]), view)
+
+
+def arrows(graph: Graph) -> dict[tuple[str, str], tuple[str, ...]]:
+    return {(edge.source, edge.target): edge.lines for edge in graph.edges}
+
+
+TALK = """
+    system: talk
+    nodes:
+      talker:
+        namespace: left
+        parameters: {rate_hz: 4.0}
+        publishers: {chatter: {type: std_msgs/msg/String, topic: /chatter, qos: sensor_data}}
+        timers: {tick: {rate_hz: "{parameters.rate_hz}", publish: {chatter: {data: hello}}}}
+      listener:
+        namespace: right
+        subscriptions: {chatter: {type: std_msgs/msg/String, topic: /chatter, qos: sensor_data}}
+      asker:
+        namespace: right
+        clients: {ask: {type: std_srvs/srv/Trigger, service: /ask}}
+      answerer:
+        services: {ask: {type: std_srvs/srv/Trigger, service: /ask}}
+"""
+
+
+def test_messages_go_from_publisher_to_subscription_and_requests_from_client_to_server() -> None:
+    assert set(arrows(drawn(TALK))) == {
+        ("node:/left/talker", "topic:/chatter"),
+        ("topic:/chatter", "node:/right/listener"),
+        ("node:/right/asker", "service:/ask"),
+        ("service:/ask", "node:/answerer"),
+    }
+
+
+def test_the_rate_comes_from_the_timer_and_its_parameter_and_the_profile_is_said_once() -> None:
+    lines = arrows(drawn(TALK))
+    assert lines["node:/left/talker", "topic:/chatter"] == ("4 Hz", "sensor_data")
+    assert lines["topic:/chatter", "node:/right/listener"] == ()
+
+
+def test_a_timer_with_a_condition_promises_no_rate() -> None:
+    text = TALK.replace("publish: {chatter", "when: count > 3, publish: {chatter")
+    lines = arrows(drawn(text))
+    assert lines["node:/left/talker", "topic:/chatter"] == ("sensor_data",)
+
+
+def test_namespaces_are_frames_and_one_that_holds_one_other_is_none() -> None:
+    text = """
+        system: nested
+        nodes:
+          one: {namespace: a/b/c}
+          two: {namespace: a/b/d}
+          three: {namespace: x/y/z}
+    """
+    clusters = {cluster.key: cluster.parent for cluster in drawn(text).clusters}
+    assert clusters == {"/a/b": "", "/a/b/c": "/a/b", "/a/b/d": "/a/b", "/x/y/z": ""}
+
+
+def test_a_topic_stands_in_the_frame_of_its_name() -> None:
+    text = """
+        system: inside
+        nodes:
+          one: {namespace: a, publishers: {out: {type: std_msgs/msg/String}}}
+          two: {namespace: a, publishers: {out: {type: std_msgs/msg/String, topic: ~/out}}}
+    """
+    clusters = {vertex.key: vertex.cluster for vertex in drawn(text).vertices}
+    assert clusters["topic:/a/out"] == "/a"
+    assert clusters["topic:/a/two/out"] == "/a"
+
+
+def test_connections_join_ports_and_say_both_profiles_where_they_differ() -> None:
+    text = TALK.replace(
+        "/chatter, qos: sensor_data}}\n      asker",
+        "/chatter, qos: {extends: sensor_data, depth: 2}}}\n      asker",
+    )
+    lines = arrows(drawn(text, View.CONNECTIONS))
+    assert lines["publisher:/left/talker.chatter", "subscription:/right/listener.chatter"] == (
+        "/chatter",
+        "String",
+        "4 Hz",
+        "sensor_data → best_effort, volatile, keep_last 2",
+    )
+    assert lines["client:/right/asker.ask", "service:/answerer.ask"] == ("/ask", "Trigger")
+
+
+LIFECYCLE = """
+    system: order
+    executors: {quick: {kind: single_threaded}}
+    nodes:
+      late: {lifecycle: {depends_on: [early]}}
+      early: {executor: quick}
+      asleep: {lifecycle: {autostart: unconfigured}}
+"""
+
+
+def test_the_lifecycle_view_tells_the_steps_and_who_waits_for_whom() -> None:
+    graph = drawn(LIFECYCLE, View.LIFECYCLE)
+    assert arrows(graph) == {("node:/early", "node:/late"): ("once active",)}
+    lines = {vertex.key: vertex.lines for vertex in graph.vertices}
+    assert lines["node:/early"] == ("early", "#1 configure, #3 activate")
+    assert lines["node:/asleep"] == ("asleep", "stays unconfigured")
+
+
+def test_the_states_view_puts_nodes_where_the_bring_up_takes_them() -> None:
+    lines = {vertex.key: vertex.lines for vertex in drawn(LIFECYCLE, View.STATES).vertices}
+    assert lines["state:active"] == ("active", "/late", "/early")
+    assert lines["state:unconfigured"] == ("unconfigured", "/asleep")
+    assert lines["state:finalized"] == ("finalized",)
+
+
+def test_the_deployment_view_groups_nodes_by_executor() -> None:
+    graph = drawn(LIFECYCLE, View.DEPLOYMENT)
+    assert {cluster.key: cluster.label for cluster in graph.clusters} == {
+        "executor:order.quick": "quick: single_threaded",
+        "executor:order.default": "default: events",
+    }
+    assert {vertex.key: vertex.cluster for vertex in graph.vertices} == {
+        "node:/late": "executor:order.default",
+        "node:/early": "executor:order.quick",
+        "node:/asleep": "executor:order.default",
+    }
+
+
+def test_what_a_finding_points_at_is_marked() -> None:
+    text = """
+        system: broken
+        nodes:
+          fine: {publishers: {out: {type: std_msgs/msg/String, topic: /talk, qos: sensor_data}}}
+          strict: {subscriptions: {talk: {type: std_msgs/msg/String, topic: /talk, qos: command}}}
+          lost: {lifecycle: {depends_on: [nobody]}}
+    """
+    loading = load_bytes(dedent(text).encode(), Path("/nowhere"), shown="broken.yaml")
+    assert loading.system is not None
+    graph = build_graph(scene_of([loading.system], loading.diagnostics))
+    wrong = {edge.target: edge.wrong for edge in graph.edges}
+    assert "reliab" in wrong["node:/strict"]
+    assert {vertex.key for vertex in graph.vertices if vertex.wrong} == {"node:/lost"}

@@ -1,0 +1,212 @@
+"""The catalogue: where definitions come from, which one wins, and what is read when."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from composer.interfaces import Action, FieldType, Interfaces, Message, Service
+from composer.interfaces.share_json import read_description
+from composer.interfaces.sources import Bundle, Prefix, find_packages, installed_prefixes
+
+BUNDLED = Interfaces([Bundle()])
+
+
+def package(folder: Path, name: str, **files: str) -> Path:
+    """Write an interface package; ``msg_Demo="bool on"`` becomes msg/Demo.msg."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    for key, text in files.items():
+        kind, stem = key.split("_")
+        (folder / kind).mkdir(exist_ok=True)
+        (folder / kind / f"{stem}.{kind}").write_text(text)
+    return folder
+
+
+def prefix(root: Path, name: str, **files: str) -> Prefix:
+    """Write a package as it is installed."""
+    package(root / "share" / name, name, **files)
+    index = root / "share" / "ament_index" / "resource_index" / "rosidl_interfaces"
+    index.mkdir(parents=True, exist_ok=True)
+    (index / name).touch()
+    return Prefix(root)
+
+
+def test_the_snapshot_has_what_systems_are_made_of() -> None:
+    message = BUNDLED.find("geometry_msgs/msg/Twist")
+    assert isinstance(message, Message)
+    assert message.field_names == ("linear", "angular")
+    service = BUNDLED.find("composer_interfaces/srv/PlanTrajectory")
+    assert isinstance(service, Service)
+    assert service.response.field_names == ("path", "success", "message")
+    action = BUNDLED.find("composer_interfaces/action/Navigate")
+    assert isinstance(action, Action)
+    assert action.feedback.field_names == ("progress_percent", "current_position")
+
+
+def test_every_definition_of_the_snapshot_can_be_read_and_is_complete() -> None:
+    for folder in ("msg", "srv", "action"):
+        for name in BUNDLED.names(folder):
+            found = BUNDLED.find(name)
+            assert found is not None, BUNDLED.problem(name)
+            for message in parts(found):
+                for field in message.fields:
+                    assert field.type.is_primitive or BUNDLED.message(field.type.name), field
+
+
+def parts(interface: Message | Service | Action) -> tuple[Message, ...]:
+    match interface:
+        case Message():
+            return (interface,)
+        case Service():
+            return (interface.request, interface.response)
+        case Action():
+            return (interface.goal, interface.result, interface.feedback)
+
+
+def test_constants_are_known() -> None:
+    message = BUNDLED.message("diagnostic_msgs/msg/DiagnosticStatus")
+    assert message is not None
+    assert {constant.name: constant.value for constant in message.constants} == {
+        "OK": 0,
+        "WARN": 1,
+        "ERROR": 2,
+        "STALE": 3,
+    }
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["std_msgs/msg/Strin", "nowhere_msgs/msg/A", "std_msgs/String", "../../etc/msg/A", "", "a/b"],
+)
+def test_what_does_not_exist_is_not_found(name: str) -> None:
+    assert BUNDLED.find(name) is None
+    assert BUNDLED.problem(name) is None
+
+
+def test_a_service_is_not_a_message() -> None:
+    assert BUNDLED.message("std_srvs/srv/Trigger") is None
+    assert BUNDLED.message("std_msgs/msg/String") is not None
+
+
+def test_project_wins_over_installed_wins_over_the_snapshot(tmp_path: Path) -> None:
+    project = find_packages([package(tmp_path / "a", "std_msgs", msg_String="bool ours")])
+    installed = prefix(tmp_path / "b", "std_msgs", msg_String="bool theirs", msg_Bool="bool theirs")
+    interfaces = Interfaces([project, installed, Bundle()])
+
+    def first_field(name: str) -> str:
+        message = interfaces.message(name)
+        assert message is not None
+        return message.fields[0].name
+
+    assert first_field("std_msgs/msg/String") == "ours"
+    assert first_field("std_msgs/msg/Bool") == "theirs"
+    assert first_field("std_msgs/msg/Int8") == "data"
+
+
+def test_packages_are_found_below_a_folder_but_not_where_builds_are(tmp_path: Path) -> None:
+    package(tmp_path / "src" / "one", "one_msgs", msg_A="bool a", srv_B="---", action_C="---\n---")
+    package(tmp_path / "src" / "one" / "inner", "inner_msgs", msg_A="bool a")
+    package(tmp_path / "build" / "one", "stale_msgs", msg_A="bool a")
+    package(tmp_path / ".hidden", "hidden_msgs", msg_A="bool a")
+    package(tmp_path / "code_only", "code_only")
+    (tmp_path / "link").symlink_to(tmp_path / "src")
+    found = find_packages([tmp_path])
+    assert found.packages() == {"one_msgs"}
+    assert Interfaces([found]).names("msg") == ("one_msgs/msg/A",)
+    assert Interfaces([found]).names("srv") == ("one_msgs/srv/B",)
+    assert Interfaces([found]).names("action") == ("one_msgs/action/C",)
+    assert find_packages([tmp_path / "missing"]).packages() == frozenset()
+
+
+def test_the_projects_own_interfaces_are_found() -> None:
+    interfaces = Interfaces([find_packages([Path(__file__).parents[3] / "interfaces"])])
+    assert interfaces.packages() == {"composer_interfaces"}
+    found = interfaces.find("composer_interfaces/srv/PlanTrajectory")
+    assert found == BUNDLED.find("composer_interfaces/srv/PlanTrajectory")
+
+
+def test_a_definition_that_cannot_be_read_says_why(tmp_path: Path) -> None:
+    folder = package(tmp_path, "demo_msgs", msg_Bad="bool ok\nbool Not\n", msg_Good="bool ok")
+    interfaces = Interfaces([find_packages([tmp_path])])
+    assert interfaces.find("demo_msgs/msg/Bad") is None
+    problem = interfaces.problem("demo_msgs/msg/Bad")
+    assert problem is not None
+    assert (problem.path, problem.line) == (str(folder / "msg" / "Bad.msg"), 2)
+    assert problem.message.startswith("'Not' is not a field name")
+    assert interfaces.problem("demo_msgs/msg/Good") is None
+
+
+@pytest.mark.parametrize("content", [b"bool \xff", b"#" * 1_000_001])
+def test_a_file_that_is_no_definition_is_not_read(tmp_path: Path, content: bytes) -> None:
+    folder = package(tmp_path, "demo_msgs", msg_A="bool ok")
+    (folder / "msg" / "A.msg").write_bytes(content)
+    assert Interfaces([find_packages([tmp_path])]).find("demo_msgs/msg/A") is None
+
+
+def test_only_what_is_asked_for_is_read(tmp_path: Path) -> None:
+    installed = prefix(tmp_path, "demo_msgs", msg_A="bool a", msg_B="bool b")
+    interfaces = Interfaces([installed])
+    (tmp_path / "share" / "demo_msgs" / "msg" / "B.msg").write_text("nonsense")
+    assert interfaces.find("demo_msgs/msg/A") is not None
+    (tmp_path / "share" / "demo_msgs" / "msg" / "A.msg").write_text("nonsense")
+    assert interfaces.problem("demo_msgs/msg/A") is None  # read once
+    assert interfaces.problem("demo_msgs/msg/B") is not None
+
+
+def test_prefixes_come_from_the_environment_then_from_python(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "/opt/overlay::/opt/ros/jazzy")
+    roots = [prefix.root for prefix in installed_prefixes()]
+    assert roots == [Path("/opt/overlay"), Path("/opt/ros/jazzy"), Path(sys.prefix)]
+
+
+def description(type_name: str, fields: list[dict[str, object]]) -> dict[str, object]:
+    return {"type_name": type_name, "fields": fields}
+
+
+def described_field(name: str, type_id: int, **more: object) -> dict[str, object]:
+    described = {"type_id": type_id, "capacity": 0, "string_capacity": 0, "nested_type_name": ""}
+    return {"name": name, "type": described | more, "default_value": ""}
+
+
+def test_a_package_without_msg_text_is_read_from_its_type_description(tmp_path: Path) -> None:
+    installed = prefix(tmp_path, "idl_msgs", msg_Other="bool a")
+    fields = [
+        described_field("plain", 11),
+        described_field("fixed", 59, capacity=3),
+        described_field("bounded", 97, capacity=2, nested_type_name="idl_msgs/msg/Other"),
+        described_field("texts", 165, string_capacity=8),
+        described_field("data", 147),
+    ]
+    fields[0]["default_value"] = "1.5"
+    content = {
+        "type_description_msg": {
+            "type_description": description("idl_msgs/msg/Demo", fields),
+            "referenced_type_descriptions": [],
+        }
+    }
+    (tmp_path / "share" / "idl_msgs" / "msg" / "Demo.json").write_text(json.dumps(content))
+    interfaces = Interfaces([installed])
+    assert interfaces.names("msg") == ("idl_msgs/msg/Demo", "idl_msgs/msg/Other")
+    message = interfaces.message("idl_msgs/msg/Demo")
+    assert message is not None
+    assert [(field.name, str(field.type)) for field in message.fields] == [
+        ("plain", "float64"),
+        ("fixed", "float64[3]"),
+        ("bounded", "idl_msgs/msg/Other[<=2]"),
+        ("texts", "string<=8[]"),
+        ("data", "uint8[]"),
+    ]
+    assert message.fields[0].default == 1.5
+    assert message.fields[1].type.element == FieldType("float64")
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"type_description_msg": 3}', "[" * 100_000])
+def test_other_json_is_no_type_description(text: str) -> None:
+    with pytest.raises(ValueError, match=r"."):
+        read_description("a_msgs/msg/A", text)

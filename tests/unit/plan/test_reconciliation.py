@@ -1,0 +1,205 @@
+"""What is done about a failed node, by tables: no ROS, no clock, no thread."""
+
+from __future__ import annotations
+
+import pytest
+
+from composer.model import OnFailure, PrimaryState, System
+from composer.plan import Decision, DesiredState, Fault, FaultKind, judge, mend, wanted
+from tests.unit.support.resolving import system_of
+
+ACTIVE = PrimaryState.ACTIVE
+LETTERS = {"u": PrimaryState.UNCONFIGURED, "i": PrimaryState.INACTIVE, "a": ACTIVE}
+NAMES = ("sensor", "planner", "motor", "logger", "camera")
+
+
+def robot(lifecycle: str = "{on_failure: restart}") -> System:
+    return system_of(
+        f"""
+        system: robot
+        lifecycle: {lifecycle}
+        nodes:
+          logger: {{lifecycle: {{depends_on: {{planner: inactive}}}}}}
+          motor: {{lifecycle: {{depends_on: [planner]}}}}
+          planner: {{lifecycle: {{depends_on: [sensor]}}}}
+          sensor: {{}}
+          camera: {{}}
+        """
+    )
+
+
+def states(letters: str) -> dict[str, PrimaryState]:
+    return {name: LETTERS[letter] for name, letter in zip(NAMES, letters, strict=True)}
+
+
+def fault(node: str, at_s: float = 100.0, kind: FaultKind = FaultKind.SILENCE) -> Fault:
+    return Fault(node, kind, "silent for 300 ms", at_s)
+
+
+@pytest.mark.parametrize(
+    ("down", "goals"),
+    [
+        ((), "aaaaa"),
+        (("sensor",), "uiiaa"),  # the logger can do with an inactive planner
+        (("planner",), "auiia"),
+        (("motor",), "aauaa"),
+        (("camera",), "aaaau"),
+        (("sensor", "camera"), "uiiau"),
+        (("planner", "sensor"), "uuiia"),
+    ],
+)
+def test_where_nodes_are_wanted_while_some_are_held_down(down: tuple[str, ...], goals: str) -> None:
+    upkeep = DesiredState(states("aaaaa"), dict.fromkeys(down, "silent"))
+    assert wanted(robot(), upkeep) == states(goals)
+
+
+def test_nobody_is_wanted_further_up_because_another_one_fails() -> None:
+    upkeep = DesiredState(states("aiuii"), {"sensor": "silent"})
+    assert wanted(robot(), upkeep) == states("uiuii")
+
+
+DOWN = [
+    "#1 deactivate /motor: it needs sensor, which is down",
+    "#2 deactivate /planner after #1: it needs sensor, which is down",
+    "#3 deactivate /sensor after #2: silent for 300 ms",
+    "#4 cleanup /sensor: silent for 300 ms",
+]
+UP = [
+    "#1 configure /sensor: restart 1 of 5",
+    "#2 activate /sensor: restart 1 of 5",
+    "#3 activate /planner after #2: restart 1 of 5",
+    "#4 activate /motor after #3: restart 1 of 5",
+]
+
+
+def test_dependents_pause_before_a_restart_and_resume_behind_it() -> None:
+    system = robot()
+    upkeep = DesiredState(states("aaaaa"))
+    verdict = judge(system, upkeep, fault("sensor"))
+    assert verdict == Decision(OnFailure.RESTART, "silent for 300 ms", wait_s=0.5, attempt=1)
+
+    upkeep = upkeep.fail(fault("sensor"))
+    assert str(mend(system, upkeep, states("aaaaa"), "")).splitlines() == DOWN
+
+    upkeep = upkeep.restart("sensor", at_s=100.5)
+    assert upkeep.down == {}
+    assert upkeep.restarts == {"sensor": (100.5,)}
+    assert str(mend(system, upkeep, states("uiiaa"), "restart 1 of 5")).splitlines() == UP
+
+
+def test_what_somebody_has_paused_by_hand_stays_paused() -> None:
+    system = robot()
+    upkeep = (
+        DesiredState(states("aaaaa")).want({"motor": PrimaryState.INACTIVE}).fail(fault("sensor"))
+    )
+    down = mend(system, upkeep, states("aaiaa"), "")
+    assert [step.node for step in down.steps] == ["planner", "sensor", "sensor"]
+    up = mend(system, upkeep.restart("sensor", 100.5), states("uiiaa"), "restart")
+    assert [step.node for step in up.steps] == ["sensor", "sensor", "planner"]
+
+
+def test_nobody_is_sent_up_before_what_somebody_keeps_low_by_hand() -> None:
+    system = robot()
+    upkeep = DesiredState(states("aiaaa"))
+    assert mend(system, upkeep, states("aiaaa"), "").steps == (), "nor is anybody taken down"
+    plan = mend(system, upkeep, states("aiuua"), "")
+    assert [f"{step.transition} {step.node}" for step in plan.steps] == [
+        "configure logger",
+        "configure motor",
+        "activate logger",
+    ]
+
+
+def test_a_second_fault_of_a_node_that_is_held_down_is_none() -> None:
+    upkeep = DesiredState(states("aaaaa")).fail(fault("sensor"))
+    assert judge(robot(), upkeep, fault("sensor")) is None
+    assert judge(robot(), upkeep, fault("camera")) is not None
+    assert judge(robot(), upkeep, fault("nobody")) is None
+
+
+def test_two_nodes_that_fail_one_after_the_other_come_back_one_after_the_other() -> None:
+    system = robot()
+    upkeep = DesiredState(states("aaaaa")).fail(fault("sensor")).fail(fault("planner"))
+    down = mend(system, upkeep, states("aaaaa"), "")
+    assert [f"{step.transition} {step.node}" for step in down.steps] == [
+        "deactivate motor",
+        "deactivate logger",
+        "deactivate planner",
+        "deactivate sensor",
+        "cleanup planner",
+        "cleanup sensor",
+    ]
+    upkeep = upkeep.restart("planner", 101.0)
+    up = mend(system, upkeep, states("uuiia"), "restart")
+    assert [f"{step.transition} {step.node}" for step in up.steps] == [
+        "configure planner",
+        "activate logger",
+    ]
+    upkeep = upkeep.restart("sensor", 102.0)
+    up = mend(system, upkeep, states("uiiaa"), "restart")
+    assert [f"{step.transition} {step.node}" for step in up.steps][:2] == [
+        "configure sensor",
+        "activate sensor",
+    ]
+
+
+BUDGET = "{on_failure: restart, restart: {max_attempts: 3, window_ms: 10000, backoff_ms: 100}}"
+
+
+@pytest.mark.parametrize(
+    ("restarts", "action", "wait_s", "attempt"),
+    [
+        ((), OnFailure.RESTART, 0.1, 1),
+        ((95.0,), OnFailure.RESTART, 0.2, 2),
+        ((95.0, 96.0), OnFailure.RESTART, 0.4, 3),
+        ((95.0, 96.0, 97.0), OnFailure.SHUTDOWN, 0.0, 0),
+        ((80.0, 85.0, 89.9), OnFailure.RESTART, 0.1, 1),  # forgotten
+        ((80.0, 96.0, 97.0), OnFailure.RESTART, 0.4, 3),
+    ],
+)
+def test_the_budget(
+    restarts: tuple[float, ...], action: OnFailure, wait_s: float, attempt: int
+) -> None:
+    upkeep = DesiredState(states("aaaaa"), restarts={"sensor": restarts})
+    verdict = judge(robot(BUDGET), upkeep, fault("sensor"))
+    assert verdict is not None
+    assert (verdict.action, verdict.wait_s, verdict.attempt) == (action, wait_s, attempt)
+    if action is OnFailure.SHUTDOWN:
+        assert verdict.reason == "silent for 300 ms; restarted 3 times within 10 s before"
+
+
+@pytest.mark.parametrize(
+    ("policy", "kind", "action", "reason"),
+    [
+        ("isolate", FaultKind.SILENCE, OnFailure.ISOLATE, "silent for 300 ms"),
+        ("isolate", FaultKind.LOST, OnFailure.ISOLATE, "silent for 300 ms"),
+        ("shutdown", FaultKind.TRANSITION, OnFailure.SHUTDOWN, "silent for 300 ms"),
+        ("restart", FaultKind.CALLBACK, OnFailure.RESTART, "silent for 300 ms"),
+        ("restart", FaultKind.ERRORS, OnFailure.RESTART, "silent for 300 ms"),
+        ("restart", FaultKind.LOST, OnFailure.SHUTDOWN,
+         "silent for 300 ms; it cannot be restarted"),
+    ],
+)  # fmt: skip
+def test_policies(policy: str, kind: FaultKind, action: OnFailure, reason: str) -> None:
+    system = robot(f"{{on_failure: {policy}}}")
+    verdict = judge(system, DesiredState(states("aaaaa")), fault("sensor", kind=kind))
+    assert verdict is not None
+    assert (verdict.action, verdict.reason) == (action, reason)
+
+
+def test_an_isolated_node_stays_down_and_the_others_go_on() -> None:
+    system = robot("{on_failure: isolate}")
+    upkeep = DesiredState(states("aaaaa")).fail(fault("planner"))
+    plan = mend(system, upkeep, states("auaaa"), "")
+    assert str(plan).splitlines() == [
+        "#1 deactivate /motor: it needs planner, which is down",
+        "#2 deactivate /logger: it needs planner, which is down",
+    ]
+    assert mend(system, upkeep, states("auiia"), "").steps == ()
+    released = upkeep.release("planner")
+    assert [step.node for step in mend(system, released, states("auiia"), "by hand").steps] == [
+        "planner",
+        "planner",
+        "logger",
+        "motor",
+    ]

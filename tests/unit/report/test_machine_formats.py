@@ -1,0 +1,178 @@
+"""The reports for programs: JSON by its schema, SARIF by its specification, GitHub's commands."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from jsonschema import Draft7Validator
+
+from composer.diagnostics import Diagnostic, Label, Severity
+from composer.report import github, sarif
+from composer.report import json as json_report
+from composer.report.fingerprint import fingerprints
+from composer.resources import schemas_folder
+from composer.source import SourceFile, Span
+from tests.unit.support.reporting import finding, rule
+
+TEXT = "system: demo\nnodes: {talker: {type: relai}}\n"
+
+
+def example() -> list[Diagnostic]:
+    first = finding(TEXT, "relai", "there is no 'relai'", line=2, hint="did you mean 'relay'?")
+    label = Label(first.primary.part(0, 2), "this one")
+    second = replace(first, rule=rule(Severity.INFO, "RC998", "hint"), related=(label,), hint=None)
+    return [first, replace(first, message="again"), second]
+
+
+def test_json_is_what_its_schema_says() -> None:
+    schema = json.loads((schemas_folder() / "report.schema.json").read_text(encoding="utf-8"))
+    Draft7Validator.check_schema(schema)
+    for findings in ([], example()):
+        report = json.loads(json_report.render(findings))
+        assert list(Draft7Validator(schema).iter_errors(report)) == []
+
+
+def test_json_says_all_there_is_to_say() -> None:
+    report = json.loads(json_report.render(example()))
+    assert report["summary"] == {"errors": 2, "warnings": 0, "infos": 1}
+    assert report["findings"][0] == {
+        "code": "RC999",
+        "rule": "made-up",
+        "severity": "error",
+        "message": "there is no 'relai'",
+        "hint": "did you mean 'relay'?",
+        "location": {"file": "systems/demo.yaml", "line": 2, "column": 24, "end_column": 29},
+        "related": [],
+        "fingerprint": fingerprints(example())[0],
+    }
+    assert [label["message"] for label in report["findings"][2]["related"]] == ["this one"]
+
+
+#: The properties that SARIF 2.1.0 knows for the objects that are used: OASIS, section 3.
+SARIF_PROPERTIES = {
+    "log": {"$schema", "version", "runs"},  # 3.13
+    "run": {"tool", "results", "columnKind"},  # 3.14
+    "driver": {"name", "version", "rules"},  # 3.19
+    "rule": {
+        "id",
+        "name",
+        "shortDescription",
+        "fullDescription",
+        "help",
+        "defaultConfiguration",
+    },  # 3.49
+    "result": {
+        "ruleId",
+        "ruleIndex",
+        "level",
+        "message",
+        "locations",
+        "partialFingerprints",
+        "relatedLocations",
+    },  # 3.27
+}
+
+
+def sarif_log(findings: list[Diagnostic]) -> dict[str, Any]:
+    log: dict[str, Any] = json.loads(sarif.render(findings))
+    return log
+
+
+def test_sarif_has_the_shape_of_the_specification() -> None:
+    log = sarif_log(example())
+    assert log.keys() == SARIF_PROPERTIES["log"]
+    assert log["version"] == "2.1.0"
+    [run] = log["runs"]
+    assert run.keys() == SARIF_PROPERTIES["run"]
+    assert run["columnKind"] == "unicodeCodePoints"
+    driver = run["tool"]["driver"]
+    assert driver.keys() == SARIF_PROPERTIES["driver"]
+    for described in driver["rules"]:
+        assert described.keys() == SARIF_PROPERTIES["rule"]
+        assert described["defaultConfiguration"]["level"] in {"error", "warning", "note"}
+    for result in run["results"]:
+        assert result.keys() <= SARIF_PROPERTIES["result"]
+        assert driver["rules"][result["ruleIndex"]]["id"] == result["ruleId"]
+        for location in (*result["locations"], *result.get("relatedLocations", ())):
+            region = location["physicalLocation"]["region"]
+            assert 1 <= region["startColumn"] < region["endColumn"]
+
+
+def test_sarif_tells_the_levels_and_the_hint() -> None:
+    results = sarif_log(example())["runs"][0]["results"]
+    assert [result["level"] for result in results] == ["error", "error", "note"]
+    assert results[0]["message"]["text"] == "there is no 'relai'\ndid you mean 'relay'?"
+
+
+@pytest.mark.parametrize(
+    ("path", "uri"),
+    [
+        ("systems/demo.yaml", "systems/demo.yaml"),
+        ("./demo.yaml", "demo.yaml"),
+        ("my robot/naïve%.yaml", "my%20robot/na%C3%AFve%25.yaml"),
+        ("/robots/demo.yaml", "file:///robots/demo.yaml"),
+        ("caf\udce9.yaml", "caf%E9.yaml"),
+    ],
+)
+def test_sarif_paths_are_uri_references(path: str, uri: str) -> None:
+    [result] = sarif_log([finding(TEXT, "demo", path=path)])["runs"][0]["results"]
+    assert result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] == uri
+
+
+def moved(found: Diagnostic, lines_added: int, indentation: int) -> Diagnostic:
+    span = found.primary
+    text = "\n" * lines_added + "\n".join(
+        f"{' ' * indentation}{line}" for line in span.file.text.split("\n")
+    )
+    place = Span(
+        SourceFile(span.file.path, text),
+        span.line + lines_added,
+        span.column + indentation,
+        span.length,
+    )
+    return replace(found, primary=place)
+
+
+def test_fingerprints_survive_lines_added_above_and_deeper_indentation() -> None:
+    before = example()
+    after = [moved(found, lines_added=7, indentation=4) for found in before]
+    assert fingerprints(before) == fingerprints(after)
+
+
+def test_fingerprints_tell_findings_apart() -> None:
+    same = finding(TEXT, "relai", line=2)
+    others = [
+        replace(same, message="another"),
+        replace(same, rule=rule(code="RC998")),
+        finding(TEXT.replace("relai", "rely"), "rely", line=2),
+        finding(TEXT, "relai", line=2, path="another.yaml"),
+    ]
+    prints = fingerprints([same, same, *others])
+    assert len(set(prints)) == len(prints)
+
+
+def test_github_commands_name_the_place_and_end_with_the_message() -> None:
+    [line] = github.render(example()[:1]).splitlines()
+    assert line == (
+        "::error file=systems/demo.yaml,line=2,endLine=2,col=24,endColumn=29,"
+        "title=RC999 made-up::there is no 'relai'%0Ahint: did you mean 'relay'?"
+    )
+
+
+def test_github_commands_cannot_be_broken_out_of() -> None:
+    found = finding(
+        TEXT, "demo", "100%\n::error::gotcha\r", path="a,line=1::b%.yaml", hint="x\x1b[2J"
+    )
+    [line] = github.render([found]).splitlines()
+    assert "file=a%2Cline=1%3A%3Ab%25.yaml,line=1" in line
+    assert "100%25\\x0a::error::gotcha\\x0d" in line
+    assert "\x1b" not in line
+
+
+def test_github_commands_follow_the_severity() -> None:
+    made_by = [rule(severity) for severity in Severity]
+    lines = github.render(finding("a", "a", made_by=item) for item in made_by).splitlines()
+    assert [line.split()[0] for line in lines] == ["::error", "::warning", "::notice"]

@@ -1,0 +1,50 @@
+"""The page of rules is current, and every rule tells what it should."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.diagnostics import Rule
+from composer.report.rule_page import BANDS, all_rules, explain, find_rule, page
+from composer.report.samples import files_of
+
+PAGE = Path(__file__).parents[3] / "docs" / "rules.md"
+
+
+def test_the_page_is_current() -> None:
+    current = PAGE.read_text(encoding="utf-8")
+    assert current == page(all_rules()), "run: python tools/write_rules.py"
+
+
+@pytest.mark.parametrize("rule", all_rules(), ids=lambda rule: rule.code)
+def test_a_rule_tells_what_and_why_and_how(rule: Rule) -> None:
+    assert rule.code[:2] == "RC"
+    assert rule.code[2] in BANDS
+    assert rule.name == rule.name.lower().replace("_", "-")
+    for text in (rule.summary, rule.why):
+        assert text.endswith(".")
+    assert rule.bad != rule.good
+
+
+def test_a_rule_is_found_by_code_and_by_name() -> None:
+    rules = all_rules()
+    by_code, by_name = find_rule("rc202", rules), find_rule("unknown-node", rules)
+    assert by_code is by_name is not None
+    assert find_rule("nonsense", rules) is None
+
+
+def test_an_explanation_has_everything() -> None:
+    rule = find_rule("RC202", all_rules())
+    assert rule is not None
+    text = explain(rule)
+    for part in (rule.code, rule.name, rule.summary, rule.why, "depends_on: [planer]"):
+        assert part in text
+
+
+def test_examples_are_split_into_their_files() -> None:
+    files = files_of("# file: system.yaml\nsystem: a\n# file: nodes/b.py\nclass B:\n    pass\n")
+    assert files == {"system.yaml": "system: a\n", "nodes/b.py": "class B:\n    pass\n"}
+    assert files_of("node: planner\n") == {"planner.yaml": "node: planner\n"}
+    assert files_of("compose run x") == {}

@@ -1,0 +1,68 @@
+"""SARIF held against the schema of OASIS, as the package pydantic-sarif has it.
+
+That package is made by a program from ``sarif-schema-2.1.0.json``: properties that must be there,
+none that the schema does not have, types, enumerations, least values. What no schema can say -
+URIs, indexes into arrays - is in test_report_programs.py.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from composer.loading import load
+from composer.report import sarif
+
+model = pytest.importorskip("pydantic_sarif.model")
+ValidationError = pytest.importorskip("pydantic").ValidationError
+
+ROOT = Path(__file__).parents[3]
+EXAMPLES = sorted((ROOT / "tests" / "golden" / "err").glob("*.yaml"))
+
+
+def check(log: Any) -> None:
+    model.StaticAnalysisResultsFormatSarifVersion210JsonSchema.model_validate_json(json.dumps(log))
+
+
+def log_of(path: Path) -> Any:
+    found = load(path, shown=str(path.relative_to(ROOT))).diagnostics
+    return json.loads(sarif.render(found))
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_findings(path: Path) -> None:
+    log = log_of(path)
+    assert log["runs"][0]["results"]
+    check(log)
+
+
+def test_no_findings() -> None:
+    check(json.loads(sarif.render([])))
+
+
+def _in_result(change: Callable[[Any], None]) -> Any:
+    log = copy.deepcopy(log_of(ROOT / "tests/golden/err/ten_mistakes.yaml"))
+    change(log["runs"][0]["results"][0])
+    return log
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda result: result.pop("message"),
+        lambda result: result.update(level="fatal"),
+        lambda result: result.update(rule="RC202"),
+        lambda result: result.update(ruleIndex=-2),
+        lambda result: result["locations"][0]["physicalLocation"]["region"].update(startLine=0),
+        lambda result: result["locations"][0].update(file="a.yaml"),
+    ],
+    ids=["no message", "a level", "a property", "an index", "a line", "a place"],
+)
+def test_it_refuses_what_is_wrong(change: Callable[[Any], None]) -> None:
+    with pytest.raises(ValidationError):
+        check(_in_result(change))

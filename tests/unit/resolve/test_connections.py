@@ -1,0 +1,171 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from composer.model import ChannelKind, Delivery, Isolation, System
+from tests.unit.support.resolving import quoted, system_of
+
+NODES = """\
+    system: robot
+    namespace: robot1
+    qos_profiles: {odometry: {extends: sensor_data, depth: 1}}
+    nodes:
+      a:
+        namespace: left
+        publishers: {out: {type: x/msg/X, qos: state}, spare: {type: x/msg/X}}
+        services: {ask: {type: x/srv/X}}
+        remappings: {out: /remapped, spare: other}
+      b:
+        subscriptions: {in: {type: x/msg/X}}
+        clients: {ask: {type: x/srv/X}}
+"""
+
+
+def full_names(system: System) -> dict[str, str]:
+    return {
+        f"{node.name.value}.{port.name.value}": port.full_name
+        for node in system.nodes
+        for port in node.ports
+    }
+
+
+def test_without_connections_names_are_expanded_and_remapped() -> None:
+    assert full_names(system_of(NODES)) == {
+        "a.out": "/remapped",
+        "a.spare": "/robot1/left/other",
+        "a.ask": "/robot1/left/ask",
+        "b.in": "/robot1/in",
+        "b.ask": "/robot1/ask",
+    }
+
+
+def test_a_remapping_matches_by_the_expanded_name() -> None:
+    system = system_of("""\
+        system: robot
+        nodes:
+          a:
+            namespace: left
+            publishers: {x: {type: x/msg/X, topic: /left/y}, z: {type: x/msg/X, topic: ~/z}}
+            remappings: {y: w, /left/a/z: ~/v, never: mind}
+        """)
+    assert full_names(system) == {"a.x": "/left/w", "a.z": "/left/a/v"}
+    first = system.nodes[0].remappings[0]
+    assert (quoted(first.source.span), quoted(first.target.span)) == ("y", "w")
+
+
+def test_a_connection_names_its_ports() -> None:
+    system = system_of(
+        NODES
+        + """\
+    connections:
+      - {topic: data, from: a.out, to: [b.in], qos: odometry}
+      - {service: /ask, server: a.ask, clients: b.ask}
+    """
+    )
+    names = full_names(system)
+    assert (names["a.out"], names["b.in"]) == ("/robot1/data", "/robot1/data")
+    assert (names["a.ask"], names["b.ask"]) == ("/ask", "/ask")
+    data, ask = system.connections
+    assert (data.kind, str(data.name), str(data.qos)) == (ChannelKind.TOPIC, "data", "odometry")
+    assert [(end.node, end.port) for end in (*ask.sources, *ask.sinks)] == [
+        ("a", "ask"),
+        ("b", "ask"),
+    ]
+    assert quoted(data.sinks[0].text.span) == "b.in"
+    port = system.port(data.sources[0])
+    assert port is not None
+    assert port.full_name == "/robot1/data"
+
+
+def test_a_connections_profile_wins_over_the_ports() -> None:
+    system = system_of(
+        NODES + "    connections:\n      - {topic: data, from: a.out, to: b.in, qos: odometry}\n"
+    )
+    for node, port in (("a", "out"), ("b", "in")):
+        found = system.node(node)
+        assert found is not None
+        end = found.port(port)
+        assert end is not None
+        assert (end.qos.profile.depth, end.qos.explicit) == (1, True)
+        assert quoted(end.qos.span) == "odometry"
+        assert quoted(end.qos.policy_span("depth")) == "1"
+    assert [reference.name.value for reference in system.qos_references].count("odometry") == 1
+
+
+def test_a_connection_may_write_its_profile_out() -> None:
+    system = system_of(
+        NODES + "    connections:\n      - {topic: data, from: a.out, to: b.in, qos: {depth: 2}}\n"
+    )
+    assert system.nodes[0].ports[0].qos.profile.depth == 2
+    assert system.connections[0].qos is None
+
+
+def test_what_a_connection_names_and_nobody_has_stays_as_written() -> None:
+    system = system_of(
+        NODES + "    connections:\n      - {topic: data, from: nobody.out, to: [b.no, b, '']}\n"
+    )
+    (data,) = system.connections
+    assert [str(end.text) for end in data.sinks] == ["b.no", "b", ""]
+    assert [(end.node, end.port) for end in data.sinks] == [("b", "no"), ("", "b"), ("", "")]
+    assert all(system.port(end) is None for end in (*data.sources, *data.sinks))
+
+
+def test_a_port_of_another_kind_of_channel_keeps_its_name() -> None:
+    system = system_of(NODES + "    connections:\n      - {topic: data, from: a.ask, to: b.in}\n")
+    assert full_names(system)["a.ask"] == "/robot1/left/ask"
+
+
+def test_of_two_connections_of_a_port_the_first_counts() -> None:
+    system = system_of(
+        NODES
+        + """\
+    connections:
+      - {topic: one, from: a.out}
+      - {topic: two, from: a.out, qos: state}
+      - {topic: one, from: a.out, to: b.in, qos: odometry}
+    """
+    )
+    assert full_names(system)["a.out"] == "/robot1/one"
+    out = system.nodes[0].port("out")
+    assert out is not None
+    assert out.qos.profile.depth == 1
+
+
+def test_ports_of_types_are_joined_as_those_of_inline_nodes(tmp_path: Path) -> None:
+    (tmp_path / "relay.yaml").write_text(
+        "node: relay\nsubscriptions: {in: {type: x/msg/X}}\npublishers: {out: {type: x/msg/X}}\n"
+    )
+    system = system_of(
+        """\
+        system: robot
+        nodes: {one: {type: relay}, two: {type: relay, namespace: far}}
+        connections:
+          - {topic: /between, from: one.out, to: two.in}
+        """,
+        tmp_path,
+    )
+    assert full_names(system) == {
+        "one.out": "/between",
+        "one.in": "/in",
+        "two.out": "/far/out",
+        "two.in": "/between",
+    }
+
+
+def test_a_connection_says_how_its_ports_are_joined_and_others_follow_the_system() -> None:
+    text = """
+    system: ways
+    delivery: dds
+    nodes:
+      talker: {publishers: {a: {type: std_msgs/msg/String}, b: {type: std_msgs/msg/String}}}
+      listener: {subscriptions: {a: {type: std_msgs/msg/String}}}
+    connections:
+      - {topic: /a, from: talker.a, to: listener.a, delivery: auto, isolation: copy}
+    """
+    system = system_of(text)
+    assert system.delivery is Delivery.DDS
+    joined = [system.node("talker").port("a"), system.node("listener").port("a")]
+    assert [port.delivery for port in joined] == [Delivery.AUTO, Delivery.AUTO]
+    assert [port.isolation for port in joined] == [Isolation.COPY, Isolation.COPY]
+    free = system.node("talker").port("b")
+    assert (free.delivery, free.isolation) == (None, Isolation.SHARE)

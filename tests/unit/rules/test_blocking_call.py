@@ -1,0 +1,70 @@
+"""Which calls in a handler count as blocking."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.unit.support.checking import findings_in
+
+SYSTEM = "system: demo\nnodes:\n  a: {behavior: code:Code, timers: {tick: {period_ms: 1000}}}\n"
+
+BLOCKING = {
+    "time.sleep(1.0)": "import time",
+    "sleep(1.0)": "from time import sleep",
+    "t.sleep(1.0)": "import time as t",
+    "input()": "",
+    "os.system('true')": "import os",
+    "run(['true'])": "from subprocess import run",
+    "subprocess.check_output(['true'])": "import subprocess",
+    "requests.get('http://robot')": "import requests",
+    "urlopen('http://robot')": "from urllib.request import urlopen",
+    "self.socket.recv(1024)": "",
+    "rclpy.spin_until_future_complete(self.node, future)": "import rclpy",
+    "self.executor.spin_until_future_complete(future)": "",
+    "self.plan_client.call(request)": "",
+    "self.helper()": "import time",
+    "[time.sleep(n) for n in (1, 2)]": "import time",
+}
+FINE = {
+    "self.clock.sleep(1.0)": "",
+    "self.clients.plan.call(request)": "",
+    "later(lambda: time.sleep(1.0))": "import time",
+    "self.queue.get_nowait()": "",
+    "self.input()": "",
+    "time.monotonic()": "import time",
+    "await asyncio.sleep(1.0)": "import asyncio",
+}
+
+
+def messages(statement: str, imports: str, folder: Path) -> list[str]:
+    kind = "async def" if "await" in statement else "def"
+    source = (
+        f"{imports}\n\n\nclass Code:\n    {kind} on_tick(self):\n        {statement}\n\n"
+        "    def helper(self):\n        time.sleep(1.0)\n\n    def unused(self):\n        input()\n"
+    )
+    (folder / "code.py").write_text(source, encoding="utf-8")
+    return [item.message for item in findings_in(SYSTEM, folder)]
+
+
+@pytest.mark.parametrize(("statement", "imports"), BLOCKING.items())
+def test_calls_that_wait_are_told(statement: str, imports: str, tmp_path: Path) -> None:
+    [message] = messages(statement, imports, tmp_path)
+    assert message.startswith("handler 'on_tick' of 'Code' blocks in '")
+
+
+@pytest.mark.parametrize(("statement", "imports"), FINE.items())
+def test_calls_that_do_not_wait_are_not(statement: str, imports: str, tmp_path: Path) -> None:
+    assert messages(statement, imports, tmp_path) == []
+
+
+def test_a_line_that_two_handlers_lead_to_is_told_once(tmp_path: Path) -> None:
+    system = SYSTEM.replace("{period_ms: 1000}}", "{period_ms: 1000}, tock: {period_ms: 1000}}")
+    methods = "".join(
+        f"    def {name}(self):\n        self.ask()\n\n" for name in ("on_tick", "on_tock")
+    )
+    source = f"class Code:\n{methods}    def ask(self):\n        input()\n"
+    (tmp_path / "code.py").write_text(source, encoding="utf-8")
+    [finding] = findings_in(system, tmp_path)
+    assert finding.related[0].span.line == 9

@@ -1,0 +1,116 @@
+"""Comments that silence a rule: what they hold for, and what is told of useless ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.rules.ignores import ignores_in
+from composer.source import SourceFile
+from tests.unit.support.checking import findings_in, quoted, rules_broken
+
+SYSTEM = """\
+system: demo
+nodes:
+  talker:
+    {before}
+    publishers: {{chatter: {{type: std_msgs/msg/String, qos: command}}}}{behind}
+"""
+
+
+def text(before: str = "# a talker", behind: str = "") -> str:
+    return SYSTEM.format(before=before, behind=behind)
+
+
+@pytest.mark.parametrize(
+    ("before", "behind"),
+    [
+        ("#", "  # compose: ignore[unheard-publisher]"),
+        ("#", " #compose:ignore[RC324]"),
+        ("#", "  # compose: ignore[unheard-publisher] because people listen"),
+        ("# compose: ignore[unheard-publisher]", ""),
+        ("# compose: ignore[unheard-publisher]\n    # and why\n", ""),
+    ],
+)
+def test_a_comment_silences_its_line(before: str, behind: str, tmp_path: Path) -> None:
+    assert rules_broken(text(), tmp_path) == ["unheard-publisher"]
+    assert rules_broken(text(before, behind), tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "behind",
+    [
+        "  # compose: ignore",
+        "  # compose: ignore[]",
+        "  # composed: ignore[unheard-publisher]",
+    ],
+)
+def test_other_comments_silence_nothing(behind: str, tmp_path: Path) -> None:
+    assert rules_broken(text(behind=behind), tmp_path) == ["unheard-publisher"]
+
+
+@pytest.mark.parametrize("line", ["log: a# compose: ignore[x]", 'log: "a # compose: ignore[x]"'])
+def test_what_is_no_comment_silences_nothing(line: str) -> None:
+    assert list(ignores_in(SourceFile("a.yaml", line))) == []
+
+
+def test_every_rule_of_a_comment_that_silences_nothing_is_told(tmp_path: Path) -> None:
+    behind = "  # compose: ignore[RC324, unfed-subscription, unherd-publisher]"
+    found = findings_in(text(behind=behind), tmp_path)
+    assert [(item.rule.name, quoted(item)) for item in found] == [
+        ("unused-ignore", "unfed-subscription"),
+        ("unused-ignore", "unherd-publisher"),
+    ]
+    assert found[1].hint == "did you mean 'unheard-publisher'?"
+
+
+def test_a_comment_at_a_related_place_silences_too(tmp_path: Path) -> None:
+    nodes = (
+        "system: demo\nnodes:\n"
+        "  planner: {lifecycle: {autostart: inactive}}  # MARK\n"
+        "  motor_controller: {lifecycle: {depends_on: [planner]}}\n"
+    )
+    assert rules_broken(nodes, tmp_path) == ["dependency-not-reached"]
+    silenced = nodes.replace("MARK", "compose: ignore[dependency-not-reached] moved by hand")
+    assert rules_broken(silenced, tmp_path) == []
+
+
+def test_no_comment_silences_an_error(tmp_path: Path) -> None:
+    text = (
+        "system: demo\nnodes:\n"
+        "  lidar:\n"
+        "    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data}}  # MARK\n"
+        "  mapper:\n"
+        "    subscriptions: {scan: {type: std_msgs/msg/String, qos: command}}\n"
+    )
+    assert rules_broken(text, tmp_path) == ["qos-incompatible"]
+    commented = text.replace("MARK", "compose: ignore[qos-incompatible] on purpose")
+    found = findings_in(commented, tmp_path)
+    assert [item.rule.name for item in found] == ["unused-ignore", "qos-incompatible"]
+    assert found[0].message == "'qos-incompatible' finds an error here, which no comment silences"
+
+
+def test_a_comment_in_a_python_file_silences_what_is_found_there(tmp_path: Path) -> None:
+    source = (
+        "import time\n\n\nclass Slow:\n    def on_tick(self):\n        time.sleep(1.0)  # MARK\n"
+    )
+    system = "system: demo\nnodes:\n  a: {behavior: slow:Slow, timers: {tick: {period_ms: 1000}}}\n"
+    (tmp_path / "slow.py").write_text(source, encoding="utf-8")
+    assert rules_broken(system, tmp_path) == ["blocking-call"]
+    silenced = source.replace("MARK", "compose: ignore[blocking-call]").replace("Slow", "Other")
+    (tmp_path / "other.py").write_text(silenced, encoding="utf-8")
+    assert rules_broken(system.replace("slow:Slow", "other:Other"), tmp_path) == []
+
+
+def test_nothing_is_called_unused_where_the_file_could_not_be_read(tmp_path: Path) -> None:
+    broken = "system: demo  # compose: ignore[unheard-publisher]\nnodes: {a: [}\n"
+    assert "unused-ignore" not in rules_broken(broken, tmp_path)
+
+
+def test_places_of_rules_in_a_comment_are_exact() -> None:
+    source = SourceFile("a.yaml", "key: 1  # compose: ignore[one, RC301]")
+    assert [(item.rule, item.line, item.span.column) for item in ignores_in(source)] == [
+        ("one", 1, 27),
+        ("RC301", 1, 32),
+    ]
