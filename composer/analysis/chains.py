@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from composer.analysis.context import Context
-from composer.analysis.periods import period_seconds
 from composer.analysis.publications import causes
 from composer.model import Chain, Node, Port, PortKind, Timer
 from composer.source import Span
@@ -51,7 +50,7 @@ def delays(context: Context, chain: Chain) -> Iterator[Delay]:
 
 def _wait(node: Node, timers: list[Timer]) -> Iterator[Delay]:
     """Yield the wait for whichever timer comes first."""
-    known = [(period_seconds(node, timer), timer) for timer in timers]
+    known = [(node.period_s(timer), timer) for timer in timers]
     periods = [(period_s, timer) for period_s, timer in known if period_s is not None]
     if not periods:
         return

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from composer.analysis.context import Context
-from composer.analysis.periods import period_seconds
 from composer.analysis.publications import Cause, Causes, causes
 from composer.model import ChannelKind, Node, PortKind, PortOfNode
 
@@ -24,8 +23,7 @@ def timed_publishers(context: Context) -> tuple[tuple[PortOfNode, float], ...]:
         for port in node.ports_of(PortKind.PUBLISHER):
             of_port = context.once(causes).get(_key(PortOfNode(node, port)), ())
             periods = [
-                period_seconds(node, cause.timer) if cause.timer is not None else None
-                for cause in of_port
+                node.period_s(cause.timer) if cause.timer is not None else None for cause in of_port
             ]
             known = [period_s for period_s in periods if period_s is not None]
             if known and len(known) == len(periods):
@@ -109,7 +107,7 @@ def _publisher_hz(
 
 def _callback_hz(topics: Mapping[str, float | None], node: Node, cause: Cause) -> float | None:
     if cause.timer is not None:
-        period_s = period_seconds(node, cause.timer)
+        period_s = node.period_s(cause.timer)
         return 1.0 / period_s if period_s is not None else None
     port = cause.port
     if port is None or port.kind is not PortKind.SUBSCRIPTION:

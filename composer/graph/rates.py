@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from composer.behavior_source import Method, find_behavior
-from composer.expressions import EvaluationError, Expression
-from composer.model import Node, Period, PortKind, Timer
+from composer.model import Node, PortKind, Timer
 
 
 def timer_rate_hz(node: Node, timer: Timer) -> float | None:
     """Return the timer's rate with the parameters the node starts with; None if unknown."""
-    value = _number(node, timer.period)
-    if value is None or value <= 0.0:
-        return None
-    return 1.0 / timer.period.seconds(value)
+    period_s = node.period_s(timer)
+    return None if period_s is None else 1.0 / period_s
 
 
 def publishing_rates_hz(node: Node) -> dict[str, float]:
@@ -61,21 +58,3 @@ def _always_publishes(timer: Timer, port: str, handlers: Mapping[str, Method]) -
         )
     handler = handlers.get(f"on_{timer.name.value}")
     return handler is not None and port in handler.publishing.always
-
-
-def _number(node: Node, period: Period) -> float | None:
-    value = period.value
-    if isinstance(value, Expression):
-        try:
-            value = value.evaluate({"parameters": _parameters(node)})
-        except EvaluationError:
-            return None
-    return float(value) if isinstance(value, int | float) else None
-
-
-def _parameters(node: Node) -> dict[str, object]:
-    return {
-        parameter.name.value: parameter.value.value
-        for parameter in node.parameters
-        if parameter.value is not None
-    }

@@ -5,6 +5,7 @@ written; the checks say what is wrong with it.
 """
 
 from composer.model.introspection import DEFAULT_INTROSPECTION, Introspection
+from composer.model.periods import Period, PeriodError, PeriodUnit
 from composer.model.ports import (
     USE_SIM_TIME,
     ChannelKind,
@@ -15,8 +16,6 @@ from composer.model.ports import (
     LogLevel,
     Parameter,
     ParameterType,
-    Period,
-    PeriodUnit,
     Port,
     PortKind,
     Qos,
@@ -79,6 +78,7 @@ __all__ = [
     "Parameter",
     "ParameterType",
     "Period",
+    "PeriodError",
     "PeriodUnit",
     "Port",
     "PortKind",

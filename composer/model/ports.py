@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from composer.expressions import Expression
+from composer.model.periods import Period
 from composer.qos import QosProfile
 from composer.source import Located, Span
 from composer.templates import Template
@@ -177,26 +178,6 @@ class Port:
     def reaction(self, event: Event) -> Reaction | None:
         """Return what is declared for ``event``, or None."""
         return dict(self.reactions).get(event)
-
-
-class PeriodUnit(StrEnum):
-    """The two ways to say how often."""
-
-    MILLISECONDS = "period_ms"
-    HERTZ = "rate_hz"
-
-
-@dataclass(frozen=True, slots=True)
-class Period:
-    """How often a timer fires: a number, or an expression over ``parameters``."""
-
-    value: float | Expression
-    unit: PeriodUnit
-    span: Span = field(compare=False)
-
-    def seconds(self, value: float) -> float:
-        """Return ``value``, which is in ``unit``, in seconds. Raises ZeroDivisionError at 0 Hz."""
-        return value / 1000.0 if self.unit is PeriodUnit.MILLISECONDS else 1.0 / value
 
 
 class TimerClock(StrEnum):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 from composer.model.introspection import DEFAULT_INTROSPECTION, Introspection
+from composer.model.periods import PeriodError
 from composer.model.ports import (
     ChannelKind,
     Delivery,
@@ -136,6 +137,22 @@ class Node:
     def ports_of(self, *kinds: PortKind) -> tuple[Port, ...]:
         """Return the ports of the given kinds, in order."""
         return tuple(port for port in self.ports if port.kind in kinds)
+
+    @property
+    def initial_parameters(self) -> dict[str, object]:
+        """The values that the parameters start with, by name; without those that have none."""
+        return {
+            parameter.name.value: parameter.value.value
+            for parameter in self.parameters
+            if parameter.value is not None
+        }
+
+    def period_s(self, timer: Timer) -> float | None:
+        """Return a timer's period with the initial parameters; None if it has no valid one."""
+        try:
+            return timer.period.seconds(self.initial_parameters)
+        except PeriodError:
+            return None
 
     def parameter(self, name: str) -> Parameter | None:
         """Return the parameter called ``name``, or None."""

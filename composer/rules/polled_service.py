@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.periods import period_seconds
 from composer.analysis.words import number
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import PortKind
@@ -44,7 +43,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Look at the calls that timers make unconditionally."""
     for node in context.system.nodes:
         for timer in node.timers:
-            period_s = period_seconds(node, timer)
+            period_s = node.period_s(timer)
             if timer.reaction is None or timer.reaction.when is not None or period_s is None:
                 continue
             for send in timer.reaction.call:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.periods import period_seconds
 from composer.analysis.words import number
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import Node, Timer
@@ -56,7 +55,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 def _fastest(node: Node) -> tuple[Timer, float] | None:
     """Return the fastest timer with its rate in hertz."""
-    known = ((timer, period_seconds(node, timer)) for timer in node.timers)
+    known = ((timer, node.period_s(timer)) for timer in node.timers)
     rates = [(timer, 1.0 / period_s) for timer, period_s in known if period_s is not None]
     return max(rates, key=lambda found: found[1], default=None)
 

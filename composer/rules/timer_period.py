@@ -6,11 +6,10 @@ import math
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.periods import period_value
 from composer.analysis.words import number
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.expressions import Expression
-from composer.model import PeriodUnit, Timer
+from composer.model import Node, PeriodError, PeriodUnit, Timer
 
 RULE = register(
     Rule(
@@ -42,11 +41,10 @@ LONGEST_S = 86_400.0
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at every timer whose period is known."""
+    """Check every timer whose period is known."""
     for node in context.system.nodes:
         for timer in node.timers:
-            value = period_value(node, timer)
-            problem = _problem(timer, value) if value is not None else None
+            problem = _problem(node, timer)
             if problem is not None:
                 yield Diagnostic(
                     RULE,
@@ -56,18 +54,22 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 )
 
 
-def _problem(timer: Timer, value: float) -> str | None:
-    unit = "ms" if timer.period.unit is PeriodUnit.MILLISECONDS else "Hz"
+def _problem(node: Node, timer: Timer) -> str | None:
+    period = timer.period
+    try:
+        value = period.evaluate(node.initial_parameters)
+    except PeriodError:
+        return None  # the expression is reported by the rules for expressions and parameters
     if not math.isfinite(value):
-        return f"has a {timer.period.unit} that is no finite number"
-    if value <= 0:
-        return f"has a {timer.period.unit} of {number(value)}, which is not positive"
-    seconds = timer.period.seconds(value)
-    written = f"({number(value)} {unit})"
-    if seconds < SHORTEST_S:
-        return f"fires every {number(seconds * 1e6)} us {written}, which cannot be kept"
-    if seconds > LONGEST_S:
-        return f"fires every {number(seconds / 3600)} h {written}, which is absurd"
+        return f"has a {period.unit} that is not finite"
+    period_s = node.period_s(timer)
+    if value <= 0 or period_s is None:
+        return f"has a {period.unit} of {number(value)}, which is not positive"
+    unit = "ms" if period.unit is PeriodUnit.MILLISECONDS else "Hz"
+    if period_s < SHORTEST_S:
+        return f"fires every {number(period_s * 1e6)} us ({number(value)} {unit}), too fast to keep"
+    if period_s > LONGEST_S:
+        return f"fires every {number(period_s / 3600)} h ({number(value)} {unit}), too rarely"
     return None
 
 

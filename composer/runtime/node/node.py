@@ -16,7 +16,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node as RosNode
 
 from composer.behavior import TransitionFailed
-from composer.model import BehaviorReference, Event, LogLevel, Node
+from composer.model import BehaviorReference, Event, LogLevel, Node, PeriodError
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import ErrorLog, Log, Write, describe
@@ -44,7 +44,6 @@ from composer.runtime.node.lifecycle import Lifecycle, Result
 from composer.runtime.node.parameters import Parameters
 from composer.runtime.node.ros_node import make_ros_node
 from composer.runtime.ports.port import RunningPort
-from composer.runtime.ports.timer import PeriodError, period_s
 
 T = TypeVar("T")
 
@@ -358,7 +357,7 @@ class RunningNode:
         """Return why a timer could not go on with the new parameter values, or None."""
         for timer in self.model.timers:
             try:
-                period_s(timer.period, values)
+                timer.period.seconds(values)
             except PeriodError as error:
                 return f"timer '{timer.name}': {error}"
         return None

@@ -2,38 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any
 
-from composer.expressions import EvaluationError, Expression
-from composer.model import Period, TimerClock
 from composer.model import Timer as TimerModel
+from composer.model import TimerClock
 from composer.runtime.callbacks.callback import NOTHING, Callback
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import line_for
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.callbacks.timing import watched
 from composer.runtime.executors.loop import Timer
-
-
-class PeriodError(Exception):
-    """A period that no timer can have."""
-
-
-def period_s(period: Period, parameters: Mapping[str, Any]) -> float:
-    """Return the period in seconds with the given parameter values. Raises PeriodError."""
-    value: Any = period.value
-    try:
-        if isinstance(value, Expression):
-            value = value.evaluate({"parameters": parameters})
-        seconds = period.seconds(float(value))
-    except (EvaluationError, ZeroDivisionError, TypeError, ValueError) as error:
-        raise PeriodError(f"{period.unit} cannot be {value}: {error}") from error
-    if not (math.isfinite(seconds) and seconds > 0.0):
-        raise PeriodError(f"{period.unit} is {value}, but must be above zero")
-    return seconds
 
 
 class TimerPort(Callback):
@@ -54,7 +34,7 @@ class TimerPort(Callback):
         name = timer.name.value
         self._clock = core.loop if timer.clock is TimerClock.STEADY else core.clock
         self._period = timer.period
-        self._period_s = period_s(timer.period, core.names["parameters"])
+        self._period_s = timer.period.seconds(core.names["parameters"])
         self._reaction = reaction
         self._handler = handler
         self._traced = core.statistics.callback("timer", name)
@@ -69,7 +49,7 @@ class TimerPort(Callback):
 
     def follow_parameters(self) -> None:
         """Take over the period that the parameters say now. Raises PeriodError."""
-        seconds = period_s(self._period, self._core.names["parameters"])
+        seconds = self._period.seconds(self._core.names["parameters"])
         if seconds != self._period_s:
             self._period_s = seconds
             self._begin_anew()
