@@ -1,1 +1,1 @@
-"""Measurements, side by side with what people would use instead: ``make bench``."""
+"""Benchmarks of the composer against alternatives: ``make bench``."""

@@ -1,4 +1,4 @@
-"""Run the benchmarks, print the table, write the figures."""
+"""Run the benchmarks, print their tables and write the results."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from benchmarks import (
-    answers,
     large_systems,
+    live_commands,
     others,
     pipeline,
     plot,
@@ -28,29 +28,32 @@ from benchmarks.figures import Row, as_json, table
 
 RESULTS = Path(__file__).parent / "results"
 BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
-    "commands": ("wall time of commands that start nothing", start_up.measure),
-    "answers": ("wall time of commands beside a running system", answers.measure),
-    "validation": ("growth of compose validate with the size of a system", validation.measure),
+    "commands": ("wall time of commands without a running system", start_up.measure),
+    "live": ("wall time of commands on a running system", live_commands.measure),
+    "validation": ("scaling of compose validate with the size of a system", validation.measure),
     "pipeline": ("CPU of systems/pipeline.yaml", pipeline.measure),
-    "ring": ("CPU per message as fast as it goes, start-up and memory of N nodes", systems.ring),
-    "growth": ("CPU per message of 300 nodes against 10", systems.growth),
-    "streams": ("CPU per message at a rate, chains and stars, small and large", systems.streams),
-    "hops": ("latency from node to node", systems.hops),
-    "large": ("start, memory and stop of N idle nodes", large_systems.measure),
+    "ring": ("CPU per message at full speed, start-up time and memory of N nodes", systems.ring),
+    "growth": ("CPU per message with 300 nodes compared to 10", systems.growth),
+    "streams": ("CPU per message at a fixed rate, in chains and stars", systems.streams),
+    "hops": ("latency between two nodes", systems.hops),
+    "large": ("start-up, memory and shutdown of N idle nodes", large_systems.measure),
     "timers": ("jitter of a timer", systems.timers),
     "calls": ("services and actions", systems.calls),
-    "outside": ("DDS to another process", systems.outside),
-    "others": ("the ring with Zenoh, ezmsg and dora, installed when first run", others.measure),
-    "soak": ("a day of work in little: is memory flat?", soak.measure),
-    "tracing": ("what the times of callbacks cost", systems.tracing),
+    "external": ("messages between processes through DDS", systems.external),
+    "others": (
+        "the ring with Zenoh, ezmsg and dora, which are installed on the first run",
+        others.measure,
+    ),
+    "soak": ("memory usage under a long load", soak.measure),
+    "tracing": ("cost of recording callback timings", systems.tracing),
 }
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help="which; all of them unless given")
-    parser.add_argument("--list", action="store_true", help="say which there are")
-    parser.add_argument("--long", action="store_true", help="more rounds, sizes and time")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="benchmarks to run (default: all)")
+    parser.add_argument("--list", action="store_true", help="list the benchmarks and exit")
+    parser.add_argument("--long", action="store_true", help="run more rounds and sizes, for longer")
     options = parser.parse_args()
     if options.list:
         for name, (purpose, _) in BENCHMARKS.items():
@@ -58,7 +61,7 @@ def main() -> None:
         return
     unknown = sorted(set(options.names) - set(BENCHMARKS))
     if unknown:
-        parser.error(f"no such benchmark: {', '.join(unknown)}; there is {', '.join(BENCHMARKS)}")
+        parser.error(f"unknown benchmark: {', '.join(unknown)}; available: {', '.join(BENCHMARKS)}")
     _run(options.names or list(BENCHMARKS), long=options.long)
 
 
@@ -69,20 +72,18 @@ def _run(names: list[str], *, long: bool) -> None:
     for name in names:
         purpose, measure = BENCHMARKS[name]
         print(f"==> {name}: {purpose}", flush=True)
-        found = measure(long=long)
-        print(table(found), end="\n\n", flush=True)  # at once: an interrupted run tells this much
-        rows += found
-    if judged := targets.table(rows):
-        print(judged, end="\n\n")
-    print("Medians of the rounds; a ratio is ours / theirs of one round, below 1 is less for ours.")
-    print(
-        f"Load of the machine: {load_before:.1f} before, {os.getloadavg()[0]:.1f} after;", end=" "
-    )
+        measured = measure(long=long)
+        print(table(measured), end="\n\n", flush=True)  # in case the run is interrupted
+        rows += measured
+    if reached := targets.table(rows):
+        print(reached, end="\n\n")
+    print("Medians over rounds. Ratio: composer / baseline in one round; below 1 is better.")
+    print(f"System load: {load_before:.1f} before, {os.getloadavg()[0]:.1f} after;", end=" ")
     print(f"{os.cpu_count()} processors, {time.monotonic() - began_s:.0f} s.")
     path = _write(rows, load_before, long=long)
-    picture = path.with_suffix(".svg")
-    picture.write_text(plot.picture(rows), encoding="utf-8")
-    print(f"Every figure: {path}, a picture of the ratios: {picture}")
+    chart = path.with_suffix(".svg")
+    chart.write_text(plot.chart(rows), encoding="utf-8")
+    print(f"Results: {path}, chart of the ratios: {chart}")
 
 
 def _write(rows: list[Row], load_before: float, *, long: bool) -> Path:
@@ -92,7 +93,7 @@ def _write(rows: list[Row], load_before: float, *, long: bool) -> Path:
     content = {
         "time": now.isoformat(timespec="seconds"),
         "python": platform.python_version(),
-        "python was built with": sysconfig.get_config_var("CONFIG_ARGS"),
+        "python build options": sysconfig.get_config_var("CONFIG_ARGS"),
         "processors": os.cpu_count(),
         "load": [load_before, os.getloadavg()[0]],
         "long": long,

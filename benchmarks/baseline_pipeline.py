@@ -1,8 +1,8 @@
-"""systems/pipeline.yaml written by hand: plain rclpy nodes on a SingleThreadedExecutor.
+"""Hand-written equivalent of systems/pipeline.yaml: rclpy nodes on a SingleThreadedExecutor.
 
-The same topics, types, QoS, rates and arithmetic as the node types in ``nodes/``, without
-lifecycle, written as a rclpy programmer would: parameters are read once, the service is called
-with a done-callback. ``python -m benchmarks.baseline_pipeline`` runs it until Ctrl-C.
+The topics, types, QoS, rates and algorithms are those of the node types in ``nodes/``, without
+lifecycle. Parameters are read once, and the service is called with a done-callback.
+``python -m benchmarks.baseline_pipeline`` runs it until Ctrl-C.
 """
 
 from __future__ import annotations
@@ -71,9 +71,9 @@ class SensorSimulator(Node):
         self.sent += 1
 
     def accelerate(self, elapsed_s: float, time_s: float) -> None:
-        heard_lately = (time_s - self.commanded_at_s) * 1000.0 <= self.command_timeout_ms
-        wanted = self.command.linear if heard_lately else Twist().linear
-        change_x, change_y = wanted.x - self.velocity_x, wanted.y - self.velocity_y
+        is_fresh = (time_s - self.commanded_at_s) * 1000.0 <= self.command_timeout_ms
+        target = self.command.linear if is_fresh else Twist().linear
+        change_x, change_y = target.x - self.velocity_x, target.y - self.velocity_y
         change = math.hypot(change_x, change_y)
         possible = self.max_acceleration * elapsed_s
         share = 1.0 if change <= possible else possible / change
@@ -127,7 +127,7 @@ class Planner(Node):
 
 
 class MotorController(Node):
-    """Follows planned paths in closed loop, from waypoint to waypoint."""
+    """Follows planned paths between waypoints in closed loop."""
 
     def __init__(self) -> None:
         super().__init__("motor_controller", namespace="/control")
@@ -191,9 +191,9 @@ class MotorController(Node):
         self.times_s = [pose.header.stamp.sec + pose.header.stamp.nanosec * 1e-9 for pose in poses]
 
     def velocity(self, position: Point) -> tuple[float, float]:
-        wanted, velocity_x, velocity_y = self.reference(now_s(self))
-        velocity_x += self.position_gain * (wanted.x - position.x)
-        velocity_y += self.position_gain * (wanted.y - position.y)
+        target, velocity_x, velocity_y = self.reference(now_s(self))
+        velocity_x += self.position_gain * (target.x - position.x)
+        velocity_y += self.position_gain * (target.y - position.y)
         excess = math.hypot(velocity_x, velocity_y) / self.max_velocity
         if excess > 1.0:
             velocity_x, velocity_y = velocity_x / excess, velocity_y / excess
@@ -209,11 +209,11 @@ class MotorController(Node):
         period_s = self.times_s[index] - self.times_s[index - 1]
         share = (time_s - self.times_s[index - 1]) / period_s
         step_x, step_y = after.x - before.x, after.y - before.y
-        wanted = Point(x=before.x + share * step_x, y=before.y + share * step_y)
-        return wanted, step_x / period_s, step_y / period_s
+        target = Point(x=before.x + share * step_x, y=before.y + share * step_y)
+        return target, step_x / period_s, step_y / period_s
 
     def on_navigate(self, goal: object) -> Navigate.Result:
-        """Refuse: no goal is sent while measuring; the server is there for what it costs idle."""
+        """Abort: no goals are sent; the server exists for its idle cost."""
         goal.abort()
         return Navigate.Result(message="this is a measurement")
 
@@ -240,7 +240,7 @@ def later(stamp: Time, seconds: float) -> Time:
 
 
 def main() -> None:
-    """Run until Ctrl-C, then say how much was sent."""
+    """Run until Ctrl-C, then print the number of messages sent."""
     rclpy.init()
     sensor, planner, motor = SensorSimulator(), Planner(), MotorController()
     executor = SingleThreadedExecutor()

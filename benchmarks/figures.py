@@ -1,4 +1,4 @@
-"""What is made of measurements: percentiles, ratios round by round, and the table."""
+"""Statistics of measurements: percentiles, ratios per round, and tables."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """The middle and the ends of what several rounds gave."""
+    """Median and range of the values of several rounds."""
 
     median: float
     lowest: float
@@ -20,17 +20,17 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One case against one way of doing it by hand; an entry per round, None where it failed."""
+    """One case, with the values of the composer and of a baseline per round; None for failures."""
 
     case: str
     unit: str
-    against: str
-    ours: tuple[float | None, ...]
-    theirs: tuple[float | None, ...]
+    baseline: str
+    values: tuple[float | None, ...]
+    baseline_values: tuple[float | None, ...]
 
 
 def spread(values: Iterable[float | None]) -> Spread | None:
-    """Return median, least and greatest of what is there; None when nothing is."""
+    """Return median, minimum and maximum without failures; None if all have failed."""
     present = [value for value in values if value is not None]
     if not present:
         return None
@@ -38,39 +38,39 @@ def spread(values: Iterable[float | None]) -> Spread | None:
 
 
 def ratios(row: Row) -> list[float]:
-    """Return ours / theirs of each round in which both succeeded.
+    """Return the ratio composer / baseline of each round in which both succeeded.
 
-    Within a round, because the machine is the same there; from round to round it may not be.
+    Ratios are computed per round, since the speed of the machine can change between rounds.
     """
     return [
-        ours / theirs
-        for ours, theirs in zip(row.ours, row.theirs, strict=True)
-        if ours is not None and theirs
+        value / baseline
+        for value, baseline in zip(row.values, row.baseline_values, strict=True)
+        if value is not None and baseline
     ]
 
 
 def percentile(values: Sequence[float], share: float) -> float:
-    """Return the smallest value that at least ``share`` of all do not exceed (nearest rank).
+    """Return the ``share`` percentile by the nearest-rank method.
 
-    Raises ValueError when there are no values or ``share`` is not within 0 (excluded) and 1.
+    Raises ValueError if there are no values or ``share`` is not in the interval (0, 1].
     """
     if not values:
         raise ValueError("no values")
     if not 0.0 < share <= 1.0:
-        raise ValueError(f"not a share: {share}")
+        raise ValueError(f"share must be in (0, 1], not {share}")
     rank = -(-len(values) * share // 1)
     return sorted(values)[int(rank) - 1]
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Return the rows as aligned text, a ratio below 1 meaning that the composer needs less."""
-    head = ("case", "unit", "ours", "against", "theirs", "ratio", "least - most", "rounds")
+    """Return the rows as an aligned table. A ratio below 1 means that the composer needs less."""
+    head = ("case", "unit", "composer", "baseline", "value", "ratio", "min - max", "rounds")
     lines = [head, *(_cells(row) for row in rows)]
     return aligned(lines, right=(2, 4, 5, 6, 7))
 
 
 def aligned(lines: Sequence[Sequence[str]], right: Sequence[int]) -> str:
-    """Return lines with their cells in columns, those of ``right`` aligned there."""
+    """Return lines with aligned columns; those in ``right`` are right-aligned."""
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join(
         "  ".join(
@@ -82,14 +82,14 @@ def aligned(lines: Sequence[Sequence[str]], right: Sequence[int]) -> str:
 
 
 def as_json(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return the rows with every single figure, for whoever wants to count otherwise."""
+    """Return the rows with all values, for further processing."""
     return [
         {
             "case": row.case,
             "unit": row.unit,
-            "against": row.against,
-            "ours": list(row.ours),
-            "theirs": list(row.theirs),
+            "baseline": row.baseline,
+            "values": list(row.values),
+            "baseline_values": list(row.baseline_values),
             "ratios": ratios(row),
         }
         for row in rows
@@ -101,14 +101,14 @@ def _cells(row: Row) -> tuple[str, ...]:
     return (
         row.case,
         row.unit,
-        _figure(spread(row.ours)),
-        row.against,
-        _figure(spread(row.theirs)),
+        _figure(spread(row.values)),
+        row.baseline,
+        _figure(spread(row.baseline_values)),
         "-" if ratio is None else f"{ratio.median:.3g}",
         "-" if ratio is None else f"{ratio.lowest:.3g} - {ratio.highest:.3g}",
-        f"{0 if ratio is None else ratio.rounds} of {len(row.ours)}",
+        f"{0 if ratio is None else ratio.rounds} of {len(row.values)}",
     )
 
 
-def _figure(found: Spread | None) -> str:
-    return "failed" if found is None else f"{found.median:.4g}"
+def _figure(values: Spread | None) -> str:
+    return "failed" if values is None else f"{values.median:.4g}"

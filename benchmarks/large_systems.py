@@ -1,4 +1,4 @@
-"""Systems of N nodes that do nothing: how they start, what they hold, how they stop."""
+"""Systems of N idle nodes: start-up, memory and shutdown."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 from benchmarks.figures import Row
 from benchmarks.processes import ProgramFailed, run_program
 
-BY_HAND = "LifecycleNodes, by hand"
+HAND_WRITTEN = "hand-written LifecycleNodes"
 COMPOSED = "all services"
 LEAN = "introspection off"
 _PROGRAMS = {
     COMPOSED: ("large_composed",),
     LEAN: ("large_composed", "--lean"),
-    BY_HAND: ("large_hand_written",),
+    HAND_WRITTEN: ("large_hand_written",),
 }
 _FIGURES = {
     "start_s": ("start", "s"),
@@ -23,25 +23,31 @@ _FIGURES = {
     "stop_s": ("stop", "s"),
     "stop_cpu_s": ("stop", "CPU s"),
 }
-_PATIENCE_S = 300.0
+_TIMEOUT_S = 300.0
 
 
 def measure(*, long: bool) -> list[Row]:
-    """Let the ways take turns at each size. Raises ProgramFailed when one of ours fails."""
+    """Measure all variants at each size. Raises ProgramFailed if the composer fails."""
     sizes, rounds = ((10, 100, 300), 5) if long else ((10, 100), 3)
     return [row for nodes in sizes for row in _of_size(nodes, rounds)]
 
 
 def _of_size(nodes: int, rounds: int) -> list[Row]:
-    found: dict[str, list[Mapping[str, Any] | None]] = {way: [] for way in _PROGRAMS}
+    results: dict[str, list[Mapping[str, Any] | None]] = {variant: [] for variant in _PROGRAMS}
     for turn in range(rounds):
-        for way in _PROGRAMS if turn % 2 == 0 else reversed(_PROGRAMS):
-            found[way].append(_run(way, nodes))
+        for variant in _PROGRAMS if turn % 2 == 0 else reversed(_PROGRAMS):
+            results[variant].append(_run(variant, nodes))
     return [
-        Row(f"{what}, N={nodes}, {way}", unit, BY_HAND, _each(found[way], key), theirs)
+        Row(
+            f"{what}, N={nodes}, {variant}",
+            unit,
+            HAND_WRITTEN,
+            _each(results[variant], key),
+            theirs,
+        )
         for key, (what, unit) in _FIGURES.items()
-        for theirs in [_each(found[BY_HAND], key)]
-        for way in (COMPOSED, LEAN)
+        for theirs in [_each(results[HAND_WRITTEN], key)]
+        for variant in (COMPOSED, LEAN)
     ]
 
 
@@ -49,11 +55,11 @@ def _each(results: list[Mapping[str, Any] | None], key: str) -> tuple[float | No
     return tuple(None if result is None else result[key] for result in results)
 
 
-def _run(way: str, nodes: int) -> Mapping[str, Any] | None:
-    program, *arguments = _PROGRAMS[way]
+def _run(variant: str, nodes: int) -> Mapping[str, Any] | None:
+    program, *arguments = _PROGRAMS[variant]
     try:
-        return run_program(program, "--nodes", str(nodes), *arguments, timeout_s=_PATIENCE_S)
+        return run_program(program, "--nodes", str(nodes), *arguments, timeout_s=_TIMEOUT_S)
     except ProgramFailed:
-        if way == BY_HAND:
+        if variant == HAND_WRITTEN:
             return None
-        raise  # ours has to work
+        raise  # the composer must not fail

@@ -1,10 +1,10 @@
-"""The ring of nodes with other middlewares that have a Python of their own on PyPI.
+"""The ring of nodes with other middlewares that have Python packages on PyPI.
 
-Zenoh and ezmsg are in one process, as the composer is; dora has a process for each node, so it is
-held against the composer in one process, and in one for each node as well.
+Zenoh and ezmsg run in one process, like the composer. dora runs one process per node, so it is
+compared with the composer in one process and with one process per node.
 
-They are installed into an environment of the benchmark's own, when it runs for the first time. What
-does not install here is shown as failed.
+The packages are installed into a separate environment on the first run. Packages that cannot be
+installed are shown as failed.
 """
 
 from __future__ import annotations
@@ -18,23 +18,28 @@ from pathlib import Path
 
 from benchmarks.figures import Row
 from benchmarks.processes import ProgramFailed, run_program
+from benchmarks.rounds import COMPOSED, Case, run_rounds
 from benchmarks.systems import CPU, cpu_us
-from benchmarks.turns import COMPOSED, Case, take_turns
 
 FOLDER = Path(__file__).parent / "results" / "others"
 DORA = "dora"
-#: The name, what pip is to install, and the program.
+#: Name, packages to install, and program.
 OTHERS = (
     ("Zenoh", ("eclipse-zenoh",), "zenoh_ring"),
     ("ezmsg", ("ezmsg",), "ezmsg_ring"),
     (DORA, ("dora-rs", "dora-rs-cli"), "dora_ring"),
 )
 _INSTALL_WITHIN_S, _RUN_WITHIN_S = 300.0, 30.0
-_OF_ROS = ("AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
+_ROS_VARIABLES = (
+    "AMENT_PREFIX_PATH",
+    "LD_LIBRARY_PATH",
+    "PYTHONPATH",
+    "_ROS_WHEELS_BOOTSTRAP_COMPLETE",
+)
 
 
 def measure(*, long: bool) -> list[Row]:
-    """Let the composer and the others take turns. Raises ProgramFailed where ours fails."""
+    """Measure all of them alternately. Raises ProgramFailed if the composer fails."""
     case = Case("ring", 10, 3.0 if long else 0.6, rounds=1)
     installed = {name: _install(*packages) for name, packages, _ in OTHERS}
     together: list[float | None] = []
@@ -47,13 +52,13 @@ def measure(*, long: bool) -> list[Row]:
             theirs[name].append(_run(program, case) if installed[name] else None)
     ring = f"ring, N={case.nodes}"
     return [
-        *(Row(ring, CPU, name, tuple(together), tuple(found)) for name, found in theirs.items()),
-        Row(f"{ring}, a process each", CPU, DORA, tuple(apart), tuple(theirs[DORA])),
+        *(Row(ring, CPU, name, tuple(together), tuple(values)) for name, values in theirs.items()),
+        Row(f"{ring}, one process per node", CPU, DORA, tuple(apart), tuple(theirs[DORA])),
     ]
 
 
 def _ours(case: Case) -> float | None:
-    (result,) = take_turns((COMPOSED,), case)[COMPOSED]
+    (result,) = run_rounds((COMPOSED,), case)[COMPOSED]
     return None if result is None else cpu_us(result)
 
 
@@ -93,5 +98,5 @@ def _call(*command: str) -> bool:
 
 
 def _environment() -> Mapping[str, str]:
-    """Return ours without what leads to ROS: its libraries must not get into another Python."""
-    return {name: value for name, value in os.environ.items() if name not in _OF_ROS}
+    """Return our environment without ROS: its libraries are for another Python."""
+    return {name: value for name, value in os.environ.items() if name not in _ROS_VARIABLES}

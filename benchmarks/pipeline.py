@@ -1,7 +1,7 @@
-"""The tutorial's pipeline: ``compose run`` against the same written by hand.
+"""CPU usage of systems/pipeline.yaml compared to a hand-written equivalent.
 
-CPU of the whole process, all its threads, as the kernel counts it, once everything runs. Both have
-to have sent what their timers promise, so that nobody wins by doing less.
+The CPU time of the whole process is measured once all nodes are active. Both programs must publish
+at the expected rates, so that doing less does not count as an improvement.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from benchmarks.figures import Row
 from benchmarks.processes import ROOT, ProgramFailed, environment
 
 EXPECTED_HZ = 30.0 + 50.0  # odometry and motor commands
-_ENOUGH = 0.9  # of what was expected: the timers of a busy machine skip some
-_PATIENCE_S = 30.0
+_ENOUGH = 0.9  # of the expected messages: timers skip calls on a busy machine
+_TIMEOUT_S = 30.0
 _SETTLE_S = 0.5
 _PROCESS_CPU_CLOCK = 2  # CPUCLOCK_SCHED of Linux
 _NODE_LINE = re.compile(
@@ -34,7 +34,7 @@ _HAND_LINE = re.compile(r'"(?:sensor_data|motor_commands)": (\d+)')
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """One of the two: how it is started, what it says when it is up, how it tells what it sent."""
+    """A program: its command, the text printed when it is up, and the counts of sent messages."""
 
     command: tuple[str, ...]
     ready: str
@@ -44,16 +44,16 @@ class Side:
 COMPOSED = Side(
     ("-m", "composer", "run", "systems/pipeline.yaml"), "3 of 3 nodes active", _NODE_LINE
 )
-BY_HAND = Side(("-m", "benchmarks.baseline_pipeline"), "ready", _HAND_LINE)
+HAND_WRITTEN = Side(("-m", "benchmarks.baseline_pipeline"), "ready", _HAND_LINE)
 
 
 def measure(*, long: bool) -> list[Row]:
-    """Let both run in turn. Raises ProgramFailed."""
+    """Measure both alternately. Raises ProgramFailed."""
     rounds, seconds = (7, 10.0) if long else (3, 3.0)
     ours: list[float] = []
     theirs: list[float] = []
     for turn in range(rounds):
-        sides = [(COMPOSED, ours), (BY_HAND, theirs)]
+        sides = [(COMPOSED, ours), (HAND_WRITTEN, theirs)]
         for side, figures in sides if turn % 2 == 0 else reversed(sides):
             figures.append(cpu_ms_per_s(side, seconds))
     return [
@@ -68,7 +68,7 @@ def measure(*, long: bool) -> list[Row]:
 
 
 def cpu_ms_per_s(side: Side, seconds: float) -> float:
-    """Run one side and return what CPU it took. Raises ProgramFailed."""
+    """Run one program and return its CPU usage. Raises ProgramFailed."""
     with running(side, environment()) as (process, output):
         up_s = time.perf_counter()
         time.sleep(_SETTLE_S)
@@ -77,7 +77,7 @@ def cpu_ms_per_s(side: Side, seconds: float) -> float:
         cpu_s, took_s = _cpu_s(process.pid) - cpu_s, time.perf_counter() - began_s
         process.send_signal(signal.SIGINT)
         lived_s = time.perf_counter() - up_s
-        process.wait(_PATIENCE_S)
+        process.wait(_TIMEOUT_S)
         text = _read(output)
     sent_hz = sum(int(count) for count in side.sent.findall(text)) / lived_s
     if "driving to" not in text or sent_hz < _ENOUGH * EXPECTED_HZ:
@@ -89,9 +89,9 @@ def cpu_ms_per_s(side: Side, seconds: float) -> float:
 def running(
     side: Side, variables: Mapping[str, str]
 ) -> Iterator[tuple[subprocess.Popen[bytes], IO[bytes]]]:
-    """Let one side run for the length of the block, which begins when it is up.
+    """Context manager: run a program; the block is entered once the program is up.
 
-    ``variables`` is its environment. Raises ProgramFailed when it does not come up.
+    ``variables`` is its environment. Raises ProgramFailed if it does not come up.
     """
     command: Sequence[str] = (sys.executable, *side.command)
     with tempfile.TemporaryFile() as output:
@@ -107,7 +107,7 @@ def running(
 
 
 def _wait_until_up(process: subprocess.Popen[bytes], output: IO[bytes], ready: str) -> None:
-    until_s = time.monotonic() + _PATIENCE_S
+    until_s = time.monotonic() + _TIMEOUT_S
     while ready not in _read(output):
         if process.poll() is not None or time.monotonic() > until_s:
             raise ProgramFailed(f"did not come up: {_read(output)[-500:]}")
@@ -115,11 +115,11 @@ def _wait_until_up(process: subprocess.Popen[bytes], output: IO[bytes], ready: s
 
 
 def _read(output: IO[bytes]) -> str:
-    # Not by seeking: the process writes at the same position of the same open file.
+    # Do not seek: the process shares the file position.
     size = os.fstat(output.fileno()).st_size
     return os.pread(output.fileno(), size, 0).decode(errors="replace")
 
 
 def _cpu_s(pid: int) -> float:
-    # The process's CPU clock, as clock_getcpuclockid(3) names it: /proc counts in steps of 10 ms.
+    # The CPU clock of the process, see clock_getcpuclockid(3); /proc has a resolution of 10 ms.
     return time.clock_gettime((~pid << 3) | _PROCESS_CPU_CLOCK)

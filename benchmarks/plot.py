@@ -1,4 +1,4 @@
-"""The ratios as a picture: a bar for the median, a line from the least to the greatest."""
+"""A bar chart of the ratios: a bar for the median, a line from the minimum to the maximum."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from html import escape
 
 from benchmarks.figures import Row, Spread, ratios, spread
 
-_LOWEST, _HIGHEST = 0.001, 10.0  # ratios beyond are drawn at the edge
+_LOWEST, _HIGHEST = 0.001, 10.0  # other ratios are clipped
 _LABELS_PX, _BARS_PX, _LINE_PX, _MARGIN_PX = 520, 440, 22, 30
 _GRID = (0.001, 0.01, 0.1, 1.0, 10.0)
 _OURS, _THEIRS = "#2a9d8f", "#e76f51"
 
 
-def picture(rows: Iterable[Row]) -> str:
-    """Return an SVG. On the logarithmic scale below 1 the composer needs less."""
-    found = [(row, ratio) for row in rows if (ratio := spread(ratios(row))) is not None]
-    height = 2 * _MARGIN_PX + _LINE_PX * len(found)
+def chart(rows: Iterable[Row]) -> str:
+    """Return an SVG image with a logarithmic scale. Below 1, the composer needs less."""
+    bars = [(row, ratio) for row in rows if (ratio := spread(ratios(row))) is not None]
+    height = 2 * _MARGIN_PX + _LINE_PX * len(bars)
     width = _LABELS_PX + _BARS_PX + _MARGIN_PX
     return "\n".join(
         [
@@ -25,7 +25,7 @@ def picture(rows: Iterable[Row]) -> str:
             'font-family="sans-serif" font-size="12">',
             f'<rect width="{width}" height="{height}" fill="white"/>',
             *_grid(height),
-            *(line for place, item in enumerate(found) for line in _bar(place, *item)),
+            *(line for place, item in enumerate(bars) for line in _bar(place, *item)),
             "</svg>\n",
         ]
     )
@@ -34,10 +34,10 @@ def picture(rows: Iterable[Row]) -> str:
 def _grid(height: int) -> Iterable[str]:
     for ratio in _GRID:
         x = _x(ratio)
-        colour = "black" if ratio == 1.0 else "#cccccc"
+        color = "black" if ratio == 1.0 else "#cccccc"
         yield (
             f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{_MARGIN_PX}" y2="{height - _MARGIN_PX}" '
-            f'stroke="{colour}"/>'
+            f'stroke="{color}"/>'
         )
         yield f'<text x="{x:.1f}" y="{_MARGIN_PX - 8}" text-anchor="middle">{ratio:g}</text>'
 
@@ -46,12 +46,12 @@ def _bar(place: int, row: Row, ratio: Spread) -> Iterable[str]:
     top = _MARGIN_PX + place * _LINE_PX
     middle = top + _LINE_PX / 2
     first, last = sorted((_x(1.0), _x(ratio.median)))
-    colour = _OURS if ratio.median <= 1.0 else _THEIRS
-    label = escape(f"{row.case}, {row.unit}, against {row.against}: {ratio.median:.3g}")
+    color = _OURS if ratio.median <= 1.0 else _THEIRS
+    label = escape(f"{row.case}, {row.unit}, baseline {row.baseline}: {ratio.median:.3g}")
     yield f'<text x="{_LABELS_PX - 10}" y="{middle + 4}" text-anchor="end">{label}</text>'
     yield (
         f'<rect x="{first:.1f}" y="{top + 4}" width="{last - first:.1f}" '
-        f'height="{_LINE_PX - 8}" fill="{colour}"/>'
+        f'height="{_LINE_PX - 8}" fill="{color}"/>'
     )
     yield (
         f'<line x1="{_x(ratio.lowest):.1f}" x2="{_x(ratio.highest):.1f}" y1="{middle}" '
@@ -60,7 +60,7 @@ def _bar(place: int, row: Row, ratio: Spread) -> Iterable[str]:
 
 
 def _x(ratio: float) -> float:
-    """Return where a ratio is drawn."""
-    inside = min(max(ratio, _LOWEST), _HIGHEST)
-    share = math.log(inside / _LOWEST) / math.log(_HIGHEST / _LOWEST)
+    """Return the x coordinate of a ratio."""
+    clipped = min(max(ratio, _LOWEST), _HIGHEST)
+    share = math.log(clipped / _LOWEST) / math.log(_HIGHEST / _LOWEST)
     return _LABELS_PX + share * _BARS_PX

@@ -1,4 +1,4 @@
-"""Starts what is measured: a process of its own each, in a ROS domain of its own."""
+"""Run each measurement in a separate process and ROS domain."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-RESULT_MARK = "RESULT "  # begins the one line of a program's output that is its result
-BEGUN_LINE = "BEGUN"  # of a program that will be told when to end: what counts begins
-_LOWEST_DOMAIN_ID, _DOMAIN_IDS = 30, 70  # above 101 the ports may meet those that Linux gives out
+RESULT_MARK = "RESULT "  # prefix of the line with the result of a program
+STARTED_LINE = "STARTED"  # printed at the start of a measurement without a fixed duration
+_LOWEST_DOMAIN_ID, _DOMAIN_IDS = 30, 70  # ports of IDs above 101 may collide with ephemeral ports
 
 _domain_ids = itertools.cycle(
     _LOWEST_DOMAIN_ID + (os.getpid() + step) % _DOMAIN_IDS for step in range(_DOMAIN_IDS)
@@ -25,11 +25,11 @@ _domain_ids = itertools.cycle(
 
 
 class ProgramFailed(Exception):
-    """A measured program that gave no result; the text says how it ended."""
+    """A program ended without a result; the message says how."""
 
 
 def environment() -> Mapping[str, str]:
-    """Return the environment of the next process: a domain of its own, this machine only."""
+    """Return an environment with a new ROS domain ID, restricted to this machine."""
     return {
         **os.environ,
         "ROS_DOMAIN_ID": str(next(_domain_ids)),
@@ -39,9 +39,9 @@ def environment() -> Mapping[str, str]:
 
 @contextmanager
 def on_one_processor() -> Iterator[None]:
-    """Let all that is started in the block share one processor."""
+    """Context manager: all processes started in the block share one processor."""
     allowed = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {max(allowed)})  # not the first, which as a rule serves devices
+    os.sched_setaffinity(0, {max(allowed)})  # the first one usually handles device interrupts
     try:
         yield
     finally:
@@ -49,9 +49,9 @@ def on_one_processor() -> Iterator[None]:
 
 
 def wall_time_s(*arguments: str, folder: Path) -> float:
-    """Return how long this Python takes with ``arguments``. Raises CalledProcessError.
+    """Return the wall time of this Python with ``arguments``. Raises CalledProcessError.
 
-    Bytecode is kept, as it is where people install programs, also in environments that forbid it.
+    Bytecode is cached, as in an installation, even if the environment disables it.
     """
     compiled = str(Path(tempfile.gettempdir()) / "composer-benchmarks-bytecode")
     variables = {**os.environ, "PYTHONPYCACHEPREFIX": compiled}
@@ -64,7 +64,7 @@ def wall_time_s(*arguments: str, folder: Path) -> float:
 
 @contextmanager
 def started(name: str, *arguments: str, variables: Mapping[str, str]) -> Iterator[None]:
-    """Let ``benchmarks.programs.<name>`` run for the length of the block."""
+    """Context manager: run ``benchmarks.programs.<name>`` during the block."""
     with subprocess.Popen(
         command(name, *arguments),
         cwd=ROOT,
@@ -85,9 +85,9 @@ def run_program(
     variables: Mapping[str, str] | None = None,
     python: str = sys.executable,
 ) -> dict[str, Any]:
-    """Run ``benchmarks.programs.<name>`` and return what it measured. Raises ProgramFailed.
+    """Run ``benchmarks.programs.<name>`` and return its result. Raises ProgramFailed.
 
-    ``variables`` is its environment, a ROS domain of its own unless given; ``python`` runs it.
+    ``variables`` is its environment, by default one with a new ROS domain.
     """
     try:
         done = subprocess.run(
@@ -105,7 +105,7 @@ def run_program(
 
 
 def result_in(output: str, errors: str, exit_code: int) -> dict[str, Any]:
-    """Return the result that a program printed. Raises ProgramFailed when there is none."""
+    """Return the result that a program printed. Raises ProgramFailed if there is none."""
     for line in output.splitlines():
         if line.startswith(RESULT_MARK):
             result: dict[str, Any] = json.loads(line.removeprefix(RESULT_MARK))
@@ -114,7 +114,7 @@ def result_in(output: str, errors: str, exit_code: int) -> dict[str, Any]:
 
 
 def no_result(errors: str, exit_code: int) -> ProgramFailed:
-    """Return what to raise for a program that has ended without a result."""
+    """Return the exception for a program that ended without a result."""
     last = (errors.strip().splitlines() or ["nothing on stderr"])[-1]
     return ProgramFailed(f"exit code {exit_code}: {last}")
 

@@ -1,18 +1,18 @@
-"""A day's work in little, and whether memory stays where it was."""
+"""Memory usage under a long load."""
 
 from __future__ import annotations
 
 from benchmarks.figures import Row
 from benchmarks.processes import run_program
 
-FIFTHS = 5  # of the work: after the first of them everything has happened often
+FIFTHS = 5  # of the work: after the first one, caches and pools are filled
 
 
 def measure(*, long: bool) -> list[Row]:
-    """Compare the memory after each fifth of the work with that after the first.
+    """Compare the memory after each fifth of the work with that after the first one.
 
-    Long is 10 million messages, 10 000 changes of timers and 1000 lifecycle cycles; short is a
-    fiftieth of that. Raises ProgramFailed.
+    The long version has 10 million messages, 10 000 timer changes and 1000 lifecycle cycles; the
+    short version has a fiftieth of that. Raises ProgramFailed.
     """
     figures = run_program("soak", "--share", str(1.0 if long else 0.02), timeout_s=3600.0)
     first_mb, *later_mb = after_fifths(figures["memory_mb"])
@@ -24,5 +24,5 @@ def measure(*, long: bool) -> list[Row]:
 
 
 def after_fifths(memory_mb: list[float]) -> list[float]:
-    """Return what the memory was after each fifth of the looks at it."""
+    """Return the last sample of each fifth of the samples."""
     return [memory_mb[len(memory_mb) * fifth // FIFTHS - 1] for fifth in range(1, FIFTHS + 1)]

@@ -1,8 +1,8 @@
-"""How long the commands take that people run often and that start nothing.
+"""Wall time of frequent commands that do not start a system.
 
-Each is measured against the same Python importing the libraries that any such tool would import,
-so that the ratio says what the composer itself adds. The commands take turns, so that whatever else
-the machine does meets all of them alike.
+The baseline is importing the third-party libraries in the same Python, so that the ratio shows the
+cost of the composer itself. The commands run alternately, so that other load on the machine affects
+all of them equally.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ COMMANDS = {
 
 
 def measure(*, long: bool) -> list[Row]:
-    """Let the commands take turns. Raises CalledProcessError when one fails."""
+    """Measure the commands alternately. Raises CalledProcessError if one fails."""
     turns = 15 if long else 4
     times_ms: dict[str, list[float]] = {name: [] for name in COMMANDS}
     for _ in range(turns + 1):
         for name, arguments in COMMANDS.items():
             times_ms[name].append(wall_time_s(*arguments, folder=ROOT) * 1000)
-    # The first turn reads everything from the disk, which is not what is asked for.
+    # The first round is not counted, since it fills the disk cache.
     counted = {name: tuple(times[1:]) for name, times in times_ms.items()}
     theirs = counted.pop(BASELINE)
     return [Row(name, "wall ms", BASELINE, ours, theirs) for name, ours in counted.items()]

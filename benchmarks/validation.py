@@ -1,9 +1,8 @@
-"""Whether the cost of validating grows with the size of a system, and with nothing more.
+"""Scaling of ``compose validate`` with the size of a system.
 
-Two systems, one ten times as large as the other, are made of nodes of one type with three
-publishers and three subscriptions each, joined by connections. They are validated in turns in fresh
-processes, so that nothing is remembered from one to the next. Ten times the size may take ten times
-the time, and a little more for what does not stay in the caches.
+Two generated systems, one ten times as large as the other, have nodes of a single type with three
+publishers and three subscriptions each. They are validated alternately in new processes. Linear
+scaling means a ratio of ten, or slightly more because of cache misses.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from benchmarks.figures import Row
 from benchmarks.processes import wall_time_s
 
 SIZES = (200, 2000)
-ENDS_PER_NODE = 3
+PORTS_PER_NODE = 3
 
 NODE_TYPE = """\
 node: worker
@@ -37,22 +36,22 @@ timers:
 
 
 def system(nodes: int) -> str:
-    """Return the text of a system of so many nodes and three times as many connections."""
+    """Return a system file with ``nodes`` nodes and three times as many connections."""
     lines = ["system: large", "nodes:"]
     for number in range(nodes):
         waits = f", lifecycle: {{depends_on: [n{number - 1}]}}" if number else ""
         lines.append(f"  n{number}: {{type: worker, parameters: {{gain: 1.5}}{waits}}}")
     lines.append("connections:")
     for number in range(nodes):
-        for end in range(ENDS_PER_NODE):
-            target = f"n{(number + end + 1) % nodes}.in_{end}"
-            source = f"n{number}.out_{end}"
-            lines.append(f"  - {{topic: /t{number}_{end}, from: {source}, to: {target}}}")
+        for port in range(PORTS_PER_NODE):
+            target = f"n{(number + port + 1) % nodes}.in_{port}"
+            source = f"n{number}.out_{port}"
+            lines.append(f"  - {{topic: /t{number}_{port}, from: {source}, to: {target}}}")
     return "\n".join(lines) + "\n"
 
 
 def measure(*, long: bool) -> list[Row]:
-    """Let the two systems take turns, in fresh processes."""
+    """Validate both systems alternately, in new processes."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "nodes").mkdir()
@@ -61,7 +60,7 @@ def measure(*, long: bool) -> list[Row]:
         for size, path in zip(SIZES, paths, strict=True):
             path.write_text(system(size), encoding="utf-8")
         turns = [[_wall_time_s(path) for path in paths] for _ in range(10 if long else 3)]
-    small, large = (f"{size} nodes, {size * ENDS_PER_NODE} connections" for size in SIZES)
+    small, large = (f"{size} nodes, {size * PORTS_PER_NODE} connections" for size in SIZES)
     theirs, ours = zip(*turns, strict=True)
     return [Row(f"compose validate, {large}", "wall s", small, ours, theirs)]
 

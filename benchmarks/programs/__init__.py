@@ -1,1 +1,1 @@
-"""What is measured, each run as a process of its own."""
+"""The measured programs; each one runs in a separate process."""

@@ -1,8 +1,7 @@
-"""The least that Python does for a task: it wakes up, and hands a message from object to object.
+"""The minimum work for a task in Python: wake up and pass a message from object to object.
 
-The nodes are there, as by hand, but nothing is asked of ROS: no lifecycle, no quality of service,
-no other process, no counting, no containment of what callbacks raise. Whoever hands messages over
-in Python cannot need less.
+The nodes exist, as in the hand-written program, but messages do not use ROS: no lifecycle, QoS,
+other processes, counters or exception handling. This is a lower bound for Python code.
 """
 
 from __future__ import annotations
@@ -17,11 +16,11 @@ import rclpy
 from benchmarks.programs.hand_written import Relay
 from benchmarks.programs.payloads import make
 from benchmarks.programs.task import Place, Task, places, task_from_arguments
-from benchmarks.programs.work import COUNTS, hand_over, measure
+from benchmarks.programs.work import COUNTS, measure, print_result
 
 
 class Stage:
-    """Hears messages and passes them on."""
+    """Receive messages and pass them on."""
 
     __slots__ = ("following", "is_measured", "waiting")
 
@@ -43,11 +42,11 @@ READY: deque[Stage] = deque()
 
 
 def spin(first: Stage, task: Task) -> None:
-    """Send at the task's rate, for ever."""
+    """Send messages at the rate of the task, forever."""
     due_s = time.monotonic()
     while True:
         due_s += 1.0 / task.rate_hz
-        time.sleep(max(0.0, due_s - time.monotonic()))  # waking up is part of what is measured
+        time.sleep(max(0.0, due_s - time.monotonic()))  # the measurement includes waking up
         message = make(task.message)
         COUNTS.sent_ns = time.monotonic_ns()
         first.waiting.append(message)
@@ -58,7 +57,7 @@ def spin(first: Stage, task: Task) -> None:
 
 
 def first_stage(task: Task) -> Stage:
-    """Return what hears the messages of the first node of a chain or a hop."""
+    """Return the stage that receives the messages of the first node of a chain or a hop."""
     following: Stage | None = None
     for place in reversed([place for place in places(task) if is_reached(task, place)]):
         following = Stage(following, is_measured=not place.relays)
@@ -67,12 +66,12 @@ def first_stage(task: Task) -> Stage:
 
 
 def is_reached(task: Task, place: Place) -> bool:
-    """Say whether messages come to a node."""
+    """Return whether the node receives messages."""
     return place.index == 1 if task.shape == "hop" else place.index > 0
 
 
 def main() -> None:
-    """Make the nodes, measure, tell."""
+    """Create the nodes, measure, and print the result."""
     task = task_from_arguments()
     started_s = time.perf_counter()
     rclpy.init()
@@ -80,7 +79,7 @@ def main() -> None:
     for node in nodes:
         node.trigger_configure()
     threading.Thread(target=spin, args=(first_stage(task), task), daemon=True).start()
-    hand_over(measure(task, started_s))
+    print_result(measure(task, started_s))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The nodes of the composed systems, as anybody would write them."""
+"""The behaviors of the composed systems."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ TASKS: list[Task] = []
 
 
 class Relay(Behavior):
-    """Passes messages on."""
+    """Forwards messages."""
 
     def on_input(self, message: Any) -> None:
-        """Count the message and pass it on."""
+        """Count the message and forward it."""
         COUNTS.delivered += 1
         self.publishers.output.publish(message)
 
 
 class Listener(Behavior):
-    """Hears messages."""
+    """Receives messages."""
 
     def on_input(self, message: Any) -> None:
         """Count the message."""
@@ -35,72 +35,72 @@ class Listener(Behavior):
 
 
 class Meter(Behavior):
-    """Hears messages and how long they took."""
+    """Receives messages and records their latency."""
 
     def on_input(self, message: Any) -> None:
-        """Note how long it took."""
+        """Record the latency."""
         COUNTS.took_ns.append(time.monotonic_ns() - COUNTS.sent_ns)
         COUNTS.delivered += 1
 
 
 class Starter(Relay):
-    """The relay that sets the message going."""
+    """The relay that publishes the first message."""
 
     def on_activate(self) -> None:
-        """Nothing moves yet."""
+        """Reset the counter."""
         self.seen = 0
 
     def on_kick(self) -> None:
-        """Send a message when none is on its way."""
+        """Publish a message if none is in flight."""
         if needs_kick(self.seen):
             self.publishers.output.publish(make(TASKS[0].message))
         self.seen = COUNTS.delivered
 
 
 class Source(Behavior):
-    """Sends at a rate."""
+    """Publishes at a fixed rate."""
 
     def on_tick(self) -> None:
-        """Send a new message."""
+        """Publish a new message."""
         message = make(TASKS[0].message)
         COUNTS.sent_ns = time.monotonic_ns()
         self.publishers.output.publish(message)
 
 
 class Ticker(Relay):
-    """Notes when its timer is called."""
+    """Records the calls of its timer."""
 
     def on_tick(self) -> None:
-        """Note the time."""
+        """Record the time."""
         COUNTS.ticks_ns.append(time.monotonic_ns())
 
 
-class Asker(Relay):
-    """Calls a service, again and again."""
+class Caller(Relay):
+    """Calls a service repeatedly."""
 
     async def on_kick(self) -> None:
-        """Never come back: the timer leaves out what is due meanwhile."""
+        """Call forever; the timer skips its next calls."""
         while True:
             began_ns = time.monotonic_ns()
-            await self.clients.ask.call(Trigger.Request())
+            await self.clients.trigger.call(Trigger.Request())
             COUNTS.took_ns.append(time.monotonic_ns() - began_ns)
             COUNTS.delivered += 1
 
 
-class Answerer(Relay):
-    """Answers."""
+class Responder(Relay):
+    """Provides the service."""
 
-    def on_ask(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Answer at once."""
+    def on_trigger(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Respond immediately."""
         response.success = True
         return response
 
 
 class Sender(Relay):
-    """Sends goals, again and again."""
+    """Sends goals repeatedly."""
 
     async def on_kick(self) -> None:
-        """Never come back."""
+        """Send goals forever."""
         while True:
             began_ns = time.monotonic_ns()
             goal = await self.action_clients.go.send_goal(Navigate.Goal())
@@ -110,8 +110,8 @@ class Sender(Relay):
 
 
 class Worker(Relay):
-    """Reaches goals."""
+    """Executes goals."""
 
     def on_go(self, goal: Any) -> Navigate.Result:
-        """Be there at once."""
+        """Succeed immediately."""
         return Navigate.Result()

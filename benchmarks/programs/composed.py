@@ -1,4 +1,4 @@
-"""The system under measurement, as the composer runs it: from a YAML file, by its own host."""
+"""The measured system, run by the composer from a YAML file."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from typing import Any
 
 import yaml
 
-# What both sides import is imported before the clock starts.
+# Imported before the measurement starts, as in the hand-written program.
 from benchmarks.programs import behaviors
 from benchmarks.programs.payloads import TYPES
 from benchmarks.programs.task import Place, Task, places, task_from_arguments
-from benchmarks.programs.work import KICK_PERIOD_S, hand_over, measure
+from benchmarks.programs.work import KICK_PERIOD_S, measure, print_result
 from composer.loading import load
 from composer.plan import bring_up, tear_down
 from composer.runtime.host import Host, HostOptions
 from composer.runtime.supervision.events import BroughtUp, Event
 
 _KICK = {"kick": {"period_ms": KICK_PERIOD_S * 1000.0}}
-_ASK = {"ask": {"type": "std_srvs/srv/Trigger", "service": "/ask"}}
+_TRIGGER = {"trigger": {"type": "std_srvs/srv/Trigger", "service": "/trigger"}}
 _GO = {"go": {"type": "composer_interfaces/action/Navigate", "action": "/go"}}
 
 
 def system_tree(task: Task) -> dict[str, Any]:
-    """Return the system file."""
+    """Return the content of the system file."""
     return {
         "system": "measured" if task.part is None else f"measured_{task.part}",
         "executors": {"chosen": {"kind": task.executor}},
@@ -36,12 +36,12 @@ def system_tree(task: Task) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Bring the system up, measure, tell."""
+    """Bring the system up, measure, and print the result."""
     task = task_from_arguments()
     behaviors.TASKS.append(task)
     up = threading.Event()
 
-    def listen(event: Event) -> None:
+    def on_event(event: Event) -> None:
         if isinstance(event, BroughtUp):
             up.set()
 
@@ -51,15 +51,15 @@ def main() -> None:
         started_s = time.perf_counter()
         loading = load(path)
         if loading.system is None or not loading.runnable:
-            sys.exit("; ".join(str(finding) for finding in loading.diagnostics))
+            sys.exit("; ".join(str(item) for item in loading.diagnostics))
         system = loading.system
         options = HostOptions(tracing=task.tracing)
-        host = Host(system, bring_up(system), tear_down(system), options, report=listen)
+        host = Host(system, bring_up(system), tear_down(system), options, report=on_event)
         threading.Thread(target=host.run, daemon=True).start()
         if not up.wait(120.0):
             sys.exit("the system did not come up")
         figures = measure(task, started_s)
-    hand_over(figures)
+    print_result(figures)
 
 
 def _node(task: Task, place: Place) -> dict[str, Any]:
@@ -69,15 +69,15 @@ def _node(task: Task, place: Place) -> dict[str, Any]:
         "executor": "chosen",
     }
     port = {"type": TYPES[task.message], "external": task.part is not None}
-    if place.hears is not None and behavior is not behaviors.Source:
-        node["subscriptions"] = {"input": {**port, "topic": place.hears}}
-    if place.sends is not None:
-        node["publishers"] = {"output": {**port, "topic": place.sends}}
+    if place.input_topic is not None and behavior is not behaviors.Source:
+        node["subscriptions"] = {"input": {**port, "topic": place.input_topic}}
+    if place.output_topic is not None:
+        node["publishers"] = {"output": {**port, "topic": place.output_topic}}
     return node | more
 
 
 def _part(task: Task, place: Place) -> tuple[type[Any], dict[str, Any]]:
-    """Return the behaviour of a node, and what it has besides input and output."""
+    """Return the behavior of a node, and its keys other than the input and output ports."""
     source = (behaviors.Source, {"timers": {"tick": {"rate_hz": task.rate_hz}}})
     parts: dict[tuple[str, int], tuple[type[Any], dict[str, Any]]] = {
         ("ring", 0): (behaviors.Starter, {"timers": _KICK}),
@@ -86,12 +86,12 @@ def _part(task: Task, place: Place) -> tuple[type[Any], dict[str, Any]]:
         ("hop", 0): source,
         ("hop", 1): (behaviors.Meter, {}),
         ("timer", 0): (behaviors.Ticker, {"timers": {"tick": {"rate_hz": task.rate_hz}}}),
-        ("service", 0): (behaviors.Asker, {"timers": _KICK, "clients": _ASK}),
-        ("service", 1): (behaviors.Answerer, {"services": _ASK}),
+        ("service", 0): (behaviors.Caller, {"timers": _KICK, "clients": _TRIGGER}),
+        ("service", 1): (behaviors.Responder, {"services": _TRIGGER}),
         ("action", 0): (behaviors.Sender, {"timers": _KICK, "action_clients": _GO}),
         ("action", 1): (behaviors.Worker, {"action_servers": _GO}),
     }
-    passing = behaviors.Listener if place.sends is None else behaviors.Relay
+    passing = behaviors.Listener if place.output_topic is None else behaviors.Relay
     return parts.get((task.shape, place.index), (passing, {}))
 
 

@@ -1,4 +1,4 @@
-"""A node of the ring with dora, which starts it as a process: dora_relay.py INDEX COUNTS."""
+"""A node of the ring, started by dora as ``dora_relay.py INDEX COUNTS``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ring of nodes with dora: a dataflow with a process for each, and their daemon."""
+"""The ring of nodes with dora: a dataflow with a process per node, and a daemon."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.programs.task import Task, task_from_arguments
-from benchmarks.programs.work import WARM_UP_S, hand_over
+from benchmarks.programs.work import WARM_UP_S, print_result
 
 _RELAY = Path(__file__).with_name("dora_relay.py")
 _BEGINS_WITHIN_S, _ENDS_WITHIN_S = 15.0, 5.0
-_LOOK_EVERY_S = 0.05
+_POLL_PERIOD_S = 0.05
 
 
 def main() -> None:
@@ -30,12 +30,12 @@ def main() -> None:
         counts_file.write_bytes(bytes(8 * task.nodes))
         with counts_file.open("r+b") as file:
             counts = memoryview(mmap.mmap(file.fileno(), 0)).cast("Q")
-        # JSON is YAML, and what reads it needs no library here.
+        # JSON is valid YAML and needs no library here.
         dataflow = Path(folder, "ring.yml")
         dataflow.write_text(json.dumps(_dataflow(task, counts_file)), encoding="utf-8")
         with _running(dataflow) as daemon:
             figures = _measure(daemon, counts, task)
-    hand_over(figures)
+    print_result(figures)
 
 
 def _dataflow(task: Task, counts_file: Path) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def _dataflow(task: Task, counts_file: Path) -> dict[str, Any]:
 
 @contextmanager
 def _running(dataflow: Path) -> Iterator[int]:
-    """Let dora run it for the length of the block; yield the id of its process."""
+    """Context manager: run the dataflow; the value is the process ID of the daemon."""
     programs = Path(sys.executable).parent
     command = [programs / "dora", "run", dataflow.name]
     variables = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}"}
@@ -83,12 +83,12 @@ def _measure(daemon: int, counts: memoryview, task: Task) -> dict[str, Any]:
     until_s = time.monotonic() + _BEGINS_WITHIN_S
     while not sum(counts):
         if time.monotonic() > until_s:
-            sys.exit(f"nothing moved within {_BEGINS_WITHIN_S:g} s")
-        time.sleep(_LOOK_EVERY_S)  # between two looks
+            sys.exit(f"no message delivered within {_BEGINS_WITHIN_S:g} s")
+        time.sleep(_POLL_PERIOD_S)
     time.sleep(WARM_UP_S)  # as in work.py
     processes = _processes(daemon)
     delivered, cpu_s, wall_s = sum(counts), _cpu_s(processes), time.perf_counter()
-    time.sleep(task.seconds)  # the window that is measured
+    time.sleep(task.seconds)
     return {
         "cpu_s": _cpu_s(processes) - cpu_s,
         "wall_s": time.perf_counter() - wall_s,
@@ -97,13 +97,13 @@ def _measure(daemon: int, counts: memoryview, task: Task) -> dict[str, Any]:
 
 
 def _processes(daemon: int) -> list[int]:
-    """Return the daemon and everybody whom it started."""
+    """Return the daemon and its child processes."""
     children = Path(f"/proc/{daemon}/task").glob("*/children")
     return [daemon, *(int(child) for file in children for child in file.read_text().split())]
 
 
 def _cpu_s(processes: list[int]) -> float:
-    """Return their CPU time; a process has a clock for it, whose number Linux makes of its id."""
+    """Return the total CPU time, from the CPU clock of each process (clock_getcpuclockid(3))."""
     return sum(time.clock_gettime((~process << 3) | 2) for process in processes)
 
 

@@ -1,4 +1,4 @@
-"""The ring of nodes with ezmsg: a unit for each, all in one process."""
+"""The ring of nodes with ezmsg: a unit per node, in one process."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Any
 import ezmsg.core as ez
 
 from benchmarks.programs.task import task_from_arguments
-from benchmarks.programs.work import COUNTS, hand_over, measure
+from benchmarks.programs.work import COUNTS, measure, print_result
 
 TASK = task_from_arguments()
 
 
 class Relay(ez.Unit):
-    """Passes messages on."""
+    """Forwards messages."""
 
     INPUT = ez.InputStream(str)
     OUTPUT = ez.OutputStream(str)
@@ -29,17 +29,17 @@ class Relay(ez.Unit):
 
 
 class Starter(ez.Unit):
-    """Sets the message going, and measures."""
+    """Publishes the first message and measures."""
 
     OUTPUT = ez.OutputStream(str)
 
     @ez.publisher(OUTPUT)
     async def start(self) -> AsyncIterator[Any]:
         yield self.OUTPUT, "x" * 32
-        threading.Thread(target=self.tell, daemon=True).start()
+        threading.Thread(target=self.report, daemon=True).start()
 
-    def tell(self) -> None:
-        hand_over(measure(TASK, STARTED_S))
+    def report(self) -> None:
+        print_result(measure(TASK, STARTED_S))
 
 
 def main() -> None:

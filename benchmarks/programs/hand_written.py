@@ -1,4 +1,4 @@
-"""The same system written by hand: default rclpy lifecycle nodes on one of rclpy's executors."""
+"""The hand-written system: default rclpy lifecycle nodes on an executor of rclpy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from benchmarks.programs.payloads import CLASSES, make
 from benchmarks.programs.task import Place, Task, places, task_from_arguments
-from benchmarks.programs.work import COUNTS, hand_over, measure, needs_kick
+from benchmarks.programs.work import COUNTS, measure, needs_kick, print_result
 
 THREADS = 2
 QUEUE_DEPTH = 10
@@ -30,7 +30,7 @@ EXECUTORS = {
 
 
 class Relay(LifecycleNode):
-    """Hears messages and passes them on, as its place says."""
+    """Receives and forwards messages, depending on its place."""
 
     def __init__(self, task: Task, place: Place) -> None:
         super().__init__(f"node_{place.index}")
@@ -40,10 +40,12 @@ class Relay(LifecycleNode):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         kind = CLASSES[self.task.message]
-        if self.place.sends is not None:
-            self.output = self.create_lifecycle_publisher(kind, self.place.sends, QUEUE_DEPTH)
-        if self.place.hears is not None and not self.is_source:
-            self.create_subscription(kind, self.place.hears, self.callback(), QUEUE_DEPTH)
+        if self.place.output_topic is not None:
+            self.output = self.create_lifecycle_publisher(
+                kind, self.place.output_topic, QUEUE_DEPTH
+            )
+        if self.place.input_topic is not None and not self.is_source:
+            self.create_subscription(kind, self.place.input_topic, self.callback(), QUEUE_DEPTH)
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -59,7 +61,7 @@ class Relay(LifecycleNode):
     def callback(self) -> Callable[[Any], None]:
         if not self.place.relays:
             return self.on_measured_input
-        return self.on_last_input if self.place.sends is None else self.on_input
+        return self.on_last_input if self.place.output_topic is None else self.on_input
 
     def on_input(self, message: Any) -> None:
         COUNTS.delivered += 1
@@ -86,52 +88,52 @@ class Relay(LifecycleNode):
         COUNTS.ticks_ns.append(time.monotonic_ns())
 
 
-class Asker(Relay):
-    """Calls a service, again and again."""
+class Caller(Relay):
+    """Calls a service repeatedly."""
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.client = self.create_client(Trigger, "/ask")
-        self.is_under_way = False
+        self.client = self.create_client(Trigger, "/trigger")
+        self.is_pending = False
         return super().on_configure(state)
 
     def kick(self) -> None:
-        if not self.is_under_way and self.client.service_is_ready():
-            self.is_under_way = True
-            self.ask()
+        if not self.is_pending and self.client.service_is_ready():
+            self.is_pending = True
+            self.call()
 
-    def ask(self) -> None:
+    def call(self) -> None:
         self.began_ns = time.monotonic_ns()
-        self.client.call_async(Trigger.Request()).add_done_callback(self.on_answer)
+        self.client.call_async(Trigger.Request()).add_done_callback(self.on_response)
 
-    def on_answer(self, answer: Any) -> None:
+    def on_response(self, response: Any) -> None:
         COUNTS.took_ns.append(time.monotonic_ns() - self.began_ns)
         COUNTS.delivered += 1
-        self.ask()
+        self.call()
 
 
-class Answerer(Relay):
-    """Answers."""
+class Responder(Relay):
+    """Provides the service."""
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.create_service(Trigger, "/ask", self.on_ask)
+        self.create_service(Trigger, "/trigger", self.on_trigger)
         return super().on_configure(state)
 
-    def on_ask(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def on_trigger(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success = True
         return response
 
 
 class Sender(Relay):
-    """Sends goals, again and again."""
+    """Sends goals repeatedly."""
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         self.client = ActionClient(self, Navigate, "/go")
-        self.is_under_way = False
+        self.is_pending = False
         return super().on_configure(state)
 
     def kick(self) -> None:
-        if not self.is_under_way and self.client.server_is_ready():
-            self.is_under_way = True
+        if not self.is_pending and self.client.server_is_ready():
+            self.is_pending = True
             self.go()
 
     def go(self) -> None:
@@ -148,7 +150,7 @@ class Sender(Relay):
 
 
 class Worker(Relay):
-    """Reaches goals."""
+    """Executes goals."""
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         self.server = ActionServer(self, Navigate, "/go", self.on_go)
@@ -160,24 +162,24 @@ class Worker(Relay):
 
 
 PARTS = {
-    ("service", 0): Asker,
-    ("service", 1): Answerer,
+    ("service", 0): Caller,
+    ("service", 1): Responder,
     ("action", 0): Sender,
     ("action", 1): Worker,
 }
 
 
 def spin(executor: Any, task: Task) -> None:
-    """Let the executor work. EventsExecutor's ``spin`` does not wake up for timers or outsiders."""
-    wakes_by_itself = task.shape == "ring" and task.part is None
-    if task.executor == "EventsExecutor" and not wakes_by_itself:
+    """Spin. EventsExecutor.spin() does not wake up for timers and external messages."""
+    can_spin = task.shape == "ring" and task.part is None
+    if task.executor == "EventsExecutor" and not can_spin:
         while True:
             executor.spin_once(timeout_sec=1.0)
     executor.spin()
 
 
 def main() -> None:
-    """Bring the system up, measure, tell."""
+    """Bring the system up, measure, and print the result."""
     task = task_from_arguments()
     started_s = time.perf_counter()
     rclpy.init()
@@ -190,7 +192,7 @@ def main() -> None:
     for node in nodes:
         executor.add_node(node)
     threading.Thread(target=spin, args=(executor, task), daemon=True).start()
-    hand_over(measure(task, started_s, nodes[0].kick))
+    print_result(measure(task, started_s, nodes[0].kick))
 
 
 if __name__ == "__main__":

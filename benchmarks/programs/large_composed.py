@@ -1,4 +1,4 @@
-"""N nodes that do nothing, as the composer starts and stops them."""
+"""Start and stop N idle nodes with the composer."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from benchmarks.programs.phases import Phases, size_from_arguments
-from benchmarks.programs.work import hand_over
+from benchmarks.programs.work import print_result
 from composer.loading import load
 from composer.plan import bring_up, tear_down
 from composer.runtime.host import Host, HostOptions
@@ -20,7 +20,7 @@ LEAN = dict.fromkeys(("parameters", "rosout", "type_description", "lifecycle_ser
 
 
 def main() -> None:
-    """Bring the system up and down again, tell what that took."""
+    """Bring the system up and down, and print the timings."""
     size = size_from_arguments()
     tree: dict[str, Any] = {
         "system": "large",
@@ -30,7 +30,7 @@ def main() -> None:
         tree["introspection"] = LEAN
     phases = Phases()
 
-    def listen(event: Event) -> None:
+    def on_event(event: Event) -> None:
         if isinstance(event, BroughtUp):
             phases.has_started()
         elif isinstance(event, Stopping):
@@ -44,11 +44,11 @@ def main() -> None:
         if system is None:
             sys.exit("the system is not valid")
         options = HostOptions(run_for_s=0.0, stop_within_s=60.0, ends_process=True)
-        outcome = Host(system, bring_up(system), tear_down(system), options, listen).run()
+        outcome = Host(system, bring_up(system), tear_down(system), options, on_event).run()
         phases.has_stopped()
     if outcome.exit_code:
         sys.exit(outcome.reason)
-    hand_over(phases.figures)
+    print_result(phases.figures)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""N nodes that do nothing, by hand: default rclpy lifecycle nodes, destroyed one by one."""
+"""Start and stop N idle default rclpy lifecycle nodes, which are destroyed one by one."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import rclpy
 from rclpy.lifecycle import LifecycleNode
 
 from benchmarks.programs.phases import Phases, size_from_arguments
-from benchmarks.programs.work import hand_over
+from benchmarks.programs.work import print_result
 
 
 def main() -> None:
-    """Bring the nodes up and down again, tell what that took."""
+    """Bring the nodes up and down, and print the timings."""
     size = size_from_arguments()
     phases = Phases()
     phases.starts()
@@ -26,11 +26,11 @@ def main() -> None:
         for node in reversed(nodes):
             getattr(node, f"trigger_{transition}")()
     for node in reversed(nodes):
-        node._state_machine.destroy_when_not_in_use()  # rclpy forgets it, and the node stays
+        node._state_machine.destroy_when_not_in_use()  # rclpy omits this
         node.destroy_node()
     rclpy.shutdown()
     phases.has_stopped()
-    hand_over(phases.figures)
+    print_result(phases.figures)
 
 
 if __name__ == "__main__":

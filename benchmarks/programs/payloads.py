@@ -1,4 +1,4 @@
-"""The messages that are sent: small, middle, large."""
+"""The messages: small, medium and large."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CLASSES = {"String": String, "LaserScan": LaserScan, "Image": Image}
 
 
 def make(kind: str) -> Any:
-    """Return a new message. A String holds 32 characters, others each time."""
+    """Return a new message. A String has 32 characters that differ each time."""
     match kind:
         case "LaserScan":
             return LaserScan(ranges=_RANGES, intensities=_RANGES)

@@ -1,4 +1,4 @@
-"""How long a system takes to start and to stop, in wall time and CPU time, and its memory."""
+"""Wall and CPU time of the start-up and shutdown of a system, and its memory."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from benchmarks.programs.work import memory_mb
 
 @dataclass(frozen=True, slots=True)
 class Size:
-    """How many nodes there are; ``lean`` nodes have given up what is for tools."""
+    """The number of nodes; ``lean`` disables introspection."""
 
     nodes: int
     lean: bool
 
 
 def size_from_arguments() -> Size:
-    """Read the command line."""
+    """Parse the command line."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--nodes", type=int, required=True)
     parser.add_argument("--lean", action="store_true")
@@ -27,26 +27,26 @@ def size_from_arguments() -> Size:
 
 @dataclass(slots=True)
 class Phases:
-    """Takes the times of a start and a stop. What is imported by then is not counted."""
+    """Timings of start-up and shutdown, without imports."""
 
     figures: dict[str, float] = field(default_factory=dict)
     _began_s: tuple[float, float] = (0.0, 0.0)
 
     def starts(self) -> None:
-        """Note that the start begins."""
+        """Mark the begin of the start-up."""
         self._began_s = _now_s()
 
     def has_started(self) -> None:
-        """Note that all nodes are active."""
+        """Mark that all nodes are active."""
         self._end("start")
         self.figures["memory_mb"] = memory_mb()
 
     def stops(self) -> None:
-        """Note that the stop begins."""
+        """Mark the begin of the shutdown."""
         self._began_s = _now_s()
 
     def has_stopped(self) -> None:
-        """Note that the nodes are gone from the ROS graph."""
+        """Mark that the nodes have left the ROS graph."""
         self._end("stop")
 
     def _end(self, what: str) -> None:

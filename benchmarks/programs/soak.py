@@ -1,4 +1,4 @@
-"""Lets a system do a day's work in minutes and looks at its memory meanwhile."""
+"""Sample the memory of a system under load."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from rclpy.parameter import Parameter
 from benchmarks.programs import behaviors
 from benchmarks.programs.composed import system_tree
 from benchmarks.programs.task import Task
-from benchmarks.programs.work import COUNTS, hand_over, memory_mb
+from benchmarks.programs.work import COUNTS, memory_mb, print_result
 from composer.loading import load
 from composer.plan import bring_up, tear_down
 from composer.runtime.host import Host
 from composer.runtime.node.node import RunningNode
 from composer.runtime.supervision.events import BroughtUp, Event
 
-#: A day's work in little.
+#: The total work.
 MESSAGES, TIMER_CHANGES, CYCLES = 10_000_000, 10_000, 1_000
-_STEPS = 100  # looks at the memory
+_STEPS = 100  # samples of the memory
 _CYCLE = ("deactivate", "cleanup", "configure", "activate")
-_PATIENCE_S = 30.0
+_TIMEOUT_S = 30.0
 _MORE = {
     "ticking": {
         "parameters": {"rate_hz": {"type": "double", "default": 50.0}},
@@ -36,18 +36,18 @@ _MORE = {
         "timers": {"tick": {"rate_hz": "{parameters.rate_hz}", "set": {"ticks": "{count}"}}},
     },
     "cycling": {
-        "publishers": {"said": {"type": "std_msgs/msg/String", "external": True}},
+        "publishers": {"output": {"type": "std_msgs/msg/String", "external": True}},
         "subscriptions": {
-            "heard": {"type": "std_msgs/msg/String", "external": True, "log": "heard"}
+            "input": {"type": "std_msgs/msg/String", "external": True, "log": "received"}
         },
-        "services": {"asked": {"type": "std_srvs/srv/Trigger", "log": "asked"}},
-        "timers": {"tick": {"rate_hz": 100, "publish": {"said": {"data": "number {count}"}}}},
+        "services": {"trigger": {"type": "std_srvs/srv/Trigger", "log": "called"}},
+        "timers": {"tick": {"rate_hz": 100, "publish": {"output": {"data": "number {count}"}}}},
     },
 }
 
 
 def main() -> None:
-    """Bring the system up, work, tell."""
+    """Bring the system up, run the load, and print the result."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--share", type=float, default=1.0)
     share = parser.parse_args().share
@@ -55,7 +55,7 @@ def main() -> None:
     behaviors.TASKS.append(task)
     up = threading.Event()
 
-    def listen(event: Event) -> None:
+    def on_event(event: Event) -> None:
         if isinstance(event, BroughtUp):
             up.set()
 
@@ -66,15 +66,15 @@ def main() -> None:
         path.write_text(yaml.safe_dump(tree, sort_keys=False), encoding="utf-8")
         loading = load(path)
         if loading.system is None or not loading.runnable:
-            sys.exit("; ".join(finding.message for finding in loading.diagnostics))
+            sys.exit("; ".join(item.message for item in loading.diagnostics))
         system = loading.system
-        host = Host(system, bring_up(system), tear_down(system), report=listen)
+        host = Host(system, bring_up(system), tear_down(system), report=on_event)
         threading.Thread(target=host.run, daemon=True).start()
-        if not up.wait(_PATIENCE_S):
+        if not up.wait(_TIMEOUT_S):
             sys.exit("the system did not come up")
         started_s = time.monotonic()
         memory = list(_work(host._crew.nodes, share))
-    hand_over(
+    print_result(
         {
             "memory_mb": memory,
             "messages": COUNTS.delivered,
@@ -84,7 +84,7 @@ def main() -> None:
 
 
 def _work(nodes: dict[str, RunningNode], share: float) -> Iterator[float]:
-    """Do everything at once, and yield the resident memory after each step."""
+    """Run all kinds of load, and yield the resident memory after each step."""
     for step in range(1, _STEPS + 1):
         for change in _due(TIMER_CHANGES * share, step):
             _set_rate(nodes["ticking"], 50.0 + change % 50)
@@ -96,14 +96,14 @@ def _work(nodes: dict[str, RunningNode], share: float) -> Iterator[float]:
 
 
 def _due(total: float, step: int) -> range:
-    """Return which of ``total`` are to be done in a step."""
+    """Return the indices of the ``total`` operations that belong to a step."""
     return range(round(total * (step - 1) / _STEPS), round(total * step / _STEPS))
 
 
 def _set_rate(node: RunningNode, rate_hz: float) -> None:
     ros = node.cores[0].node
     done: Any = node.loop.run(
-        lambda: ros.set_parameters([Parameter("rate_hz", value=rate_hz)]), _PATIENCE_S
+        lambda: ros.set_parameters([Parameter("rate_hz", value=rate_hz)]), _TIMEOUT_S
     )
     if not done[0].successful:
         sys.exit(f"rate_hz was not set: {done[0].reason}")
@@ -115,7 +115,7 @@ def _cycle(node: RunningNode) -> None:
         node.loop.run_task(node.change(transition)).add_done_callback(
             lambda _, ended=ended: ended.set()
         )
-        if not ended.wait(_PATIENCE_S):
+        if not ended.wait(_TIMEOUT_S):
             sys.exit(f"{transition} did not end")
     if node.state != "active":
         sys.exit(f"the node is {node.state} after a cycle")

@@ -1,4 +1,4 @@
-"""What a measured program is to do, and how its nodes are joined: the same for every way."""
+"""The task of a measured program and the topology of its nodes."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ SHAPES = ("ring", "chain", "star", "hop", "timer", "service", "action")
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """How large the system is, and what happens in it for how long.
+    """The size of the system, and what it does for how long.
 
-    ``shape``: in a *ring* one message goes round and round; in a *chain* and a *star* the first
-    node sends at ``rate_hz``, and the others pass it on or hear it; in a *hop* the second node
-    alone hears it; a *timer* ticks in the first node; the first node asks the second by *service*
-    or *action*. What has no part in it is there and idle. ``part`` is the index of
-    the one node of a ring that this process has, when the others are other processes. ``seconds``
-    do not count when it is to last until a line comes on standard input.
+    ``shape``: in a *ring*, one message circulates; in a *chain* and a *star*, the first node
+    publishes at ``rate_hz`` and the others forward or receive the messages; in a *hop*, only the
+    second node receives them; with *timer*, the first node has a timer; with *service* and
+    *action*, the first node calls the second. All other nodes are idle. ``part`` is the index of
+    the node of a ring that this process runs, if each node has a process. ``seconds`` is ignored
+    with ``until_stopped``: the task then runs until a line arrives on standard input.
     """
 
     executor: str
@@ -29,26 +29,26 @@ class Task:
     message: str
     part: int | None
     tracing: bool
-    until_told: bool = False
+    until_stopped: bool = False
 
     @property
     def is_timed(self) -> bool:
-        """Whether something happens at a rate, and not as fast as it can."""
+        """Whether the task has a fixed rate."""
         return self.shape in ("chain", "star", "hop", "timer")
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """One node: what it hears and what it sends to, None for nothing, and whether it passes on."""
+    """One node: its input and output topics, if any, and whether it forwards messages."""
 
     index: int
-    hears: str | None
-    sends: str | None
+    input_topic: str | None
+    output_topic: str | None
     relays: bool = True
 
 
 def places(task: Task) -> Iterator[Place]:
-    """Yield the nodes that this process is to run."""
+    """Yield the nodes of this process."""
     for index in range(task.nodes):
         if task.part in (None, index):
             yield _place(task, index)
@@ -69,12 +69,12 @@ def _place(task: Task, index: int) -> Place:
 
 
 def topic(index: int) -> str:
-    """Return the topic that a node listens to."""
+    """Return the input topic of a node."""
     return f"/stage_{index}"
 
 
 def task_from_arguments() -> Task:
-    """Read the command line."""
+    """Parse the command line."""
     parser = argparse.ArgumentParser()
     parser.add_argument("executor")
     parser.add_argument("--shape", choices=SHAPES, required=True)
@@ -84,6 +84,6 @@ def task_from_arguments() -> Task:
     parser.add_argument("--message", default="String")
     parser.add_argument("--part", type=int)
     parser.add_argument("--no-tracing", dest="tracing", action="store_false")
-    parser.add_argument("--until-told", action="store_true")
+    parser.add_argument("--until-stopped", action="store_true")
     given = vars(parser.parse_args())
     return Task(**{field.name: given[field.name] for field in fields(Task)})

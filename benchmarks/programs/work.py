@@ -1,4 +1,4 @@
-"""How it is counted what a system does: by the same functions whoever runs it."""
+"""Counters and measurements that all programs share."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.processes import BEGUN_LINE, RESULT_MARK
+from benchmarks.processes import RESULT_MARK, STARTED_LINE
 from benchmarks.programs.task import Task
 
 KICK_PERIOD_S = 0.2
 _BYTES_PER_MB = 1_000_000
-_PATIENCE_S, _PATIENCE_S_PER_PART = 5.0, 3.0
+_TIMEOUT_S, _TIMEOUT_S_PER_PART = 5.0, 3.0
 WARM_UP_S = 0.3
-_OTHERS_LAST_S = 120.0  # is over long before; nobody may be left to end the other parts
+_OTHERS_LAST_S = 120.0  # longer than any measurement; limits the lifetime of orphaned processes
 
 
 @dataclass(slots=True)
 class Counts:
-    """What callbacks write and the main thread reads. ``took_ns`` are latencies and round trips.
+    """Counters, written by callbacks and read by the main thread.
 
-    ``sent_ns`` is when the message that is on its way was published.
+    ``took_ns`` are latencies and round trips; ``sent_ns`` is when the message in flight was
+    published.
     """
 
     delivered: int = 0
@@ -38,7 +39,7 @@ COUNTS = Counts()
 
 
 def needs_kick(seen: int) -> bool:
-    """Say whether nothing moved since ``seen``: the first messages may precede the matching."""
+    """Return whether nothing was delivered since ``seen``: messages before matching are lost."""
     return COUNTS.delivered == seen
 
 
@@ -53,20 +54,20 @@ def measure(
     started_s: float,
     kick: Callable[[], None] = lambda: None,
 ) -> dict[str, Any]:
-    """Let the running system work for a while and return what that took.
+    """Let the running system work for a while and return the measurements.
 
-    ``kick`` is called until something moves; a system that kicks itself needs none.
+    ``kick`` is called until the first delivery; systems that start by themselves need none.
     """
     figures: dict[str, Any] = {
         "start_s": time.perf_counter() - started_s,
         "memory_mb": memory_mb(),
     }
-    if task.part:  # the first measures
-        time.sleep(_OTHERS_LAST_S)  # its nodes work on threads of their own
+    if task.part:  # the first part measures
+        time.sleep(_OTHERS_LAST_S)  # its nodes run on other threads
         os._exit(0)
     parts = 0 if task.part is None else task.nodes
-    _wait_for_work(kick, _PATIENCE_S + _PATIENCE_S_PER_PART * parts)
-    time.sleep(WARM_UP_S)  # caches are cold, and the first messages wait for each other
+    _wait_for_work(kick, _TIMEOUT_S + _TIMEOUT_S_PER_PART * parts)
+    time.sleep(WARM_UP_S)  # caches are cold at first
     delivered, ticks, took = COUNTS.delivered, len(COUNTS.ticks_ns), len(COUNTS.took_ns)
     cpu_s, wall_s = time.process_time(), time.perf_counter()
     _wait_for_the_end(task)
@@ -78,26 +79,26 @@ def measure(
     return figures
 
 
-def hand_over(figures: dict[str, Any]) -> None:
-    """Print the result and end at once: how a system ends is not measured here."""
+def print_result(figures: dict[str, Any]) -> None:
+    """Print the result and exit immediately, without tear-down."""
     print(RESULT_MARK + json.dumps(figures), flush=True)
     sys.stderr.flush()
     os._exit(0)
 
 
 def _wait_for_the_end(task: Task) -> None:
-    if task.until_told:
-        print(BEGUN_LINE, flush=True)
+    if task.until_stopped:
+        print(STARTED_LINE, flush=True)
         sys.stdin.readline()
     else:
         time.sleep(task.seconds)
 
 
-def _wait_for_work(kick: Callable[[], None], patience_s: float) -> None:
-    until_s = time.monotonic() + patience_s
+def _wait_for_work(kick: Callable[[], None], timeout_s: float) -> None:
+    until_s = time.monotonic() + timeout_s
     while not (COUNTS.delivered or COUNTS.ticks_ns or COUNTS.took_ns):
         if time.monotonic() > until_s:
-            print(f"nothing moved within {patience_s:g} s", file=sys.stderr, flush=True)
+            print(f"no message delivered within {timeout_s:g} s", file=sys.stderr, flush=True)
             os._exit(1)
         kick()
         time.sleep(KICK_PERIOD_S)

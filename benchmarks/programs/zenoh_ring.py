@@ -1,4 +1,4 @@
-"""The ring of nodes with Zenoh: a publisher and a subscriber for each, in one session."""
+"""The ring of nodes with Zenoh: a publisher and a subscriber per node, in one session."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import zenoh
 
 from benchmarks.programs.task import task_from_arguments, topic
-from benchmarks.programs.work import COUNTS, hand_over, measure, needs_kick
+from benchmarks.programs.work import COUNTS, measure, needs_kick, print_result
 
 
 def main() -> None:
@@ -31,7 +31,7 @@ def main() -> None:
 
         return on_input
 
-    kept = [session.declare_subscriber(key, relay(index)) for index, key in enumerate(keys)]
+    subscribers = [session.declare_subscriber(key, relay(index)) for index, key in enumerate(keys)]
     seen = [0]
 
     def kick() -> None:
@@ -40,8 +40,8 @@ def main() -> None:
         seen[0] = COUNTS.delivered
 
     figures = measure(task, started_s, kick)
-    del kept
-    hand_over(figures)
+    del subscribers
+    print_result(figures)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A day's work in little, messages, timers and lifecycle at once: memory stays where it was."""
+"""Memory does not grow under a load of messages, timers and lifecycle transitions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from benchmarks.processes import run_program
 from benchmarks.soak import after_fifths
 
-#: A byte a message would be 8 MB in all, and 16 bytes would be 2.6 MB in the short version.
+#: A leak of one byte per message would be 8 MB, and of 16 bytes 2.6 MB in the short version.
 GROWTH_MB = 2.0
 
 
@@ -22,7 +22,7 @@ def test_memory_is_flat_after_the_first_fifth(share: float) -> None:
         "--share",
         str(share),
         timeout_s=50.0 if share < 1.0 else 880.0,
-        variables=os.environ,  # the domain that no test beside this one is in
+        variables=os.environ,  # the ROS domain of this test
     )
     assert figures["messages"] >= share * 10_000_000
     first_mb, *later_mb = after_fifths(figures["memory_mb"])

@@ -1,4 +1,4 @@
-"""A lifecycle node as anybody would write it, until it is killed."""
+"""A lifecycle node that runs until it is killed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from rclpy.lifecycle import LifecycleNode
 
 
 def main() -> None:
-    """Serve /arm."""
+    """Run the node /arm."""
     rclpy.init()
     rclpy.spin(LifecycleNode("arm"))
 

@@ -1,8 +1,7 @@
-"""The least that a node in Python does to pass a message on to another process.
+"""The minimum work to forward a message to another process in Python.
 
-rcl wakes its thread up, which takes the message and publishes it, by rclpy. There is no executor,
-lifecycle, timer, counting, or containment of what callbacks raise. Fast DDS has the profile that
-the composer's processes have.
+rcl wakes up a thread that takes the message and publishes it with rclpy, without executor,
+lifecycle, timers, counters or exception handling. Fast DDS uses the profile of the composer.
 """
 
 from __future__ import annotations
@@ -18,13 +17,13 @@ from rclpy.subscription import Subscription
 from benchmarks.programs.hand_written import QUEUE_DEPTH
 from benchmarks.programs.payloads import CLASSES, make
 from benchmarks.programs.task import places, task_from_arguments
-from benchmarks.programs.work import COUNTS, hand_over, measure, needs_kick
+from benchmarks.programs.work import COUNTS, measure, needs_kick, print_result
 from composer.runtime.executors.readiness import MESSAGE, Signal
 from composer.runtime.process.dds_profiles import use_discovery_profile
 
 
 def pass_on(subscription: Subscription, publisher: Publisher) -> None:
-    """Publish what comes, for ever."""
+    """Forward messages, forever."""
     signal = Signal()
     os.set_blocking(signal.fd, True)
     signal.attach(subscription.handle, MESSAGE)
@@ -37,7 +36,7 @@ def pass_on(subscription: Subscription, publisher: Publisher) -> None:
 
 
 def main() -> None:
-    """Make the node of this process, measure, tell."""
+    """Create the node of this process, measure, and print the result."""
     task = task_from_arguments()
     (place,) = places(task)
     kind = CLASSES[task.message]
@@ -45,8 +44,8 @@ def main() -> None:
     use_discovery_profile(os.environ)
     rclpy.init()
     node = rclpy.create_node(f"node_{place.index}")
-    publisher = node.create_publisher(kind, place.sends, QUEUE_DEPTH)
-    subscription = node.create_subscription(kind, place.hears, lambda _: None, QUEUE_DEPTH)
+    publisher = node.create_publisher(kind, place.output_topic, QUEUE_DEPTH)
+    subscription = node.create_subscription(kind, place.input_topic, lambda _: None, QUEUE_DEPTH)
     threading.Thread(target=pass_on, args=(subscription, publisher), daemon=True).start()
     seen = 0
 
@@ -56,7 +55,7 @@ def main() -> None:
             publisher.publish(make(task.message))
         seen = COUNTS.delivered
 
-    hand_over(measure(task, started_s, kick))
+    print_result(measure(task, started_s, kick))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""How long commands to what runs take: from the start of the process to its end, with the answer.
+"""Wall time of commands on a running system, from the start of the process to its exit.
 
-Beside them run systems/pipeline.yaml and a lifecycle node that somebody else wrote. What it is held
-against is a script by hand that knows the service it wants and asks it once; it lists nothing and
-waits for nobody else. The commands take turns with it.
+The ROS graph contains systems/pipeline.yaml and a separate lifecycle node. The baseline is a
+hand-written script that calls one service, whose name it knows, without listing nodes. The commands
+and the script run alternately.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from benchmarks.figures import Row, percentile
 from benchmarks.pipeline import COMPOSED, running
 from benchmarks.processes import ROOT, ProgramFailed, environment, started
 
-BY_HAND = "a script by hand"
-A_SECOND = "a second"
-ALL = "every answer"
-_PATIENCE_S = 60.0
-_ASK_BY_HAND = ("-m", "benchmarks.programs.state_by_hand")
-#: Each leaves the system as the next one expects it.
+HAND_WRITTEN = "hand-written script"
+ONE_SECOND = "1 s"
+ALL = "all commands"
+_TIMEOUT_S = 60.0
+_SCRIPT = ("-m", "benchmarks.programs.get_state")
+#: Each command leaves the system in the state that the next one expects.
 COMMANDS = (
     "ps",
     "ps pipeline",
@@ -42,28 +42,37 @@ COMMANDS = (
 
 
 def measure(*, long: bool) -> list[Row]:
-    """Let the commands take turns. Raises ProgramFailed when one fails."""
+    """Measure the commands alternately. Raises ProgramFailed if one fails."""
     domain = environment()
     with ExitStack() as stack:
         stack.enter_context(running(COMPOSED, domain))
-        stack.enter_context(started("lifecycle_node_by_hand", variables=domain))
+        stack.enter_context(started("lifecycle_node", variables=domain))
         _wait_for_both(domain)
         turns = [_turn(domain) for _ in range(60 if long else 8)]
-    theirs = tuple(turn[BY_HAND] for turn in turns)
-    answers = {name: tuple(turn[name] for turn in turns) for name in COMMANDS}
+    theirs = tuple(turn[HAND_WRITTEN] for turn in turns)
+    times_ms = {name: tuple(turn[name] for turn in turns) for name in COMMANDS}
     rows = [
-        Row(f"compose {name}", "wall ms", BY_HAND, ours, theirs) for name, ours in answers.items()
+        Row(f"compose {name}", "wall ms", HAND_WRITTEN, ours, theirs)
+        for name, ours in times_ms.items()
     ]
-    every = [answer for ours in answers.values() for answer in ours]
+    every = [time_ms for ours in times_ms.values() for time_ms in ours]
     return rows + [
-        Row(f"{ALL}, p{100 * share:g}", "wall ms", A_SECOND, (percentile(every, share),), (1000.0,))
+        Row(
+            f"{ALL}, p{100 * share:g}",
+            "wall ms",
+            ONE_SECOND,
+            (percentile(every, share),),
+            (1000.0,),
+        )
         for share in (0.5, 0.9, 0.99)
     ]
 
 
 def _turn(domain: Mapping[str, str]) -> dict[str, float]:
-    ways = {BY_HAND: _ASK_BY_HAND} | {name: ("-m", "composer", *name.split()) for name in COMMANDS}
-    return {name: 1000.0 * _time_s(arguments, domain) for name, arguments in ways.items()}
+    variants = {HAND_WRITTEN: _SCRIPT} | {
+        name: ("-m", "composer", *name.split()) for name in COMMANDS
+    }
+    return {name: 1000.0 * _time_s(arguments, domain) for name, arguments in variants.items()}
 
 
 def _time_s(arguments: Sequence[str], domain: Mapping[str, str]) -> float:
@@ -82,13 +91,13 @@ def _run(arguments: Sequence[str], domain: Mapping[str, str]) -> subprocess.Comp
         env=domain,
         capture_output=True,
         text=True,
-        timeout=_PATIENCE_S,
+        timeout=_TIMEOUT_S,
         check=False,
     )
 
 
 def _wait_for_both(domain: Mapping[str, str]) -> None:
-    until_s = time.monotonic() + _PATIENCE_S
+    until_s = time.monotonic() + _TIMEOUT_S
     while "/arm" not in (nodes := _run(("-m", "composer", "lifecycle", "nodes"), domain).stdout):
         if time.monotonic() > until_s:
-            raise ProgramFailed(f"the node by hand did not come up; there are: {nodes}")
+            raise ProgramFailed(f"/arm did not come up; nodes: {nodes}")

@@ -1,4 +1,4 @@
-"""Holds running programs back, so that several can take turns without starting anew each time."""
+"""Running programs that are paused, so that several can run alternately without restarts."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Self
 
-from benchmarks.processes import BEGUN_LINE, ROOT, ProgramFailed, command, no_result, result_in
+from benchmarks.processes import ROOT, STARTED_LINE, ProgramFailed, command, no_result, result_in
 
 
-class Held:
-    """Programs of ``benchmarks.programs`` that are up in its block, and at work in :meth:`work`.
+class PausedPrograms:
+    """Context manager: programs of ``benchmarks.programs`` that run only during :meth:`work`.
 
-    ``parts`` are the name and the arguments of each; the first measures. They are a process group
-    of their own, which is stopped (SIGSTOP) meanwhile. Entering raises ProgramFailed when what is
-    measured has not begun after ``timeout_s``.
+    ``parts`` are the name and the arguments of each program; the first one measures. They form a
+    process group, which is otherwise stopped (SIGSTOP). Entering the context raises ProgramFailed
+    if the measurement has not started after ``timeout_s``.
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class Held:
         try:
             for part in self._parts:
                 self._processes.append(self._start(*part))
-            self._wait_until_begun()
+            self._wait_until_started()
         except BaseException:
             self._end()
             raise
@@ -45,17 +45,17 @@ class Held:
         self._end()
 
     def work(self, seconds: float) -> None:
-        """Let them work for a while."""
+        """Let the programs run for a while."""
         self._send(signal.SIGCONT)
         time.sleep(seconds)
         self._send(signal.SIGSTOP)
 
     def result(self) -> dict[str, Any]:
-        """Return what the first one measured. Raises ProgramFailed."""
+        """Return the result of the first program. Raises ProgramFailed."""
         self._send(signal.SIGCONT)
         first = self._processes[0]
         try:
-            output, errors = first.communicate("over\n", timeout=self._timeout_s)
+            output, errors = first.communicate("stop\n", timeout=self._timeout_s)
         except subprocess.TimeoutExpired as error:
             raise ProgramFailed(f"no result within {self._timeout_s:g} s") from error
         return result_in(output, errors, first.returncode)
@@ -63,7 +63,7 @@ class Held:
     def _start(self, name: str, *arguments: str) -> subprocess.Popen[str]:
         is_first = not self._processes
         return subprocess.Popen(
-            command(name, *arguments, "--until-told"),
+            command(name, *arguments, "--until-stopped"),
             cwd=ROOT,
             env=self._variables,
             stdin=subprocess.PIPE if is_first else subprocess.DEVNULL,
@@ -73,23 +73,23 @@ class Held:
             process_group=0 if is_first else self._processes[0].pid,
         )
 
-    def _wait_until_begun(self) -> None:
+    def _wait_until_started(self) -> None:
         first = self._processes[0]
         assert first.stdout is not None
-        patience = threading.Timer(self._timeout_s, first.kill)
-        patience.start()
+        timeout = threading.Timer(self._timeout_s, first.kill)
+        timeout.start()
         try:
             line = first.stdout.readline()
         finally:
-            patience.cancel()
-        if line.rstrip() != BEGUN_LINE:
+            timeout.cancel()
+        if line.rstrip() != STARTED_LINE:
             _, errors = first.communicate()
             killed = first.returncode == -signal.SIGKILL
-            late = f"nothing begun within {self._timeout_s:g} s"
+            late = f"not started within {self._timeout_s:g} s"
             raise ProgramFailed(late) if killed else no_result(errors, first.returncode)
 
     def _send(self, number: signal.Signals) -> None:
-        with suppress(ProcessLookupError):  # all of them have died
+        with suppress(ProcessLookupError):  # all have exited
             os.killpg(self._processes[0].pid, number)
 
     def _end(self) -> None:

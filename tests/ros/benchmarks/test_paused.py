@@ -1,4 +1,4 @@
-"""Programs that are measured side by side: at work in their turns alone, and gone afterwards."""
+"""Paused programs: they run only when requested, and exit afterwards."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.held import Held
+from benchmarks.paused import PausedPrograms
 from benchmarks.processes import ProgramFailed
 from tests.ros.support.loops import wait_until
 
-RING = ("bare_outside", "none", "--shape", "ring", "--nodes", "2", "--seconds", "1")
+RING = ("bare_external", "none", "--shape", "ring", "--nodes", "2", "--seconds", "1")
 BOTH = tuple((*RING, "--part", part) for part in "01")
 STOPPED = "T"
 
@@ -20,9 +20,9 @@ pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(60)]
 
 
 def states_of_children() -> dict[int, str]:
-    """Return the scheduler's state of each process that this one has started and that is there.
+    """Return the scheduler state of each child process; see proc_pid_stat(5).
 
-    See proc_pid_stat(5); any process may end between two looks.
+    Processes may exit while /proc is read.
     """
     states = {}
     for file in Path("/proc").glob("[0-9]*/stat"):
@@ -33,13 +33,13 @@ def states_of_children() -> dict[int, str]:
     return states
 
 
-def test_programs_work_in_their_turns_alone() -> None:
+def test_programs_run_only_when_requested() -> None:
     before = states_of_children().keys()
 
     def states() -> list[str]:
         return [state for process, state in states_of_children().items() if process not in before]
 
-    with Held(BOTH, os.environ, timeout_s=20.0) as held:
+    with PausedPrograms(BOTH, os.environ, timeout_s=20.0) as held:
         wait_until(lambda: states() == [STOPPED, STOPPED], "both stopped")
         held.work(0.1)
         wait_until(lambda: states() == [STOPPED, STOPPED], "both stopped again")
@@ -49,18 +49,18 @@ def test_programs_work_in_their_turns_alone() -> None:
 
 
 @pytest.mark.parametrize(
-    ("parts", "timeout_s", "said"),
+    ("parts", "timeout_s", "message"),
     [
-        pytest.param(BOTH, 0.01, "nothing begun within 0.01 s", id="late"),
+        pytest.param(BOTH, 0.01, "not started within 0.01 s", id="late"),
         pytest.param(
             [("bare", "none", "--shape", "bow")], 20.0, "exit code 2: .*invalid choice", id="bad"
         ),
     ],
 )
-def test_programs_that_do_not_begin_are_told_and_gone(
-    parts: tuple[tuple[str, ...], ...], timeout_s: float, said: str
+def test_programs_that_do_not_start_are_reported_and_killed(
+    parts: tuple[tuple[str, ...], ...], timeout_s: float, message: str
 ) -> None:
     before = states_of_children().keys()
-    with pytest.raises(ProgramFailed, match=said), Held(parts, os.environ, timeout_s):
-        pytest.fail("has begun")
+    with pytest.raises(ProgramFailed, match=message), PausedPrograms(parts, os.environ, timeout_s):
+        pytest.fail("has started")
     assert states_of_children().keys() == before
