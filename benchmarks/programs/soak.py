@@ -73,7 +73,7 @@ def main() -> None:
         if not up.wait(_TIMEOUT_S):
             sys.exit("the system did not come up")
         started_s = time.monotonic()
-        memory = list(_work(host._crew.nodes, share))
+        memory = list(_work(host._node_set.nodes, share))
     print_result(
         {
             "memory_mb": memory,
