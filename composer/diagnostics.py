@@ -1,4 +1,4 @@
-"""Findings: what is wrong, where, what was expected, and which rule says so (DESIGN: Findings)."""
+"""Findings: what is wrong, where, what was expected, and which rule says so."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The whole pure pipeline: from a file to its model and everything that is wrong with it.
 
 Document, kind, what is included, variables, schema, model, checks - each stage runs on whatever the
-one before left it, so that one run shows every finding (DESIGN: The way data flows).
+one before left it, so that one run shows every finding.
 """
 
 from __future__ import annotations

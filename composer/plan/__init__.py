@@ -1,9 +1,9 @@
-"""What is done to bring a system, or parts of it, up and down: steps, each with its cause.
+"""Plans: the steps that bring a system, or parts of it, up and down, each step with its cause.
 
-A plan is data. It decides everything and does nothing; the runtime does it and decides nothing
-(DESIGN: The way data flows). Nodes are configured and then activated behind the nodes they depend
-on, and taken down in reverse; what does not depend on each other may move at the same time. What
-waits for what is told by :mod:`composer.model.dependencies`.
+A plan is data: this package decides everything, and the runtime executes it without decisions of
+its own. Nodes are configured and then activated after the nodes that they depend on, and taken down
+in reverse order; independent nodes may move at the same time. :mod:`composer.model.dependencies`
+defines which node waits for which.
 """
 
 from composer.plan.reach import reach

@@ -1,4 +1,4 @@
-"""What a node may do right now, as its lifecycle state allows (DESIGN: The runtime, Lifecycle)."""
+"""What a node may do right now, as its lifecycle state allows."""
 
 from __future__ import annotations
 

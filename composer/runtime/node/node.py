@@ -1,7 +1,7 @@
 """The generic lifecycle node: any node of any system, made from its model.
 
 It builds its ports when it is configured, opens them when it is activated, and gives all of them
-back when it is cleaned up, shut down or has failed (DESIGN: The runtime, Lifecycle).
+back when it is cleaned up, shut down or has failed.
 """
 
 from __future__ import annotations
