@@ -1,6 +1,6 @@
-"""Writes composer/interfaces/jazzy.json from the interfaces installed beside this Python.
+"""Write composer/interfaces/jazzy.json from the interfaces installed in this environment.
 
-Run it in an environment with ROS 2 Jazzy and composer_interfaces when either has changed::
+Run it in an environment with ROS 2 Jazzy and composer_interfaces when either of them changes::
 
     python tools/bundle_interfaces.py
 """
@@ -17,15 +17,15 @@ TARGET = Path(__file__).parent.parent / "composer" / "interfaces" / "jazzy.json"
 
 
 def definitions() -> dict[str, str]:
-    """Return the bare text of every installed definition, by name."""
-    found: dict[str, str] = {}
+    """Return all installed definitions without comments, by name."""
+    texts: dict[str, str] = {}
     for prefix in installed_prefixes():
         for folder in FOLDERS:
             for name in prefix.names(folder):
                 definition = prefix.read(name)
                 if definition is not None and not definition.is_json:
-                    found.setdefault(name, without_comments(definition.text))
-    return dict(sorted(found.items()))
+                    texts.setdefault(name, without_comments(definition.text))
+    return dict(sorted(texts.items()))
 
 
 def main() -> None:

@@ -1,7 +1,7 @@
-"""Bytecode for an editable install, as pip makes it of what it installs otherwise.
+"""Hatchling build hook: compile the bytecode of an editable install.
 
-Hatchling calls it when it builds. Where Python is not to write bytecode itself, every start of
-``compose`` would compile all of it anew.
+pip compiles bytecode for regular installs only. In environments that disable writing bytecode,
+``compose`` would otherwise be compiled on every start.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
 class CompileEditable(BuildHookInterface):  # type: ignore[type-arg]
-    """Compiles the package where it is, when it is installed from there."""
+    """Compile the package in place for editable installs."""
 
     PLUGIN_NAME = "custom"
 
     def initialize(self, version: str, _build_data: dict[str, Any]) -> None:
-        """Do so for the version of a wheel that is called editable, and nothing for others."""
+        """Compile the package if ``version`` is "editable"."""
         if version == "editable":
             compileall.compile_dir(Path(self.root, "composer"), quiet=1)

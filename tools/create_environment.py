@@ -1,9 +1,9 @@
-"""Create the virtual environment that `make` works in, on a machine that may lack half of Python.
+"""Create the virtual environment for `make`, even if parts of Python are not installed.
 
     python3 tools/create_environment.py .venv
 
-Uses the standard library only and runs on old Pythons as well, to be able to say that they are too
-old. What is missing is said in one sentence on stderr, with exit code 1, before time is spent.
+Uses the standard library only and runs on old Python versions, to be able to report them. If a
+requirement is missing, prints a message on stderr and exits with status 1.
 """
 
 import importlib.util
@@ -17,7 +17,7 @@ import venv
 from pathlib import Path
 
 OLDEST_PYTHON = (3, 11)
-NEWEST_PYTHON = (3, 14)  # the newest that ROS 2 Jazzy's wheels on PyPI are built for
+NEWEST_PYTHON = (3, 14)  # the newest version with ROS 2 Jazzy wheels on PyPI
 
 
 def _version_text(version):
@@ -25,43 +25,43 @@ def _version_text(version):
 
 
 def python_problem(version, available):
-    """Return why a Python of this version will not do, or None.
+    """Return why this Python version is not supported, or None.
 
-    `available` are the versions that could be taken instead.
+    `available` are supported versions that are installed.
     """
     if OLDEST_PYTHON <= tuple(version[:2]) <= NEWEST_PYTHON:
         return None
-    wanted = f"{_version_text(OLDEST_PYTHON)} to {_version_text(NEWEST_PYTHON)}"
+    supported = f"{_version_text(OLDEST_PYTHON)} to {_version_text(NEWEST_PYTHON)}"
     if available:
-        remedy = f"run: make run PYTHON=python{_version_text(available[0])}"
+        fix = f"run: make run PYTHON=python{_version_text(available[0])}"
     else:
-        remedy = "install one and run: make run PYTHON=/path/to/python"
-    return f"this is Python {_version_text(version)}, and Python {wanted} is needed; {remedy}"
+        fix = "install one and run: make run PYTHON=/path/to/python"
+    return f"Python {supported} is required, but this is Python {_version_text(version)}; {fix}"
 
 
 def platform_problem(system, machine):
-    """Return why ROS wheels cannot be had on this platform, or None."""
+    """Return why ROS wheels are not available for this platform, or None."""
     if (system, machine) == ("Linux", "x86_64"):
         return None
     return (
-        f"ROS 2 wheels exist for Linux x86_64, not for {system} {machine}; "
-        "README.md says how to use a ROS 2 of your own"
+        f"ROS 2 wheels are available for Linux x86_64, not for {system} {machine}; "
+        "see README.md for how to use an existing ROS 2 installation"
     )
 
 
 def compiler_problem(has_compiler):
-    """Return how to get what compiles the interfaces, or None where it is."""
-    return None if has_compiler else "there is no C++ compiler; run: sudo apt install g++"
+    """Return how to install a compiler for the interfaces, or None if there is one."""
+    return None if has_compiler else "C++ compiler not found; run: sudo apt install g++"
 
 
 def _available_pythons():
-    """Return the versions on the PATH that would do, newest last, as far as they start."""
-    found = []
+    """Return the supported versions on the PATH that work, newest last."""
+    versions = []
     for minor in range(OLDEST_PYTHON[1], NEWEST_PYTHON[1] + 1):
         command = shutil.which(f"python3.{minor}")
         if command and subprocess.call([command, "-c", ""], stderr=subprocess.DEVNULL) == 0:
-            found.append((3, minor))
-    return found
+            versions.append((3, minor))
+    return versions
 
 
 def _has_compiler():
@@ -73,7 +73,7 @@ def _has_headers():
 
 
 def find_problem():
-    """Return the first thing that keeps this machine from building and running, or None."""
+    """Return the first missing requirement of this machine, or None."""
     return (
         platform_problem(platform.system(), platform.machine())
         or python_problem(sys.version_info, _available_pythons())
@@ -82,7 +82,7 @@ def find_problem():
 
 
 def _unpack_package(package, folder):
-    """Unpack a package of Debian or Ubuntu into ``folder``, without installing it.
+    """Unpack a Debian or Ubuntu package into ``folder``, without installing it.
 
     Raises OSError or CalledProcessError.
     """
@@ -95,17 +95,17 @@ def _unpack_package(package, folder):
 
 
 def _install_pip(python):
-    """Put pip into an environment that was made without, as Debian's Python makes them."""
+    """Install pip into an environment without it, as created by the Python of Debian."""
     with tempfile.TemporaryDirectory() as folder:
         _unpack_package("python3-pip-whl", Path(folder))
         wheel = next(Path(folder).glob("usr/share/python-wheels/pip-*.whl"))
-        # A wheel of pip is a zip file that Python can run.
+        # Python can run pip directly from its wheel, which is a zip file.
         command = [str(python), str(wheel / "pip"), "install", "--quiet", str(wheel)]
         subprocess.run(command, check=True)
 
 
 def create(folder):
-    """Create the environment with pip in it. Raises OSError or CalledProcessError."""
+    """Create the environment with pip. Raises OSError or CalledProcessError."""
     has_ensurepip = importlib.util.find_spec("ensurepip") is not None
     venv.create(folder, clear=True, symlinks=True, with_pip=has_ensurepip)
     if not has_ensurepip:
@@ -113,7 +113,7 @@ def create(folder):
 
 
 def fetch_headers(folder):
-    """Unpack Python's headers, as Debian and Ubuntu package them, without installing them.
+    """Unpack the Python headers of the Debian or Ubuntu package, without installing them.
 
     Raises OSError or CalledProcessError.
     """
@@ -121,7 +121,7 @@ def fetch_headers(folder):
 
 
 def _attempt(step, folder, purpose, package):
-    """Take a step; return why it failed and which package of the system makes up for it."""
+    """Run a step; return why it failed and which system package fixes it, or None."""
     try:
         step(folder)
     except (OSError, subprocess.CalledProcessError) as error:
@@ -130,11 +130,13 @@ def _attempt(step, folder, purpose, package):
 
 
 def main(folder):
-    """Create the environment, print what is in the way, and return the exit code."""
+    """Create the environment and return the exit code."""
     problem = find_problem() or _attempt(create, folder, "creating the environment", "python3-venv")
     if problem is None and not _has_headers():
         package = f"{Path(sys.executable).name}-dev"
-        problem = _attempt(fetch_headers, folder / "headers", "fetching Python's headers", package)
+        problem = _attempt(
+            fetch_headers, folder / "headers", "downloading the Python headers", package
+        )
     if problem:
         print(problem, file=sys.stderr)
         return 1

@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/pictures: systems of this repository, by the composer itself."""
+"""Draw the diagrams in docs/pictures with ``compose graph``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from composer.loading import load
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "docs" / "pictures"
 
-#: What is drawn of which system.
+#: The systems and their views.
 PICTURES = (
     ("talker_listener", View.NODES),
     ("pipeline", View.NODES),
@@ -27,7 +27,7 @@ PICTURES = (
 
 
 def pictures() -> dict[str, bytes]:
-    """Return all pictures by the name of their file, the same on every machine."""
+    """Return the SVG images by file name. They are identical on all machines."""
     return {f"{system}-{view}.svg": _drawn(system, view) for system, view in PICTURES}
 
 
@@ -41,7 +41,7 @@ def _drawn(name: str, view: View) -> bytes:
 
 
 def main() -> None:
-    """Draw them anew."""
+    """Write all diagrams."""
     FOLDER.mkdir(exist_ok=True)
     for name, drawn in pictures().items():
         (FOLDER / name).write_bytes(drawn)

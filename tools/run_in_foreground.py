@@ -1,11 +1,11 @@
-"""Run a command as the one that the terminal's keys speak to.
+"""Run a command as the foreground process group of the terminal.
 
     python3 tools/run_in_foreground.py compose run systems/pipeline.yaml
 
-Ctrl-C in a terminal reaches every process of the foreground group. Under make that is make as well,
-which calls it an error and ends with 130, however orderly the command ended. So the command gets a
-process group of its own and the terminal with it, as a shell does for its jobs; signals that arrive
-here are passed on. Without a terminal there is nothing to arrange.
+Ctrl-C sends SIGINT to all processes of the foreground group, including make, which then exits with
+an error even if the command shuts down cleanly. The command therefore runs in a separate process
+group, which becomes the foreground group, as in a shell. Signals that this script receives are
+forwarded. Without a terminal, the command is executed directly.
 """
 
 import contextlib
@@ -14,7 +14,7 @@ import signal
 import sys
 
 TERMINAL = 0
-#: All but the first are passed on.
+#: All except SIGCHLD are forwarded.
 AWAITED = (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -26,7 +26,7 @@ def _owns_terminal():
 
 
 def _give_terminal(group):
-    with contextlib.suppress(OSError):  # it may have been closed meanwhile
+    with contextlib.suppress(OSError):  # the terminal may be closed
         os.tcsetpgrp(TERMINAL, group)
 
 
@@ -42,12 +42,12 @@ def _start(command):
 
 
 def _wait(child):
-    """Return the wait status of the child's end; stop and go on together with it (Ctrl-Z, fg)."""
+    """Return the wait status of the child; stop and continue together with it (Ctrl-Z, fg)."""
     own_group = os.getpgrp()
     while True:
         number = signal.sigwait(AWAITED)
         if number != signal.SIGCHLD:
-            os.kill(child, number)  # it is there until it was waited for
+            os.kill(child, number)  # the process ID is valid until waitpid
             continue
         ended_or_stopped, status = os.waitpid(child, os.WUNTRACED | os.WNOHANG)
         if not ended_or_stopped:
@@ -65,9 +65,9 @@ def main(command):
     """Run the command and return its exit code as a shell would."""
     if not _owns_terminal():
         os.execvp(command[0], command)
-    # Whoever hands the terminal over from behind would be stopped by it.
+    # tcsetpgrp() from a background group would otherwise stop this process.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
-    # Blocked and waited for, none can come in the moment between a look and a sleep.
+    # Blocked signals are received by sigwait(), without a race.
     signal.pthread_sigmask(signal.SIG_BLOCK, AWAITED)
     code = os.waitstatus_to_exitcode(_wait(_start(command)))
     return code if code >= 0 else 128 - code
