@@ -54,10 +54,10 @@ def _mutations(seconds: float, first: int) -> None:
     from hypothesis import given, seed, settings  # noqa: PLC0415
 
     from tests.properties.test_validate_total import MISTAKEN, MISWRITTEN  # noqa: PLC0415
-    from tests.properties.validating import judge  # noqa: PLC0415
+    from tests.properties.validating import validate_and_check  # noqa: PLC0415
 
     def hold(data: bytes) -> None:
-        judge(data)
+        validate_and_check(data)
 
     many = settings(max_examples=EXAMPLES_PER_ROUND, deadline=None, database=None)
     end_s = time.monotonic() + seconds
@@ -104,10 +104,10 @@ def _guided(target: str, arguments: list[str]) -> None:
 
 
 def _file() -> Callable[[bytes], None]:
-    from tests.properties.validating import judge  # noqa: PLC0415
+    from tests.properties.validating import validate_and_check  # noqa: PLC0415
 
     def run_one(data: bytes) -> None:
-        judge(data)
+        validate_and_check(data)
 
     return run_one
 

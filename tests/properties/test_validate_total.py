@@ -13,7 +13,7 @@ from composer.assembly.canonical import canonical
 from composer.document.writing import write_document
 from composer.loading import findings_of, load
 from tests.properties.mutation import mutated
-from tests.properties.validating import INTERFACES, SHIPPED, contents, hold, judge
+from tests.properties.validating import INTERFACES, SHIPPED, contents, hold, validate_and_check
 
 CONTENTS = contents()
 TEXTS = [path.read_text(encoding="utf-8") for path in SHIPPED]
@@ -52,7 +52,7 @@ MISWRITTEN = spliced().map(str.encode)
 @settings(max_examples=150, deadline=None)
 @given(MISTAKEN)
 def test_files_with_mistakes(data: bytes) -> None:
-    judge(data)
+    validate_and_check(data)
 
 
 @settings(max_examples=100, deadline=None)
@@ -60,7 +60,7 @@ def test_files_with_mistakes(data: bytes) -> None:
 @example(b"")
 @example(b"system: a\nnodes: {b: {type: [x]}}\n")
 def test_files_with_pieces_out_of_place(data: bytes) -> None:
-    judge(data)
+    validate_and_check(data)
 
 
 #: The first is included under two names; the second extended by the type of a node.
@@ -109,4 +109,4 @@ def test_mistakes_in_what_is_included_and_extended(project: Path, part: bytes, b
 
 def test_shipped_files_are_clean() -> None:
     for text in TEXTS:
-        assert judge(text.encode("utf-8")) == []
+        assert validate_and_check(text.encode("utf-8")) == []

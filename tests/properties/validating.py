@@ -52,7 +52,7 @@ def contents() -> list[Any]:
     return [*(plain(tree) for tree in trees if tree is not None), *OTHERS]
 
 
-def judge(data: bytes) -> list[Diagnostic]:
+def validate_and_check(data: bytes) -> list[Diagnostic]:
     """Validate ``data`` as a file of this project, and hold the findings to their promises."""
     said = io.StringIO()
     with redirect_stdout(said), redirect_stderr(said):
