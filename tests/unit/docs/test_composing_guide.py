@@ -1,4 +1,4 @@
-"""The files in the guide about systems of systems are right."""
+"""The files in the guide to composing systems are valid."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NAMES = ("fleet.yaml", "robot.yaml", "changed.yaml", "cameras.yaml", "nodes/slow
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_file(tmp_path: Path, name: str) -> None:
+def test_the_file_is_valid(tmp_path: Path, name: str) -> None:
     (tmp_path / "nodes").mkdir()
     for other, head, block in zip(NAMES, HEADS, BLOCKS, strict=True):
         (tmp_path / other).write_text(head + block, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""docs/language.md is what the schemas say, and leads nowhere that is not."""
+"""docs/language.md is up to date, and the links in docs/ are valid."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ PAGE = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")
 GUIDES = sorted((ROOT / "docs").rglob("*.md"))
 
 
-def test_it_is_current() -> None:
-    made = runpy.run_path(str(ROOT / "tools" / "write_language.py"))["page"]()
-    assert made == PAGE, "run: python tools/write_language.py"
+def test_the_page_is_up_to_date() -> None:
+    page = runpy.run_path(str(ROOT / "tools" / "write_language.py"))["page"]()
+    assert page == PAGE, "run: python tools/write_language.py"
 
 
 @pytest.mark.parametrize("name", SCHEMAS)
-def test_every_key_has_its_row(name: str) -> None:
+def test_every_key_has_a_row(name: str) -> None:
     def keys(part: Any) -> set[str]:
         if isinstance(part, list):
             return set().union(*map(keys, part))
@@ -36,15 +36,15 @@ def test_every_key_has_its_row(name: str) -> None:
     assert {key for key in keys(schema(name)) if f"| `{key}` |" not in PAGE} == set()
 
 
-def test_the_example_is_right() -> None:
+def test_the_example_is_valid() -> None:
     (example,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
-    tree, findings = parse_document(SourceFile("example", example))
+    tree, diagnostics = parse_document(SourceFile("example", example))
     assert tree is not None
-    assert [*findings, *check_schema(tree, str(kind_of(tree)))] == []
+    assert [*diagnostics, *check_schema(tree, str(kind_of(tree)))] == []
 
 
 @pytest.mark.parametrize("page", GUIDES, ids=lambda path: path.name)
-def test_links_lead_somewhere(page: Path) -> None:
+def test_links_are_valid(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
     anchors = {re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in headings}
