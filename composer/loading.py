@@ -24,7 +24,7 @@ from composer.project import SETTINGS_FILE, Project, Settings
 from composer.project.choices import told, wrong_choices
 from composer.resolve import NOTHING_SAID, CommandLine, Overrides, read_overrides, resolve
 from composer.rules import Context, all_checks, run_checks
-from composer.rules.ignores import without_ignored
+from composer.rules.unused_ignore import without_ignored
 from composer.rules.unused_node_type import unused_node_types
 from composer.schema import check_schema, kind_of, kinds
 from composer.schema.kinds import check_kind

@@ -50,8 +50,8 @@ class Load:
         return sum(share.seconds for share in self.shares) / self.threads
 
     @property
-    def told(self) -> str:
-        """The sum, as a message shows it."""
+    def formula(self) -> str:
+        """The sum, as shown in messages."""
         ordered = self._ordered()
         terms = [str(share) for share in ordered[:SHOWN]]
         if len(ordered) > SHOWN:
@@ -87,7 +87,7 @@ def loads(context: Context) -> tuple[Load, ...]:
         shares.setdefault(name, []).extend(of_node)
         alone = tuple(share for share in of_node if not share.reentrant)
         if alone and name in declared and _threads(declared[name]) > 1:
-            found.append(Load(f"node '{node.name}', one at a time,", node.name.span, 1, alone))
+            found.append(Load(f"node '{node.name}' (one at a time)", node.name.span, 1, alone))
     for name, executor in declared.items():
         of_executor = tuple(shares.pop(name, ()))
         if of_executor:

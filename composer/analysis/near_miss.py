@@ -13,7 +13,7 @@ _OPPOSITES = {
     PortKind.SERVICE: PortKind.CLIENT,
     PortKind.ACTION_SERVER: PortKind.ACTION_CLIENT,
 }
-_OTHER_SIDE = _OPPOSITES | {sink: source for source, sink in _OPPOSITES.items()}
+COUNTERPARTS = _OPPOSITES | {sink: source for source, sink in _OPPOSITES.items()}
 
 #: For a kind of port and a type: the names such ports have, each with the nodes they belong to.
 _Names: TypeAlias = dict[tuple[PortKind, str], dict[str, set[str]]]
@@ -24,7 +24,7 @@ _LOOKED_AT = 5  # names, of which some may be of the very node or the very name
 def nearest_channel(context: Context, end: PortOfNode) -> str | None:
     """Return a hint at the name that ports of the other side and of the same type have."""
     port = end.port
-    wanted = (_OTHER_SIDE[port.kind], port.interface.value)
+    wanted = (COUNTERPARTS[port.kind], port.interface.value)
     nodes = context.once(_names).get(wanted, {})
     for name in vocabulary(tuple(nodes)).close(port.full_name, _LOOKED_AT):
         if name != port.full_name and nodes[name] != {end.node.name.value}:

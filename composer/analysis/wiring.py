@@ -66,12 +66,12 @@ def place_of(end: PortOfNode) -> tuple[Span, tuple[Label, ...]]:
 
 
 def external_hint(end: PortOfNode) -> str:
-    """Return how to say that the other end of a port is outside the system."""
+    """Return the hint for a port whose counterpart is an external node."""
     port = end.port
-    said = "external: true"
+    key = "external: true"
     if port.name.span.file != end.node.span.file:
-        said = f"{port.kind.section}: {{{port.name}: {{external: true}}}}"
-    return f"say '{said}' if somebody outside does"
+        key = f"{port.kind.section}: {{{port.name}: {{external: true}}}}"
+    return f"set '{key}' if an external node does"
 
 
 @dataclass(slots=True)

@@ -1,4 +1,4 @@
-"""An action that is over as soon as it begins."""
+"""An action server that returns its result immediately."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ RULE = register(
         code="RC332",
         name="action-as-service",
         severity=Severity.INFO,
-        summary="An action server gives its result at once, without feedback.",
+        summary="An action server returns its result immediately, without feedback.",
         why=(
-            "An action is for work that takes time, tells how far it is, and can be canceled. For "
-            "an answer at once a service does the same with a third of the endpoints."
+            "Actions are for long-running work that reports progress and can be canceled. For an "
+            "immediate response, a service does the same with a third of the endpoints."
         ),
         bad="""\
 system: pattern
@@ -42,7 +42,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at action servers that are declared in YAML throughout."""
+    """Check the action servers that are declared entirely in YAML."""
     for node in context.system.nodes:
         if node.behavior is not None:
             continue
@@ -50,7 +50,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             if port.result is not None and port.feedback is None:
                 yield Diagnostic(
                     RULE,
-                    f"action server '{port.name}' has a result at once, as a service would",
+                    f"action server '{port.name}' returns its result immediately, like a service",
                     port.name.span,
-                    hint="use a service, or give feedback",
+                    hint="use a service, or add feedback",
                 )

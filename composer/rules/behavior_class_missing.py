@@ -1,4 +1,4 @@
-"""A behaviour whose class is not in its module."""
+"""A behavior whose class is not defined in its module."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ RULE = register(
         code="RC432",
         name="behavior-class-missing",
         severity=Severity.ERROR,
-        summary="The module of a behaviour has no class of that name.",
-        why="The node could not be made.",
+        summary="The module of a behavior does not define a class of that name.",
+        why="The node cannot be created without the class.",
         bad="""\
 # file: system.yaml
-system: behaviour
+system: behavior
 nodes:
   planner: {behavior: planner:Planer}
 # file: planner.py
@@ -27,7 +27,7 @@ class Planner:
 """,
         good="""\
 # file: system.yaml
-system: behaviour
+system: behavior
 nodes:
   planner: {behavior: planner:Planner}
 # file: planner.py
@@ -39,12 +39,12 @@ class Planner:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look for the class of every behaviour whose module was read."""
+    """Check that the module of every behavior defines its class."""
     for _, source in context.once(behaviors):
         if not source.module_found or source.class_found or source.problem is not None:
             continue
         if source.path is None:
-            continue  # a compiled module: what is in it cannot be read
+            continue  # the contents of a compiled module cannot be read
         reference = source.reference
         yield Diagnostic(
             RULE,

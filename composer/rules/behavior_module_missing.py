@@ -1,4 +1,4 @@
-"""A behaviour in a module that is nowhere, or cannot be read."""
+"""A behavior module that does not exist or cannot be read."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ RULE = register(
         code="RC431",
         name="behavior-module-missing",
         severity=Severity.ERROR,
-        summary="The Python module of a behaviour is not found, or is not Python.",
+        summary="The Python module of a behavior does not exist or cannot be parsed.",
         why=(
-            "It is looked for beside the YAML file, in the project's nodes/, and where Python "
-            "would find it. The module is read as text; nothing in it is run."
+            "The module is searched for next to the YAML file, in the project's nodes/ folder, "
+            "and on Python's module search path. It is parsed, not imported."
         ),
         bad="""\
 # file: system.yaml
-system: behaviour
+system: behavior
 nodes:
   planner: {behavior: plannr:Planner}
 # file: planner.py
@@ -30,7 +30,7 @@ class Planner:
 """,
         good="""\
 # file: system.yaml
-system: behaviour
+system: behavior
 nodes:
   planner: {behavior: planner:Planner}
 # file: planner.py
@@ -42,16 +42,16 @@ class Planner:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look for the module of every behaviour."""
+    """Check that the module of every behavior exists and can be read."""
     for _, source in context.once(behaviors):
         reference = source.reference
         span = part_of(reference.text, 0, len(reference.module))
         if not source.module_found:
             yield Diagnostic(
                 RULE,
-                f"there is no Python module '{reference.module}'",
+                f"no Python module named '{reference.module}'",
                 span,
-                hint=f"expected {reference.module.replace('.', '/')}.py beside the YAML file",
+                hint=f"expected {reference.module.replace('.', '/')}.py next to the YAML file",
             )
         elif source.problem is not None:
             yield Diagnostic(RULE, f"module '{reference.module}' {source.problem}", span)

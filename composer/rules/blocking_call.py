@@ -1,4 +1,4 @@
-"""A handler that keeps everybody else waiting."""
+"""A handler that blocks its executor."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ RULE = register(
         code="RC436",
         name="blocking-call",
         severity=Severity.WARNING,
-        summary="A handler calls something that waits, and blocks its executor meanwhile.",
+        summary="A handler makes a blocking call, which blocks its executor.",
         why=(
-            "While a handler waits, no other callback of its executor runs: timers are late, "
-            "messages pile up, and a call to a node on the same executor never returns. Use "
+            "While a handler blocks, no other callback of its executor runs: timers fire late, "
+            "messages queue up, and a call to a node on the same executor never returns. Use "
             "'await' in an async handler, or a timer."
         ),
         bad="""\
 # file: system.yaml
-system: behaviour
+system: behavior
 nodes:
   counter:
     behavior: counter:Counter
@@ -40,7 +40,7 @@ class Counter:
 """,
         good="""\
 # file: system.yaml
-system: behaviour
+system: behavior
 nodes:
   counter:
     behavior: counter:Counter
@@ -63,12 +63,12 @@ _BLOCKING = re.compile(
     r"|(.+\.)?spin_until_future_complete"
     r"|(.+\.)?(sock|socket|connection|conn)\.(recv|recvfrom|recv_into|accept|connect)"
 )
-#: rclpy's own synchronous call; those of the composer's clients are awaited.
+#: rclpy's synchronous call; calls through the composer's clients are awaited.
 _SYNCHRONOUS_CALL = re.compile(r"(.+\.)?\w*(client|cli)\.call")
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at what the handlers of every behaviour call, also through their own methods."""
+    """Check what the handlers of every behavior call, directly or through their own methods."""
     for node, source in context.once(behaviors):
         places = dict.fromkeys(GENERAL_HANDLERS, source.reference.text.span)
         places |= {handler.name: handler.of.span for handler in handlers(node)}
@@ -80,7 +80,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
 def _handler(
     source: BehaviorSource, name: str, place: Span, seen: set[Span]
 ) -> Iterator[Diagnostic]:
-    """Report each line once, for the first handler that comes to it."""
+    """Report each call once, for the first handler that reaches it."""
     method = source.method(name)
     for call in calls_of(source, method) if method is not None else ():
         if _blocks(call) and call.span not in seen:
@@ -89,7 +89,7 @@ def _handler(
                 RULE,
                 f"handler '{name}' of '{source.reference.class_name}' blocks in '{call.name}'",
                 place,
-                (Label(call.span, "waits here"),),
+                (Label(call.span, "blocks here"),),
                 _hint(call),
             )
 
@@ -103,4 +103,4 @@ def _blocks(call: Call) -> bool:
 def _hint(call: Call) -> str:
     if call.name == "time.sleep":
         return "use 'await self.clock.sleep(...)' in an async handler"
-    return "await something that does not block, or use a timer"
+    return "await a non-blocking call, or use a timer"

@@ -1,4 +1,4 @@
-"""A chain with a gap in it."""
+"""A chain with a gap."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ RULE = register(
         code="RC416",
         name="broken-chain",
         severity=Severity.ERROR,
-        summary="A node of a chain does not hear the one before it.",
-        why="Nothing goes through the chain, and its latency says nothing.",
+        summary="A node of a chain does not subscribe to the topic of the previous publisher.",
+        why="No data flows through the chain, so its latency is meaningless.",
         bad="""\
 system: chain
 nodes:
@@ -44,7 +44,7 @@ chains:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at every two ports that follow each other in a chain."""
+    """Check each pair of consecutive ports in every chain."""
     system = context.system
     for chain in system.chains:
         for before, after in pairwise(chain.through):
@@ -56,9 +56,9 @@ def check(context: Context) -> Iterator[Diagnostic]:
             if not any(inputs(node, port.full_name)):
                 yield Diagnostic(
                     RULE,
-                    f"node '{node.name}' does not hear '{port.full_name}', "
+                    f"node '{node.name}' does not subscribe to '{port.full_name}', "
                     f"which '{before.text}' publishes",
                     after.text.span,
-                    (Label(before.text.span, "comes before it"),),
-                    f"let '{node.name}' subscribe to it, or name what is between the two",
+                    (Label(before.text.span, "the previous publisher"),),
+                    f"subscribe '{node.name}' to it, or add the missing publishers to the chain",
                 )

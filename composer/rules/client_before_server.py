@@ -1,4 +1,4 @@
-"""A client that is active before what it calls."""
+"""A client that starts before its server."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ RULE = register(
         code="RC403",
         name="client-before-server",
         severity=Severity.WARNING,
-        summary="A node that calls a service or action is started before the node that serves it.",
+        summary="A node that calls a service or action starts before the node that provides it.",
         why=(
-            "Servers are started before their clients, unless 'depends_on' says otherwise. Here "
-            "it does, so the first calls find no server."
+            "By default, servers start before their clients. Here 'depends_on' reverses the "
+            "order, so the first calls find no server."
         ),
         bad="""\
 system: order
@@ -47,7 +47,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Hold the order of the bring-up against services and actions."""
+    """Compare the bring-up order with the services and actions."""
     system = context.system
     if dependency_cycles(system) or not system.implied_dependencies:
         return
@@ -59,17 +59,16 @@ def check(context: Context) -> Iterator[Diagnostic]:
         server = channel.sources[0]
         for client in channel.sinks:
             if rank[client.node.name.value] < rank[server.node.name.value]:
-                yield _finding(channel, client, server)
+                yield _diagnostic(channel, client, server)
 
 
-def _finding(channel: Channel, client: PortOfNode, server: PortOfNode) -> Diagnostic:
+def _diagnostic(channel: Channel, client: PortOfNode, server: PortOfNode) -> Diagnostic:
     cause = next(iter(server.node.depends_on), None)
     place = cause.node.span if cause is not None else server.port.name.span
     return Diagnostic(
         RULE,
-        f"'{end_name(client)}' is started before '{end_name(server)}', "
-        f"the server of '{channel.name}'",
+        f"'{end_name(client)}' starts before '{end_name(server)}', the server of '{channel.name}'",
         client.port.name.span,
-        (Label(place, f"'{server.node.name}' has to wait"),),
-        f"let '{client.node.name}' depend on '{server.node.name}'",
+        (Label(place, f"'{server.node.name}' starts later"),),
+        f"make '{client.node.name}' depend on '{server.node.name}'",
     )

@@ -1,4 +1,4 @@
-"""A client of a service or action that nobody serves."""
+"""A client of a service or action that no node provides."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ RULE = register(
         code="RC322",
         name="client-without-server",
         severity=Severity.WARNING,
-        summary="Nothing in the system serves what a client calls.",
+        summary="No node in the system provides the service or action that a client calls.",
         why=(
-            "Every call ends in a timeout: most often a name differs on the two sides. Where the "
-            "server is outside, 'external: true' says so."
+            "Every call times out. The usual cause is a name that differs between client and "
+            "server. If an external node provides it, set 'external: true'."
         ),
         bad="""\
 system: unserved
@@ -38,14 +38,14 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look for services and actions with clients only."""
+    """Check for services and actions that have only clients."""
     for kind in (PortKind.CLIENT, PortKind.ACTION_CLIENT):
         for end in lonely_ends(context, kind):
             if end.port.required is None:
                 place, labels = place_of(end)
                 yield Diagnostic(
                     RULE,
-                    f"nobody in this system serves '{end.port.full_name}', "
+                    f"no node in this system provides '{end.port.full_name}', "
                     f"which '{end_name(end)}' calls",
                     place,
                     labels,

@@ -1,4 +1,4 @@
-"""A publisher that promises messages more often than it sends them."""
+"""A publisher whose deadline is shorter than its period."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ RULE = register(
         code="RC312",
         name="deadline-too-short",
         severity=Severity.WARNING,
-        summary="A publisher's deadline is shorter than the period it publishes with.",
-        why="Every single message is late, and every subscription is told of a missed deadline.",
+        summary="A publisher's deadline is shorter than its publishing period.",
+        why="Every message is late, and every subscription reports a missed deadline.",
         bad="""\
 system: deadline
 nodes:
@@ -37,15 +37,15 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Hold offered deadlines against the periods that timers publish with."""
+    """Compare offered deadlines with the periods of the publishing timers."""
     for end, period_s in context.once(timed_publishers):
         qos = end.port.qos
         deadline_ms = qos.profile.deadline_ms
         if qos.known and deadline_ms is not None and deadline_ms < period_s * 1000.0:
             yield Diagnostic(
                 RULE,
-                f"publisher '{end.port.name}' promises a message every {number(deadline_ms)} ms, "
+                f"publisher '{end.port.name}' offers a deadline of {number(deadline_ms)} ms, "
                 f"but publishes every {number(period_s * 1000.0)} ms",
                 qos.policy_span("deadline_ms"),
-                hint="leave the deadline some room above the period",
+                hint="make the deadline longer than the period, with some margin",
             )

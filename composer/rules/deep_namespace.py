@@ -1,4 +1,4 @@
-"""A namespace that is nested too deep to be of use."""
+"""A namespace with too many levels."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ RULE = register(
         severity=Severity.WARNING,
         summary="A namespace has more than three levels.",
         why=(
-            "Two or three levels (robot, subsystem, device) say where a node belongs. Deeper "
-            "names are mistyped, remapped wrongly and cut off in every tool."
+            "Two or three levels (robot, subsystem, device) are enough to locate a node. Deeper "
+            "names are easily mistyped or remapped wrongly, and tools truncate them."
         ),
         bad="""\
 system: deep
@@ -45,5 +45,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
             RULE,
             f"namespace '{namespace}' has {levels} levels, more than {DEEPEST}",
             namespace.span,
-            hint="join levels that do not stand for a choice, or drop them",
+            hint="merge or drop levels that do not tell nodes apart",
         )

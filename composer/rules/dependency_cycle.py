@@ -1,4 +1,4 @@
-"""Nodes that wait for each other."""
+"""A cycle of dependencies between nodes."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ RULE = register(
         code="RC401",
         name="dependency-cycle",
         severity=Severity.ERROR,
-        summary="Nodes depend on each other in a circle.",
-        why="None of them can be the first to start.",
+        summary="Nodes depend on each other in a cycle.",
+        why="None of them can start first.",
         bad="""\
 system: cycle
 nodes:
@@ -33,15 +33,15 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Report one cycle for every group of nodes that wait for each other."""
+    """Report one cycle for every group of nodes that depend on each other."""
     for cycle in dependency_cycles(context.system):
         pairs = list(zip(cycle, (*cycle[1:], cycle[0]), strict=True))
         steps = [(_dependency(context.system, *pair), *pair) for pair in pairs]
-        way = " -> ".join((*cycle, cycle[0]))
+        path = " -> ".join((*cycle, cycle[0]))
         message = (
             f"node '{cycle[0]}' depends on itself"
             if len(cycle) == 1
-            else f"nodes depend on each other in a circle: {way}"
+            else f"nodes depend on each other in a cycle: {path}"
         )
         yield Diagnostic(
             RULE,

@@ -1,4 +1,4 @@
-"""A node that waits for a state which another one never reaches by itself."""
+"""A dependency on a state that a node does not reach by itself."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ RULE = register(
         code="RC402",
         name="dependency-not-reached",
         severity=Severity.WARNING,
-        summary="A node needs another one in a state that its autostart does not take it to.",
+        summary="A node depends on a state that the other node's autostart does not reach.",
         why=(
-            "The bring-up leaves the waiting node inactive, and it stays so until somebody moves "
-            "the other one by hand."
+            "The bring-up leaves the dependent node inactive until the other node is moved to "
+            "that state manually."
         ),
         bad="""\
 system: waiting
@@ -37,7 +37,7 @@ _RANK = {PrimaryState.UNCONFIGURED: 0, PrimaryState.INACTIVE: 1, PrimaryState.AC
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Hold what nodes wait for against where the others are started."""
+    """Compare the required states with the states that the bring-up reaches."""
     system = context.system
     for node in system.nodes:
         for dependency in node.depends_on:
@@ -47,21 +47,21 @@ def check(context: Context) -> Iterator[Diagnostic]:
             if other.autostart is not None and _start(system, other) < _RANK[dependency.state]:
                 yield Diagnostic(
                     RULE,
-                    f"node '{node.name}' needs '{other.name}' {dependency.state}, "
-                    f"but '{other.name}' is started only as far as {other.autostart}",
+                    f"node '{node.name}' needs '{other.name}' to be {dependency.state}, "
+                    f"but '{other.name}' autostarts only to {other.autostart}",
                     dependency.node.span,
-                    (Label(other.autostart.span, "stays here until it is moved by hand"),),
+                    (Label(other.autostart.span, "stays here until moved manually"),),
                     _hint(other.autostart.value),
                 )
 
 
 def _start(system: System, node: Node) -> int:
-    """Return the rank of the state that the bring-up takes a node to, if nothing is in the way."""
+    """Return the rank of the state that the bring-up moves a node to, dependencies permitting."""
     own = node.autostart.value if node.autostart is not None else system.autostart
     return min(_RANK[own], _RANK[system.autostart])
 
 
 def _hint(reached: PrimaryState) -> str:
     if reached is PrimaryState.UNCONFIGURED:
-        return "let it start further, or do not depend on it"
-    return f"let it start further, or depend on it being {reached}"
+        return "raise its autostart, or remove the dependency"
+    return f"raise its autostart, or depend on it being {reached}"

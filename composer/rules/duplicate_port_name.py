@@ -1,4 +1,4 @@
-"""Two ports of one node with one name."""
+"""Two ports of one node with the same name."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ RULE = register(
         severity=Severity.ERROR,
         summary="Two ports of different kinds have the same name in one node.",
         why=(
-            "Connections say 'node.port', and handlers bind by name: each name must mean one "
-            "port. In ROS the two may still share a topic: give it with 'topic:'."
+            "Connections refer to 'node.port' and handlers bind by name, so a name must identify "
+            "one port. The two ports can still share a topic: set it with 'topic:'."
         ),
         bad="""\
 system: ports
@@ -38,7 +38,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look for names that a node uses twice."""
+    """Check for names that a node uses twice."""
     for node in context.system.nodes:
         first: dict[str, Port] = {}
         for port in node.ports:
@@ -46,8 +46,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
             if earlier is not port and not is_opaque(port.name.value):
                 yield Diagnostic(
                     RULE,
-                    f"'{port.name}' is {a(port.kind)} and {a(earlier.kind)} of one node",
+                    f"'{port.name}' names both {a(port.kind)} and {a(earlier.kind)} of one node",
                     port.name.span,
-                    (Label(earlier.name.span, f"{a(earlier.kind)} already"),),
+                    (Label(earlier.name.span, f"the {earlier.kind}"),),
                     "rename one of them",
                 )

@@ -1,4 +1,4 @@
-"""Two servers for one service or action."""
+"""Two servers of one service or action."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ RULE = register(
         code="RC321",
         name="duplicate-server",
         severity=Severity.ERROR,
-        summary="Two ports serve the same service or action.",
-        why="Each of them answers every request, and the client gets whichever answer is first.",
+        summary="Two ports provide the same service or action.",
+        why="Both answer every request, and the client receives whichever response arrives first.",
         bad="""\
 system: servers
 nodes:
@@ -46,9 +46,9 @@ def check(context: Context) -> Iterator[Diagnostic]:
         for other in channel.sources[1:]:
             yield Diagnostic(
                 RULE,
-                f"{channel.kind} '{channel.name}' is served by '{end_name(other)}' "
-                f"and by '{end_name(first)}'",
+                f"{channel.kind} '{channel.name}' is provided by both '{end_name(other)}' "
+                f"and '{end_name(first)}'",
                 other.port.name.span,
                 (Label(first.port.name.span, "the other server"),),
-                f"give one of them another name, such as '~/{other.port.name}'",
+                f"rename one of them, for example to '~/{other.port.name}'",
             )

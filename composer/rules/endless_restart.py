@@ -1,4 +1,4 @@
-"""A budget of restarts that can never be spent."""
+"""A restart budget that can never be exhausted."""
 
 from __future__ import annotations
 
@@ -15,10 +15,13 @@ RULE = register(
         code="RC406",
         name="endless-restart",
         severity=Severity.WARNING,
-        summary="The waits before restarts add up to more than the window they are counted in.",
+        summary=(
+            "The backoff of the restarts adds up to more than the window in which restarts are "
+            "counted."
+        ),
         why=(
-            "By the time of the last attempt the first one is forgotten, so the system never gives "
-            "up on a node that fails each time."
+            "By the last attempt, the first one is no longer counted, so a node that always fails "
+            "is restarted forever."
         ),
         bad="""\
 system: restarting
@@ -43,29 +46,29 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at every declared budget that a node is restarted by, once."""
+    """Check every restart budget that is in use, once."""
     seen: set[Span] = set()
     for node in context.system.nodes:
         budget = node.supervision.restart
         if node.supervision.policy is not OnFailure.RESTART or budget.span is None:
             continue
-        total_ms = _waits_ms(budget)
+        total_ms = _total_backoff_ms(budget)
         if total_ms < budget.window_ms or budget.span in seen:
             continue
         seen.add(budget.span)
         yield Diagnostic(
             RULE,
             f"{budget.max_attempts} restarts take at least {number(total_ms)} ms, "
-            f"but only those within {number(budget.window_ms)} ms are counted",
+            f"but only restarts within {number(budget.window_ms)} ms are counted",
             budget.span,
-            hint="make 'window_ms' longer, or 'max_attempts' or the waits smaller",
+            hint="increase 'window_ms', or reduce 'max_attempts' or the backoff",
         )
 
 
-def _waits_ms(budget: RestartBudget) -> float:
+def _total_backoff_ms(budget: RestartBudget) -> float:
     """Return the shortest time from the first restart to the last.
 
-    The waits are all the same from some attempt on, so a great number of them is no loop.
+    The backoff is constant from some attempt on, so the loop is short for any budget.
     """
     total_s = 0.0
     for attempt in range(1, budget.max_attempts):

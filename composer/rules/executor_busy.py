@@ -1,4 +1,4 @@
-"""An executor that has little time to spare."""
+"""An executor with little time to spare."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ RULE = register(
         code="RC414",
         name="executor-busy",
         severity=Severity.WARNING,
-        summary="The callbacks of an executor may take more than 70 % of its time.",
+        summary="The callbacks of an executor may use more than 70 % of its time.",
         why=(
-            "Beyond that, callbacks that fall due together wait for each other for long, and "
-            "nothing is left for what was not foreseen."
+            "Above that, callbacks that are due together wait for each other, and there is no "
+            "margin for unexpected load."
         ),
         bad="""\
 system: load
@@ -37,12 +37,12 @@ BUSY = 0.7
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Add up the budgets on every executor that is not overloaded."""
+    """Add up the budgets of every executor that is not overloaded."""
     for load in context.once(loads):
         if BUSY < load.ratio <= 1.0:
             yield Diagnostic(
                 RULE,
-                f"callbacks of {load.what} may need most of the time: {load.told}",
+                f"callbacks of {load.what} may use most of its time: {load.formula}",
                 load.span,
                 load.labels,
             )

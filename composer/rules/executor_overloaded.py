@@ -1,4 +1,4 @@
-"""An executor that cannot do what it is asked to."""
+"""An executor that cannot keep up with its callbacks."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ RULE = register(
         code="RC413",
         name="executor-overloaded",
         severity=Severity.ERROR,
-        summary="The callbacks of an executor may take more time than there is.",
+        summary="The callbacks of an executor may need more time than it has.",
         why=(
-            "The sum of rate times 'budget_ms' over the callbacks of an executor is more than its "
-            "threads have: timers come later and later, and queues overflow."
+            "The sum of rate times 'budget_ms' over the callbacks of an executor exceeds the "
+            "capacity of its threads: timers fire later and later, and queues overflow."
         ),
         bad="""\
 system: load
@@ -42,13 +42,13 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Add up the budgets on every executor."""
+    """Add up the budgets of every executor."""
     for load in context.once(loads):
         if load.ratio > 1.0:
             yield Diagnostic(
                 RULE,
-                f"callbacks of {load.what} may need more time than there is: {load.told}",
+                f"callbacks of {load.what} may need more time than it has: {load.formula}",
                 load.span,
                 load.labels,
-                "lower a rate or a budget, or put nodes on an executor of their own",
+                "lower a rate or a budget, or move nodes to another executor",
             )

@@ -1,4 +1,4 @@
-"""A handler that cannot be called as handlers are."""
+"""A handler that does not accept the arguments of its event."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ RULE = register(
         code="RC435",
         name="handler-signature",
         severity=Severity.ERROR,
-        summary="A handler takes other arguments than it will be called with.",
-        why="Every call would raise TypeError: for a lifecycle handler, at start-up.",
+        summary="A handler does not accept the arguments it is called with.",
+        why="Every call raises TypeError; for a lifecycle handler, already during bring-up.",
         bad="""\
 # file: system.yaml
-system: behaviour
+system: behavior
 nodes:
   counter:
     behavior: counter:Counter
@@ -31,7 +31,7 @@ class Counter:
 """,
         good="""\
 # file: system.yaml
-system: behaviour
+system: behavior
 nodes:
   counter:
     behavior: counter:Counter
@@ -46,13 +46,13 @@ class Counter:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the arguments of every handler whose signature is known."""
+    """Check the arguments of every handler whose signature is known."""
     for node, source in context.once(behaviors):
         place = source.reference.text.span
-        wanted = {name: (arguments, place) for name, arguments in GENERAL_HANDLERS.items()}
+        expected = {name: (arguments, place) for name, arguments in GENERAL_HANDLERS.items()}
         for handler in handlers(node):
-            wanted[handler.name] = (handler.arguments, handler.of.span)
-        for name, (arguments, span) in wanted.items():
+            expected[handler.name] = (handler.arguments, handler.of.span)
+        for name, (arguments, span) in expected.items():
             yield from _method(source, name, arguments, span)
 
 
@@ -66,7 +66,7 @@ def _method(
     gets = ", ".join(("self", *arguments))
     yield Diagnostic(
         RULE,
-        f"'{name}' of '{source.reference.class_name}' is called as ({gets}), but takes ({takes})",
+        f"'{name}' of '{source.reference.class_name}' is called with ({gets}), but takes ({takes})",
         span,
         (Label(method.span, "defined here"),),
         f"write 'def {name}({gets})'",

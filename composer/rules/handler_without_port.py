@@ -1,4 +1,4 @@
-"""A handler that nothing calls."""
+"""A handler that is never called."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ RULE = register(
         code="RC434",
         name="handler-without-port",
         severity=Severity.ERROR,
-        summary="A behaviour has a handler for a port or timer that the node does not have.",
+        summary="A behavior has a handler for a port or timer that the node does not have.",
         why=(
-            "Handlers bind by name: 'on_scan' is for a port or timer called 'scan'. Without one "
-            "the method is never called. A helper of another purpose should not begin with 'on_'."
+            "Handlers bind by name: 'on_scan' is called for the port or timer 'scan'. Without "
+            "one, the method is never called. Do not start the name of any other method with "
+            "'on_'."
         ),
         bad="""\
 # file: system.yaml
-system: behaviour
+system: behavior
 nodes:
   counter:
     behavior: counter:Counter
@@ -38,7 +39,7 @@ class Counter:
 """,
         good="""\
 # file: system.yaml
-system: behaviour
+system: behavior
 nodes:
   counter:
     behavior: counter:Counter
@@ -53,7 +54,7 @@ class Counter:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Hold the methods of behaviours against ports and timers."""
+    """Compare the methods of behaviors with the ports and timers."""
     for node, source in complete_behaviors(context):
         known = list(handlers(node))
         missing = {
@@ -63,7 +64,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
         }
         for method in orphans(node, source):
             if nearest(method.name, missing) is not None:
-                continue  # it is what the finding about the missing handler shows
+                continue  # shown by the diagnostic about the missing handler
             yield Diagnostic(
                 RULE,
                 f"nothing calls '{method.name}' of '{source.reference.class_name}'",

@@ -1,4 +1,4 @@
-"""A name that ROS tools hide."""
+"""A name that ROS tools hide by default."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ RULE = register(
         code="RC232",
         name="hidden-name",
         severity=Severity.INFO,
-        summary="A name has a part that begins with an underscore, so ROS tools leave it out.",
+        summary="A part of a name starts with an underscore, so ROS tools hide it.",
         why=(
-            "Names with a leading underscore are for what ROS itself makes. 'ros2 topic list', "
-            "rqt and rosbag leave them out unless asked, and people miss them."
+            "ROS reserves a leading underscore for hidden names. 'ros2 topic list', rqt and "
+            "rosbag omit them by default, so they are easily overlooked."
         ),
         bad="""\
 system: hidden
@@ -36,7 +36,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the names of nodes, ports and connections."""
+    """Check the names of nodes, ports and connections."""
     for word, name in _names(context):
         if (
             is_hidden(name.value)

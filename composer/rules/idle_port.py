@@ -15,10 +15,10 @@ RULE = register(
         code="RC438",
         name="idle-port",
         severity=Severity.WARNING,
-        summary="A timer or server has neither a behaviour nor a reaction.",
+        summary="A timer or server has neither a behavior nor a reaction.",
         why=(
-            "The timer fires for nothing; the service answers every request with an empty "
-            "response, which looks like a failure or, worse, like success."
+            "The timer has no effect. The service returns an empty response to every request, "
+            "which looks like a failure or, worse, like success."
         ),
         bad="""\
 system: idle
@@ -43,7 +43,7 @@ _HINTS = {
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at nodes without behaviour."""
+    """Check the nodes that have no behavior."""
     suspects = context.once(doubt).nodes
     for node in context.system.nodes:
         if node.behavior is None and node.complete and node.name.value not in suspects:

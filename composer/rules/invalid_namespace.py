@@ -1,4 +1,4 @@
-"""A namespace that ROS does not take."""
+"""A namespace that is not valid in ROS."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ RULE = register(
         code="RC222",
         name="invalid-namespace",
         severity=Severity.ERROR,
-        summary="A namespace is not one that ROS takes.",
+        summary="A namespace is not valid in ROS.",
         why=(
-            "The parts of a namespace consist of letters, digits and underscores, none begins "
-            "with a digit, and there is one slash between them (rmw_validate_namespace). The name "
-            "of a system is such a part: its own node is /<system>/manager."
+            "The parts of a namespace consist of letters, digits and underscores, do not start "
+            "with a digit, and are separated by single slashes (rmw_validate_namespace). The name "
+            "of a system is such a part: its manager node is /<system>/manager."
         ),
         bad="""\
 system: names
@@ -36,7 +36,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the namespace of every node, and of the system's own; one of many is told once."""
+    """Check the namespaces of the system and its nodes; a shared one is reported once."""
     yield from _name_of_system(context.system)
     for node in context.system.nodes:
         namespace = node.namespace
@@ -54,5 +54,5 @@ def _name_of_system(system: System) -> Iterator[Diagnostic]:
         problem = namespace_problem(join(system.namespace, name.value))
     if problem is not None:
         valid = safe_name(name.value)
-        hint = f"call it '{valid}'" if valid != name.value else None
+        hint = f"rename it to '{valid}'" if valid != name.value else None
         yield Diagnostic(RULE, f"system name '{name}' {problem}", name.span, hint=hint)

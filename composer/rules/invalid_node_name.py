@@ -1,4 +1,4 @@
-"""A node name that ROS does not take."""
+"""A node name that is not valid in ROS."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ RULE = register(
         code="RC221",
         name="invalid-node-name",
         severity=Severity.ERROR,
-        summary="A node's name is not one that ROS takes.",
+        summary="A node name is not valid in ROS.",
         why=(
-            "Node names consist of letters, digits and underscores and do not begin with a digit "
-            "(rmw_validate_node_name). rclpy refuses to make a node with any other name."
+            "Node names consist of letters, digits and underscores and do not start with a digit "
+            "(rmw_validate_node_name). rclpy refuses to create a node with any other name."
         ),
         bad="""\
 system: names
@@ -34,7 +34,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the name of every node."""
+    """Check the name of every node."""
     for node in context.system.nodes:
         name = node.name
         problem = node_name_problem(name.value)
@@ -43,5 +43,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 RULE,
                 f"node name '{name}' {problem}",
                 name.span,
-                hint=f"call it '{safe_name(name.value)}'",
+                hint=f"rename it to '{safe_name(name.value)}'",
             )

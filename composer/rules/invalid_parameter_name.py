@@ -1,4 +1,4 @@
-"""A parameter name that tools cannot name."""
+"""A parameter name that tools cannot use."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ RULE = register(
         code="RC224",
         name="invalid-parameter-name",
         severity=Severity.ERROR,
-        summary="A parameter's name is not words joined by dots.",
+        summary="A parameter name does not consist of words separated by dots.",
         why=(
-            "Parameter files, the command line and expressions can only name parameters made of "
-            "letters, digits and underscores, with dots between them."
+            "Parameter files, the command line and expressions can refer only to names that "
+            "consist of letters, digits and underscores, separated by dots."
         ),
         bad="""\
 system: names
@@ -36,7 +36,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the name of every declared parameter."""
+    """Check the name of every declared parameter."""
     for node in context.system.nodes:
         for parameter in node.parameters:
             name = parameter.name
@@ -47,5 +47,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     RULE,
                     f"parameter name '{name}' {problem}",
                     name.span,
-                    hint=f"call it '{better}'",
+                    hint=f"rename it to '{better}'",
                 )

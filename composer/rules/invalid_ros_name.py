@@ -1,4 +1,4 @@
-"""A name of a topic, service or action that ROS does not take."""
+"""A topic, service or action name that is not valid in ROS."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ RULE = register(
         code="RC223",
         name="invalid-ros-name",
         severity=Severity.ERROR,
-        summary="The name of a topic, service or action is not one that ROS takes.",
+        summary="The name of a topic, service or action is not valid in ROS.",
         why=(
-            "The parts of a name consist of letters, digits and underscores, none begins with a "
-            "digit, there is one slash between them, and '~' stands only in front "
+            "The parts of a name consist of letters, digits and underscores, do not start with a "
+            "digit, and are separated by single slashes; '~' is allowed only at the start "
             "(rcl_validate_topic_name). rclpy refuses any other name."
         ),
         bad="""\
@@ -40,7 +40,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the names of ports, of connections, and in remappings."""
+    """Check the names of ports, of connections, and in remappings."""
     for kind, name in _names(context):
         problem = topic_name_problem(name.value)
         if problem is not None and not is_opaque(name.value):

@@ -1,4 +1,4 @@
-"""A queue without an end."""
+"""An unbounded queue."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ RULE = register(
         code="RC314",
         name="keep-all",
         severity=Severity.INFO,
-        summary="A topic end keeps all messages.",
+        summary="A publisher or subscription keeps all messages.",
         why=(
-            "When a subscription is slower than its publisher, the queue grows until memory is "
-            "used up, or a reliable publisher has to wait. A depth says how much is worth keeping."
+            "If a subscription is slower than its publisher, the queue grows until memory runs "
+            "out, or a reliable publisher blocks. Set a depth instead."
         ),
         bad="""\
 system: queues
@@ -38,7 +38,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the history of every topic end; a profile that many use is reported once."""
+    """Check the history of every publisher and subscription; a shared profile is reported once."""
     for node in context.system.nodes:
         for port in node.ports:
             qos = port.qos

@@ -1,4 +1,4 @@
-"""A chain that cannot be as quick as it must."""
+"""A chain that cannot meet its latency."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ RULE = register(
         code="RC415",
         name="latency-budget",
         severity=Severity.ERROR,
-        summary="The periods and budgets on a chain's way add up to more than its latency.",
+        summary="The periods and budgets along a chain add up to more than its latency.",
         why=(
-            "A node that publishes by a timer lets what it heard wait for up to a period. What "
-            "the periods make impossible no processor can make up for."
+            "A node that publishes from a timer delays its input by up to one period. No "
+            "processor can make up for delays that the periods cause."
         ),
         bad="""\
 system: chain
@@ -50,7 +50,7 @@ chains:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Add up what may hold data up on the way of every chain."""
+    """Add up the delays along every chain."""
     for chain in context.system.chains:
         found = list(delays(context, chain))
         total_ms = sum(delay.milliseconds for delay in found)
@@ -58,11 +58,11 @@ def check(context: Context) -> Iterator[Diagnostic]:
             yield Diagnostic(
                 RULE,
                 f"chain '{chain.name}' may take {number(total_ms)} ms, "
-                f"more than its {number(chain.latency_ms.value)} ms",
+                f"more than its latency of {number(chain.latency_ms.value)} ms",
                 chain.latency_ms.span,
                 tuple(
                     Label(delay.span, f"{delay.what} {number(delay.milliseconds)} ms")
                     for delay in found
                 ),
-                "publish where a message is heard, or let timers come more often",
+                "publish from the subscription, or use shorter timer periods",
             )

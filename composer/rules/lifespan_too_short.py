@@ -1,4 +1,4 @@
-"""A message that is gone before the next one comes."""
+"""A message that expires before the next one is published."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ RULE = register(
         code="RC313",
         name="lifespan-too-short",
         severity=Severity.WARNING,
-        summary="A publisher's lifespan is shorter than the period it publishes with.",
+        summary="A publisher's lifespan is shorter than its publishing period.",
         why=(
-            "Between two messages there is none: who joins then, or takes its messages a little "
-            "late, gets nothing."
+            "Between an expired message and the next one there is no message: a late joiner or a "
+            "slow subscription receives nothing."
         ),
         bad="""\
 system: lifespan
@@ -40,15 +40,15 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Hold lifespans against the periods that timers publish with."""
+    """Compare lifespans with the periods of the publishing timers."""
     for end, period_s in context.once(timed_publishers):
         qos = end.port.qos
         lifespan_ms = qos.profile.lifespan_ms
         if qos.known and lifespan_ms is not None and lifespan_ms < period_s * 1000.0:
             yield Diagnostic(
                 RULE,
-                f"messages of '{end.port.name}' live {number(lifespan_ms)} ms, "
-                f"but the next one comes after {number(period_s * 1000.0)} ms",
+                f"messages of '{end.port.name}' expire after {number(lifespan_ms)} ms, "
+                f"but are published every {number(period_s * 1000.0)} ms",
                 qos.policy_span("lifespan_ms"),
-                hint="let them live longer than the period",
+                hint="make the lifespan longer than the period",
             )

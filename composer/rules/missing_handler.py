@@ -1,4 +1,4 @@
-"""A port or timer that nothing is done for."""
+"""A port or timer without a handler."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ RULE = register(
         code="RC433",
         name="missing-handler",
         severity=Severity.ERROR,
-        summary="A behaviour has no method for a port or a timer of its node.",
+        summary="A behavior has no method for a port or timer of its node.",
         why=(
-            "Handlers bind by name: subscription 'scan' calls 'on_scan'. Without the method "
-            "messages would vanish, timers fire for nothing, requests go unanswered."
+            "Handlers bind by name: subscription 'scan' calls 'on_scan'. Without the method, "
+            "messages are dropped, timers have no effect, and requests get no response."
         ),
         bad="""\
 # file: system.yaml
-system: behaviour
+system: behavior
 nodes:
   counter:
     behavior: counter:Counter
@@ -34,7 +34,7 @@ class Counter:
 """,
         good="""\
 # file: system.yaml
-system: behaviour
+system: behavior
 nodes:
   counter:
     behavior: counter:Counter
@@ -49,20 +49,20 @@ class Counter:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Hold ports and timers against the methods of the behaviour."""
+    """Compare the ports and timers with the methods of the behavior."""
     for node, source in complete_behaviors(context):
-        lost = {method.name: method for method in orphans(node, source)}
+        unbound = {method.name: method for method in orphans(node, source)}
         for handler in handlers(node):
             if handler.needed and source.method(handler.name) is None:
-                yield _finding(source, handler, lost)
+                yield _diagnostic(source, handler, unbound)
 
 
-def _finding(source: BehaviorSource, handler: Handler, lost: dict[str, Method]) -> Diagnostic:
+def _diagnostic(source: BehaviorSource, handler: Handler, unbound: dict[str, Method]) -> Diagnostic:
     signature = f"{handler.name}({', '.join(('self', *handler.arguments))})"
-    close = nearest(handler.name, lost)
-    label = Label(lost[close].span, f"'{close}' belongs to nothing") if close else None
+    close = nearest(handler.name, unbound)
+    label = Label(unbound[close].span, f"'{close}' is never called") if close else None
     if label is None and source.class_span is not None:
-        label = Label(source.class_span, "the behaviour")
+        label = Label(source.class_span, "the behavior class")
     return Diagnostic(
         RULE,
         f"{handler.kind} '{handler.of}' has no handler: "

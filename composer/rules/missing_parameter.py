@@ -12,8 +12,8 @@ RULE = register(
         code="RC424",
         name="missing-parameter",
         severity=Severity.ERROR,
-        summary="A parameter without default is given no value.",
-        why="A parameter without default is one that the node cannot do without.",
+        summary="A parameter without a default has no value.",
+        why="A parameter without a default is required: the node cannot run without a value.",
         bad="""\
 system: parameters
 nodes:
@@ -31,7 +31,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look for parameters without value. A node type alone need not have them all."""
+    """Check for parameters without a value. A node type alone does not need them."""
     if context.system.node_type:
         return
     for node in context.system.nodes:
@@ -41,6 +41,6 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     RULE,
                     f"node '{node.name}' needs a value for parameter '{parameter.name}'",
                     node.name.span,
-                    (Label(parameter.name.span, "declared without default"),),
+                    (Label(parameter.name.span, "declared without a default"),),
                     f"add 'parameters: {{{parameter.name}: ...}}' to the node",
                 )

@@ -1,4 +1,4 @@
-"""A watch over the silence of a node that publishes nothing."""
+"""Silence monitoring for a node that publishes nothing."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RULE = register(
         name="nothing-to-watch",
         severity=Severity.ERROR,
         summary="topic_silence_ms is set for a node without publishers.",
-        why="A node that cannot publish is always silent: it would fail again and again.",
+        why="A node without publishers is always silent, so it would fail repeatedly.",
         bad="""\
 system: watching
 nodes:
@@ -35,7 +35,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at every node that is watched as a whole."""
+    """Check every node that is watched as a whole."""
     doubts = context.once(doubt)
     for node in context.system.nodes:
         limit = node.supervision.watch.silence_ms
@@ -47,5 +47,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
             RULE,
             f"node '{node.name}' is watched for silence, but has no publishers",
             limit.span,
-            hint="watch the node whose messages it needs, or set 'callback_ms'",
+            hint="watch the nodes that publish its input, or set 'callback_ms'",
         )

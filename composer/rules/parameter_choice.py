@@ -1,4 +1,4 @@
-"""A parameter with a value that is not one of its choices."""
+"""A parameter value that is not one of the declared choices."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RULE = register(
         name="parameter-choice",
         severity=Severity.ERROR,
         summary="A parameter's value is not one of the declared choices.",
-        why="The node would refuse the value when it starts.",
+        why="The node refuses the value at startup.",
         bad="""\
 system: parameters
 nodes:
@@ -33,19 +33,19 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at values that have choices; of a list, each element must be one."""
+    """Check values against the choices; each element of a list must be one of them."""
     for parameter, value in typed_values(context):
         choices = parameter.choices
         if choices is None or value.value in choices.value:
             continue
         items = value.value if isinstance(value.value, list) else [value.value]
-        odd = next((item for item in items if item not in choices.value), None)
-        if odd is None:
+        invalid = next((item for item in items if item not in choices.value), None)
+        if invalid is None:
             continue
         yield Diagnostic(
             RULE,
-            f"parameter '{parameter.name}' cannot be {describe(odd)}",
+            f"parameter '{parameter.name}' cannot be {describe(invalid)}",
             value.span,
-            (Label(choices.span, "the choices"),),
-            suggestion(str(odd), [str(choice) for choice in choices.value]),
+            (Label(choices.span, "the valid choices"),),
+            suggestion(str(invalid), [str(choice) for choice in choices.value]),
         )

@@ -1,4 +1,4 @@
-"""A declaration that no value could meet, or that means nothing."""
+"""A parameter declaration that no value can satisfy."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ RULE = register(
         severity=Severity.ERROR,
         summary="A parameter's declaration contradicts itself.",
         why=(
-            "A minimum above the maximum leaves no value, a range on text means nothing, and a "
-            "choice of another type can never be taken."
+            "A minimum above the maximum leaves no valid value, a range applies only to numbers, "
+            "and a choice of another type can never be selected."
         ),
         bad="""\
 system: parameters
@@ -46,7 +46,7 @@ _WITH_RANGE = frozenset(
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the declarations, not at values."""
+    """Check the declarations, not the values."""
     for node in context.system.nodes:
         for parameter in node.parameters:
             yield from _of_every_node(parameter)
@@ -58,7 +58,9 @@ def check(context: Context) -> Iterator[Diagnostic]:
 def _of_every_node(parameter: Parameter) -> Iterator[Diagnostic]:
     kind = parameter.type
     if parameter.name.value == USE_SIM_TIME and kind.value in KNOWN_TYPES - {ParameterType.BOOL}:
-        message = f"parameter '{USE_SIM_TIME}', which every node has, is of type bool, not {kind}"
+        message = (
+            f"parameter '{USE_SIM_TIME}', which every node has, must be of type bool, not {kind}"
+        )
         yield Diagnostic(RULE, message, kind.span)
 
 
@@ -75,7 +77,7 @@ def _range(parameter: Parameter) -> Iterator[Diagnostic]:
     if low is not None and high is not None and low.value > high.value:
         yield Diagnostic(
             RULE,
-            f"parameter '{name}' has a minimum of {low}, more than its maximum of {high}",
+            f"parameter '{name}' has a minimum of {low} above its maximum of {high}",
             low.span,
             (Label(high.span, f"the maximum is {high}"),),
             "swap them",

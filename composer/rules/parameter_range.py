@@ -1,4 +1,4 @@
-"""A parameter with a value outside its range."""
+"""A parameter value outside its range."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ RULE = register(
         code="RC422",
         name="parameter-range",
         severity=Severity.ERROR,
-        summary="A parameter's value is outside the declared minimum, maximum or step.",
-        why="The node would refuse the value when it starts.",
+        summary="A parameter's value violates the declared minimum, maximum or step.",
+        why="The node refuses the value at startup.",
         bad="""\
 system: parameters
 nodes:
@@ -36,7 +36,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at numbers with a range."""
+    """Check numbers against the declared range."""
     for parameter, value in typed_values(context):
         if _is_contradictory(parameter):
             continue

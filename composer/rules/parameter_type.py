@@ -1,4 +1,4 @@
-"""A parameter with a value of another type."""
+"""A parameter value of the wrong type."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ RULE = register(
         code="RC421",
         name="parameter-type",
         severity=Severity.ERROR,
-        summary="A parameter's value is not of the type that was declared.",
+        summary="A parameter's value does not have the declared type.",
         why=(
-            "ROS parameters are typed: the node would refuse the value when it starts. A whole "
-            "number is fine where a double is declared; nothing else is converted."
+            "ROS parameters are typed, so the node refuses the value at startup. An integer is "
+            "accepted for a double; nothing else is converted."
         ),
         bad="""\
 system: parameters
@@ -36,7 +36,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at defaults and at the values that instances give."""
+    """Check the defaults and the values that instances set."""
     for parameter, value in judged_values(context):
         problem = type_problem(value.value, parameter.type.value)
         if problem is None:
@@ -46,7 +46,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             labels = (Label(parameter.name.span, f"declared as {parameter.type}"),)
         yield Diagnostic(
             RULE,
-            f"parameter '{parameter.name}' is of type {parameter.type}, not {problem}",
+            f"parameter '{parameter.name}' must be of type {parameter.type}, not {problem}",
             value.span,
             labels,
         )

@@ -1,4 +1,4 @@
-"""A bare value that does not tell the type of the parameter it declares."""
+"""A parameter value from which no type can be inferred."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ RULE = register(
         code="RC426",
         name="parameter-without-type",
         severity=Severity.ERROR,
-        summary="A parameter is declared by a value that does not tell its type.",
+        summary="A parameter is declared with a value from which its type cannot be inferred.",
         why=(
-            "ROS parameters are typed. Most values tell their type; an empty list could be one of "
-            "anything, and a list of numbers and texts is none at all."
+            "ROS parameters are typed. Most values determine the type, but an empty list fits "
+            "every array type, and a list of mixed types fits none."
         ),
         bad="""\
 system: parameters
@@ -35,15 +35,15 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look for parameters that were declared without a type that could be found out."""
+    """Check for parameters whose type is neither declared nor inferable."""
     for node in context.system.nodes:
         for parameter in node.parameters:
             if parameter.default is not None and not parameter.type.value:
                 name = parameter.name
                 yield Diagnostic(
                     RULE,
-                    f"parameter '{name}' is declared by {describe(parameter.default.value)}, "
-                    "which does not tell its type",
+                    f"cannot infer the type of parameter '{name}' from "
+                    f"{describe(parameter.default.value)}",
                     parameter.default.span,
                     hint=f"write '{name}: {{type: ..., default: ...}}'",
                 )

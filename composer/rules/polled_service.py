@@ -1,4 +1,4 @@
-"""A service that is asked again and again."""
+"""A service that a timer polls."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ RULE = register(
         severity=Severity.INFO,
         summary="A timer calls a service more often than once a second.",
         why=(
-            "A service answers a question now and then. What is asked for all the time is a "
-            "stream: as a topic it costs half the messages, and nobody waits."
+            "Services are for occasional requests. For data that is needed continuously, a topic "
+            "uses half the messages, and no client has to wait."
         ),
         bad="""\
 system: polling
@@ -40,7 +40,7 @@ SHORTEST_S = 1.0
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the calls that timers make unconditionally."""
+    """Check the calls that timers make unconditionally."""
     for node in context.system.nodes:
         for timer in node.timers:
             period_s = node.period_s(timer)
@@ -55,6 +55,6 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     f"timer '{timer.name}' calls service '{port.full_name}' "
                     f"{number(1 / period_s)} times a second",
                     send.port.span,
-                    (Label(timer.period.span, "this often"),),
-                    "let the server publish a topic",
+                    (Label(timer.period.span, "the timer's period"),),
+                    "publish the data on a topic instead",
                 )

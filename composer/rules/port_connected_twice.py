@@ -1,4 +1,4 @@
-"""A port in two connections that want different things of it."""
+"""A port in two conflicting connections."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ RULE = register(
         name="port-connected-twice",
         severity=Severity.ERROR,
         summary="A port is in two connections with different names or QoS profiles.",
-        why="A port has one name and one profile in ROS; one of the connections would not exist.",
+        why=(
+            "A port has one name and one QoS profile in ROS, so one of the connections would have "
+            "no effect."
+        ),
         bad="""\
 system: split
 nodes:
@@ -45,7 +48,7 @@ connections:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Compare every further connection of a port with its first."""
+    """Compare each later connection of a port with its first one."""
     first: dict[str, tuple[Connection, Endpoint]] = {}
     for connection in context.system.connections:
         for endpoint in (*connection.sources, *connection.sinks):
@@ -59,13 +62,13 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     f"port '{endpoint.text}' is connected twice, with {difference}",
                     endpoint.text.span,
                     (Label(place.text.span, f"connected to '{earlier.name}' here"),),
-                    "join all ports that share a name in one connection",
+                    "put all ports that share a name into one connection",
                 )
 
 
 def _difference(earlier: Connection, later: Connection) -> str | None:
     if earlier.kind is not later.kind:
-        return None  # one of them has the wrong kind of port, and that is said
+        return None  # the wrong kind of port is reported by another rule
     if earlier.name.value.lstrip("/") != later.name.value.lstrip("/"):
         return f"the names '{earlier.name}' and '{later.name}'"
     if earlier.qos is not None and later.qos is not None and earlier.qos != later.qos:

@@ -1,4 +1,4 @@
-"""A connection with a name that begins with ``~``."""
+"""A connection whose name starts with ``~``."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ RULE = register(
         code="RC233",
         name="private-connection-name",
         severity=Severity.ERROR,
-        summary="A connection's name is private, but a connection belongs to no one node.",
-        why="'~' stands for the node a name is used in; between nodes it stands for nothing.",
+        summary="A connection has a private name, but does not belong to a single node.",
+        why="'~' stands for the node that uses the name, and a connection has no such node.",
         bad="""\
 system: private
 nodes:
@@ -39,13 +39,13 @@ connections:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the names of connections."""
+    """Check the names of connections."""
     for connection in context.system.connections:
         name = connection.name
         if name.value.startswith("~"):
             yield Diagnostic(
                 RULE,
-                f"{connection.kind} '{name}' is private, but a connection has no node of its own",
+                f"{connection.kind} '{name}' is private, but a connection is not part of a node",
                 name.span,
-                hint="give an absolute name, such as '/node/topic'",
+                hint="use an absolute name, such as '/node/topic'",
             )

@@ -1,4 +1,4 @@
-"""A topic end that leaves its QoS to the default."""
+"""A publisher or subscription without an explicit QoS profile."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ RULE = register(
         code="RC501",
         name="qos-implicit",
         severity=Severity.INFO,
-        summary="A publisher or subscription does not say its QoS.",
+        summary="A publisher or subscription does not set its QoS profile.",
         why=(
-            "It gets rclpy's default: reliable, volatile, the last 10. That is right for orders "
-            "and wrong for sensor streams and for states that late joiners need. Who reads the "
-            "file should see that the choice was made."
+            "It gets rclpy's default: reliable, volatile, keep last 10. That suits commands, but "
+            "neither sensor streams nor states that late joiners need. An explicit profile shows "
+            "that the choice is deliberate."
         ),
         bad="""\
 system: implicit
@@ -37,15 +37,15 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the ends of topics; services and actions have one usual profile."""
+    """Check publishers and subscriptions; services and actions have one usual profile."""
     suspects = context.once(doubt).nodes
     for node in context.system.nodes:
         for port in node.ports if node.name.value not in suspects else ():
             if port.kind.channel is ChannelKind.TOPIC and not port.qos.explicit:
                 yield Diagnostic(
                     RULE,
-                    f"{port.kind} '{port.name}' leaves its QoS implicit",
+                    f"{port.kind} '{port.name}' does not set its QoS profile",
                     port.name.span,
-                    hint="say 'qos: sensor_data' for a stream, 'command' for orders, "
-                    "'state' for what late joiners need",
+                    hint="set 'qos: sensor_data' for streams, 'command' for commands, "
+                    "'state' for data that late joiners need",
                 )

@@ -1,4 +1,4 @@
-"""Two ends whose QoS keeps them apart."""
+"""Endpoints with incompatible QoS profiles."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ RULE = register(
         code="RC311",
         name="qos-incompatible",
         severity=Severity.ERROR,
-        summary="One end of a topic or service asks for more than the other end offers.",
+        summary="One endpoint of a topic or service requests more than the other offers.",
         why=(
-            "A subscription requests, a publisher offers, and they match only when the offer is "
-            "at least as strong: a best-effort publisher never reaches a reliable subscription, "
-            "while a reliable publisher does reach a best-effort one. Requests and responses of "
-            "services follow the same rule in both directions. When ends do not match, nothing "
-            "arrives, and at best a warning is lost among the logs."
+            "A subscription requests, a publisher offers, and they match only if the offer is at "
+            "least as strong as the request: a best-effort publisher never reaches a reliable "
+            "subscription, while a reliable publisher does reach a best-effort one. Requests and "
+            "responses of services follow the same rule in both directions. Endpoints that do not "
+            "match exchange no data, and ROS logs a warning at most."
         ),
         bad="""\
 system: quality
@@ -43,14 +43,14 @@ nodes:
     )
 )
 
-#: So many further ends with the same trouble are shown.
+#: Maximum number of further endpoints to show for one problem.
 _SHOWN = 3
 
 Groups = Mapping[QosProfile, list[PortOfNode]]
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Hold the profiles on every channel against each other, each kind of profile once."""
+    """Compare the profiles on every channel, each pair of profiles once."""
     for channel in context.channels:
         if channel.sources and channel.sinks and _one_type(channel):
             sources, sinks = _by_profile(channel.sources), _by_profile(channel.sinks)
@@ -60,7 +60,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 
 def _one_type(channel: Channel) -> bool:
-    """Say whether all ends have one type; others never match, and that is said elsewhere."""
+    """Return whether all endpoints have one type; another rule reports different types."""
     return len({end.port.interface.value for end in channel.ends}) == 1
 
 
@@ -76,10 +76,10 @@ def _direction(channel: Channel, offering: Groups, requesting: Groups) -> Iterat
     for offered, offers in offering.items():
         for requested, requests in requesting.items():
             for problem in incompatibilities(offered, requested):
-                yield _finding(channel, problem, offers, requests)
+                yield _diagnostic(channel, problem, offers, requests)
 
 
-def _finding(
+def _diagnostic(
     channel: Channel,
     problem: Incompatibility,
     offers: list[PortOfNode],

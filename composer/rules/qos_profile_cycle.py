@@ -13,8 +13,8 @@ RULE = register(
         code="RC318",
         name="qos-profile-cycle",
         severity=Severity.ERROR,
-        summary="QoS profiles extend each other in a circle.",
-        why="None of them has anything to start from.",
+        summary="QoS profiles extend each other in a cycle.",
+        why="None of them has a base to start from.",
         bad="""\
 system: profiles
 qos_profiles:
@@ -37,30 +37,30 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Follow what profiles extend; every circle is reported where it was entered first."""
+    """Follow the profiles that each profile extends; report every cycle once."""
     profiles = {profile.name.value: profile for profile in context.system.qos_profiles}
     done: set[str] = set()
     for name in profiles:
-        way: dict[str, NamedQos] = {}
+        path: dict[str, NamedQos] = {}
         step: str | None = name
-        while step is not None and step in profiles and step not in done and step not in way:
-            way[step] = profiles[step]
-            extends = way[step].extends
+        while step is not None and step in profiles and step not in done and step not in path:
+            path[step] = profiles[step]
+            extends = path[step].extends
             step = extends.value if extends is not None else None
-        done.update(way)
-        if step is not None and step in way:
-            names = list(way)
-            yield _finding([way[item] for item in names[names.index(step) :]])
+        done.update(path)
+        if step is not None and step in path:
+            names = list(path)
+            yield _diagnostic([path[item] for item in names[names.index(step) :]])
 
 
-def _finding(circle: list[NamedQos]) -> Diagnostic:
-    places = [profile.extends or profile.name for profile in circle]
-    names = [profile.name.value for profile in circle]
-    way = " -> ".join((*names, names[0]))
+def _diagnostic(cycle: list[NamedQos]) -> Diagnostic:
+    places = [profile.extends or profile.name for profile in cycle]
+    names = [profile.name.value for profile in cycle]
+    path = " -> ".join((*names, names[0]))
     message = (
         f"QoS profile '{names[0]}' extends itself"
-        if len(circle) == 1
-        else f"QoS profiles extend each other in a circle: {way}"
+        if len(cycle) == 1
+        else f"QoS profiles extend each other in a cycle: {path}"
     )
     labels = (
         Label(place.span, f"'{name}' extends '{place}'")

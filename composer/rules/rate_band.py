@@ -1,4 +1,4 @@
-"""A rate that is unusual for what a node says it is."""
+"""A rate that is unusual for the purpose of its node."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ RULE = register(
         code="RC412",
         name="rate-band",
         severity=Severity.INFO,
-        summary="A control or perception node runs at a rate that is unusual for it.",
+        summary="A control or perception node runs at an unusual rate.",
         why=(
-            "Control loops usually run at 50 to 500 Hz: slower ones are unstable, faster ones need "
-            "a real-time system. Perception runs at 10 to 30 Hz, as fast as sensors and "
-            "processing allow. What a node is, its namespace says."
+            "Control loops usually run at 50 to 500 Hz: slower loops are unstable, faster ones "
+            "need a real-time system. Perception runs at 10 to 30 Hz, limited by sensors and "
+            "processing. The namespace of a node shows which of the two it is."
         ),
         bad="""\
 system: rates
@@ -39,18 +39,18 @@ nodes:
 
 #: Lowest and highest usual rate in hertz, by a level of the namespace.
 BANDS_HZ = {"control": (50.0, 500.0), "perception": (10.0, 30.0)}
-#: Rates are compared with this much room, for periods that are rounded.
-_ROOM = 1.001
+#: Tolerance factor, because periods may be rounded.
+_TOLERANCE = 1.001
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the fastest timer of each node: slower ones are for housekeeping."""
+    """Check the fastest timer of each node; slower timers do housekeeping."""
     for node in context.system.nodes:
         levels = set(node.namespace.value.split("/"))
         for word, band in BANDS_HZ.items():
             fastest = _fastest(node) if word in levels else None
             if fastest is not None:
-                yield from _finding(*fastest, word, band)
+                yield from _diagnostic(*fastest, word, band)
 
 
 def _fastest(node: Node) -> tuple[Timer, float] | None:
@@ -60,15 +60,15 @@ def _fastest(node: Node) -> tuple[Timer, float] | None:
     return max(rates, key=lambda found: found[1], default=None)
 
 
-def _finding(
+def _diagnostic(
     timer: Timer, rate_hz: float, word: str, band: tuple[float, float]
 ) -> Iterator[Diagnostic]:
     low_hz, high_hz = band
-    if low_hz / _ROOM <= rate_hz <= high_hz * _ROOM:
+    if low_hz / _TOLERANCE <= rate_hz <= high_hz * _TOLERANCE:
         return
     yield Diagnostic(
         RULE,
         f"timer '{timer.name}' of a {word} node runs at {number(rate_hz)} Hz; "
-        f"usual are {number(low_hz)} to {number(high_hz)} Hz",
+        f"{number(low_hz)} to {number(high_hz)} Hz is usual",
         timer.period.span,
     )

@@ -1,4 +1,4 @@
-"""A sensor stream that waits for what is lost."""
+"""A sensor stream with reliable delivery."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ RULE = register(
         code="RC317",
         name="reliable-sensor-stream",
         severity=Severity.INFO,
-        summary="Fast sensor data is sent reliably.",
+        summary="High-rate sensor data is published reliably.",
         why=(
-            "Sending a lost image again delays all that come after it, and nobody needs the old "
-            "one. The preset 'sensor_data' is best effort."
+            "Resending a lost image delays all that follow, and the old image is no longer "
+            "needed. The 'sensor_data' preset is best effort."
         ),
         bad="""\
 system: stream
@@ -43,7 +43,7 @@ _PACKAGE = "sensor_msgs/msg/"
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at publishers of sensor messages whose rate is known."""
+    """Check publishers of sensor messages with a known rate."""
     known = context.once(rates)
     for node in context.system.nodes:
         for port in node.ports_of(PortKind.PUBLISHER):
@@ -55,7 +55,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             if port.qos.profile.reliability is Reliability.RELIABLE:
                 yield Diagnostic(
                     RULE,
-                    f"sensor data on '{port.full_name}' at {number(rate_hz)} Hz is sent reliably",
+                    f"sensor data on '{port.full_name}' at {number(rate_hz)} Hz uses reliable QoS",
                     port.qos.policy_span("reliability"),
                     hint="use 'qos: sensor_data'",
                 )

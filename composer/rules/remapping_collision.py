@@ -1,4 +1,4 @@
-"""Two ports of one node that a remapping put on one name."""
+"""Two ports of one node that a remapping gives the same name."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ RULE = register(
         severity=Severity.WARNING,
         summary="A remapping gives a port a name that another port of the node already has.",
         why=(
-            "What was two streams of the node becomes one, and nobody who listens can tell which "
-            "message came from which port."
+            "Two streams of the node become one, and subscribers cannot tell the messages of the "
+            "two ports apart."
         ),
         bad="""\
 system: collision
@@ -43,36 +43,36 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the ports that every remapping moves."""
+    """Check the ports that each remapping renames."""
     for node in context.system.nodes:
         if not node.remappings:
             continue
         joined: dict[tuple[PortKind, str], list[Port]] = defaultdict(list)
         for port in node.ports:
             joined[port.kind, port.full_name].append(port)
-        told: set[tuple[PortKind, str]] = set()
+        reported: set[tuple[PortKind, str]] = set()
         for remapping in node.remappings:
-            yield from _remapping(node, remapping, joined, told)
+            yield from _remapping(node, remapping, joined, reported)
 
 
 def _remapping(
     node: Node,
     remapping: Remapping,
     joined: dict[tuple[PortKind, str], list[Port]],
-    told: set[tuple[PortKind, str]],
+    reported: set[tuple[PortKind, str]],
 ) -> Iterator[Diagnostic]:
-    """Report each name once, where a remapping first brings it about."""
+    """Report each name once, for the first remapping that causes it."""
     if is_opaque(remapping.target.value):
         return
     target = own_name(node, remapping.target.value)
     for port in matched_ports(node, remapping):
         others = [other for other in joined[port.kind, target] if other is not port]
-        if port.full_name == target and others and (port.kind, target) not in told:
-            told.add((port.kind, target))
+        if port.full_name == target and others and (port.kind, target) not in reported:
+            reported.add((port.kind, target))
             yield Diagnostic(
                 RULE,
-                f"remapping '{remapping.source}' to '{remapping.target}' puts {port.kind}s "
-                f"'{port.name}' and '{others[0].name}' of one node on '{target}'",
+                f"remapping '{remapping.source}' to '{remapping.target}' gives {port.kind}s "
+                f"'{port.name}' and '{others[0].name}' of one node the name '{target}'",
                 remapping.target.span,
-                (Label(others[0].name.span, "has the name already"),),
+                (Label(others[0].name.span, "already has this name"),),
             )

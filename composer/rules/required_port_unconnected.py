@@ -1,11 +1,11 @@
-"""A port that says it needs another end, and has none."""
+"""A required port that is not connected."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.near_miss import nearest_channel
+from composer.analysis.near_miss import COUNTERPARTS, nearest_channel
 from composer.analysis.wiring import lonely_ends
 from composer.analysis.words import end_name
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
@@ -16,10 +16,10 @@ RULE = register(
         code="RC325",
         name="required-port-unconnected",
         severity=Severity.ERROR,
-        summary="A port with 'required: true' has nothing at its other end.",
+        summary="A port with 'required: true' has no counterpart in the system.",
         why=(
-            "Whoever wrote the node knows that it is of no use without: an emergency stop that "
-            "nobody publishes, a brake that nobody listens to."
+            "The node declares that it cannot work without the connection: for example, a motor "
+            "without its emergency stop."
         ),
         bad="""\
 system: required
@@ -40,14 +40,14 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the ports that ask to be connected."""
+    """Check the ports that are declared as required."""
     for kind in PortKind:
         for end in lonely_ends(context, kind):
             if end.port.required:
                 yield Diagnostic(
                     RULE,
                     f"port '{end_name(end)}' must be connected, "
-                    f"but nothing is at the other end of '{end.port.full_name}'",
+                    f"but '{end.port.full_name}' has no {COUNTERPARTS[end.port.kind]}",
                     end.node.name.span,
                     (Label(end.port.name.span, "declared as required"),),
                     nearest_channel(context, end),

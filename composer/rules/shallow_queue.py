@@ -1,4 +1,4 @@
-"""A reliable topic that loses messages after all."""
+"""A reliable topic that can still lose messages."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ RULE = register(
         code="RC315",
         name="shallow-queue",
         severity=Severity.WARNING,
-        summary="A fast reliable topic has a depth of 1.",
+        summary="A reliable topic with a high rate has a queue depth of 1.",
         why=(
-            "Reliable means that nothing is lost on the way, but with room for one message the "
-            "next one replaces it before it is taken. For the latest value only, say so: "
-            "best effort, or transient local."
+            "Reliable delivery loses no message in transit, but a queue of depth 1 replaces each "
+            "message that is not taken before the next one arrives. If only the latest value "
+            "matters, use best effort or transient local."
         ),
         bad="""\
 system: queues
@@ -41,12 +41,12 @@ nodes:
     )
 )
 
-#: In hertz: on a slower topic a message is taken before the next one comes.
+#: In hertz; on slower topics a message is taken before the next one arrives.
 FAST_HZ = 10.0
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the ends of topics whose rate is known."""
+    """Check the publishers and subscriptions of topics with a known rate."""
     known = context.once(rates)
     for node in context.system.nodes:
         for port in node.ports:
@@ -57,9 +57,9 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 yield Diagnostic(
                     RULE,
                     f"reliable topic '{port.full_name}' at {number(rate_hz)} Hz "
-                    "has room for one message only",
+                    "has a queue depth of 1",
                     port.qos.policy_span("depth"),
-                    hint="give it a depth of 10, or make it best effort",
+                    hint="use a depth of 10, or best effort",
                 )
 
 

@@ -1,4 +1,4 @@
-"""A node that counts as silent between two of its messages."""
+"""A node that counts as silent between two messages."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ RULE = register(
         code="RC405",
         name="silence-too-short",
         severity=Severity.ERROR,
-        summary="topic_silence_ms is not longer than the period of the messages.",
+        summary="topic_silence_ms is not longer than the publishing period.",
         why=(
-            "The node would count as failed although it publishes when it should. A timer is never "
-            "punctual to the microsecond: allow for a few periods."
+            "The node would fail although it publishes on time. Timers are never exact, so allow "
+            "for several periods."
         ),
         bad="""\
 system: watching
@@ -42,7 +42,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Hold what is watched against the timers that publish."""
+    """Compare the watched limits with the periods of the publishing timers."""
     periods: dict[str, dict[str, tuple[PortOfNode, float]]] = {}
     for end, period_s in context.once(timed_publishers):
         of_node = periods.setdefault(end.node.name.value, {})
@@ -52,17 +52,17 @@ def check(context: Context) -> Iterator[Diagnostic]:
         watch = node.supervision.watch
         for name, limit in watch.topics:
             if name.value in known:
-                yield from _held(limit, *known[name.value])
+                yield from _compare(limit, *known[name.value])
         if watch.silence_ms is not None and known and len(known) == _publishers(node):
             fastest = min(known.values(), key=lambda item: item[1])
-            yield from _held(watch.silence_ms, *fastest)
+            yield from _compare(watch.silence_ms, *fastest)
 
 
 def _publishers(node: Node) -> int:
     return len(node.ports_of(PortKind.PUBLISHER))
 
 
-def _held(limit: Located[float], end: PortOfNode, period_s: float) -> Iterator[Diagnostic]:
+def _compare(limit: Located[float], end: PortOfNode, period_s: float) -> Iterator[Diagnostic]:
     period_ms = period_s * 1000.0
     if limit.value > period_ms:
         return
@@ -71,6 +71,6 @@ def _held(limit: Located[float], end: PortOfNode, period_s: float) -> Iterator[D
         f"node '{end.node.name}' counts as silent after {number(limit.value)} ms, but publishes "
         f"'{end.port.name}' every {number(period_ms)} ms",
         limit.span,
-        (Label(end.port.name.span, "watched here"),),
-        f"allow for a few messages to be late: {number(3 * period_ms)}",
+        (Label(end.port.name.span, "the watched publisher"),),
+        f"allow for late messages, for example {number(3 * period_ms)}",
     )

@@ -1,4 +1,4 @@
-"""A timer that could not run, or not as often as it says."""
+"""A timer whose period is not valid or not practical."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ RULE = register(
         code="RC411",
         name="timer-period",
         severity=Severity.ERROR,
-        summary="A timer's period is not positive, or beyond all use.",
+        summary="A timer's period is not positive, or outside the practical range.",
         why=(
-            "rcl refuses a period that is not positive. One under 0.1 ms is more than Python can "
-            "do; one over a day is nearly always a mistake of units."
+            "rcl refuses periods that are not positive. Periods under 0.1 ms are too short for "
+            "Python; periods over one day are almost always a unit error."
         ),
         bad="""\
 system: timing
@@ -74,8 +74,8 @@ def _problem(node: Node, timer: Timer) -> str | None:
 
 
 def _origin(timer: Timer) -> str:
-    """Say which values an expression got its result from."""
+    """Return which values an expression was evaluated with."""
     value = timer.period.value
     if not isinstance(value, Expression) or not value.paths:
         return ""
-    return ", with the values its parameters start with"
+    return ", with the initial parameters"

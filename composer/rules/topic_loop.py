@@ -1,4 +1,4 @@
-"""Messages that make messages for ever."""
+"""Subscriptions that republish each other's messages."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ RULE = register(
         code="RC326",
         name="topic-loop",
         severity=Severity.WARNING,
-        summary="Subscriptions republish in a circle, with neither timer nor condition in it.",
+        summary="Subscriptions republish messages in a cycle without a timer or condition.",
         why=(
-            "The first message goes round as fast as the processor can, for ever, and every "
-            "further one besides: a message storm."
+            "One message circulates forever, as fast as the processor allows, and each further "
+            "message adds to the load."
         ),
         bad="""\
 system: loop
@@ -49,31 +49,31 @@ nodes:
     )
 )
 
-#: For each topic, where its messages are passed on to at once, and by which subscription.
+#: For each topic, the topics to which its messages are republished, with the subscription.
 _Steps = dict[str, dict[str, PortOfNode]]
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Follow messages from topic to topic; every circle is reported once."""
+    """Follow messages from topic to topic; report every cycle once."""
     steps = _steps(context)
     done: set[str] = set()
     for start in steps:
-        circle = _circle(steps, start, done)
-        if circle:
-            yield _finding(circle)
+        cycle = _cycle(steps, start, done)
+        if cycle:
+            yield _diagnostic(cycle)
 
 
 def _steps(context: Context) -> _Steps:
     steps: _Steps = {}
     for node in context.system.nodes:
         for port in node.ports_of(PortKind.SUBSCRIPTION):
-            for target in _passes_on(node.ports_of(PortKind.PUBLISHER), port):
+            for target in _republished(node.ports_of(PortKind.PUBLISHER), port):
                 if not is_opaque(port.full_name) and not is_opaque(target):
                     steps.setdefault(port.full_name, {})[target] = PortOfNode(node, port)
     return steps
 
 
-def _passes_on(publishers: tuple[Port, ...], port: Port) -> Iterator[str]:
+def _republished(publishers: tuple[Port, ...], port: Port) -> Iterator[str]:
     reaction = port.reaction(Event.MESSAGE)
     if reaction is None or reaction.when is not None:
         return
@@ -81,39 +81,39 @@ def _passes_on(publishers: tuple[Port, ...], port: Port) -> Iterator[str]:
     yield from (item.full_name for item in publishers if item.name.value in names)
 
 
-def _circle(steps: _Steps, start: str, done: set[str]) -> list[tuple[str, PortOfNode]]:
-    """Return the first circle that is reached from ``start`` over topics not yet ``done``.
+def _cycle(steps: _Steps, start: str, done: set[str]) -> list[tuple[str, PortOfNode]]:
+    """Return the first cycle that can be reached from ``start`` through topics not ``done``.
 
-    Each item is a topic and the subscription that passes messages on to it.
+    Each item is a topic and the subscription that republishes to it.
     """
-    way: list[str] = []
-    taken: list[tuple[str, PortOfNode]] = []
+    path: list[str] = []
+    steps_taken: list[tuple[str, PortOfNode]] = []
     rest = {start: iter(steps.get(start, {}).items())}
     if start not in done:
-        way.append(start)
-    while way:
-        target, end = next(rest[way[-1]], (None, None))
+        path.append(start)
+    while path:
+        target, end = next(rest[path[-1]], (None, None))
         if target is None or end is None:
-            done.add(way.pop())
-            taken = taken[: max(len(way) - 1, 0)]
-        elif target in way:
-            done.update(way)
-            return [*taken[way.index(target) :], (target, end)]
+            done.add(path.pop())
+            steps_taken = steps_taken[: max(len(path) - 1, 0)]
+        elif target in path:
+            done.update(path)
+            return [*steps_taken[path.index(target) :], (target, end)]
         elif target not in done:
-            taken.append((target, end))
-            way.append(target)
+            steps_taken.append((target, end))
+            path.append(target)
             rest[target] = iter(steps.get(target, {}).items())
     return []
 
 
-def _finding(circle: list[tuple[str, PortOfNode]]) -> Diagnostic:
-    names = [topic for topic, _ in circle]
-    way = " -> ".join((names[-1], *names))
-    first, *others = [(end, place_of(end)[0]) for _, end in circle]
+def _diagnostic(cycle: list[tuple[str, PortOfNode]]) -> Diagnostic:
+    names = [topic for topic, _ in cycle]
+    path = " -> ".join((names[-1], *names))
+    first, *others = [(end, place_of(end)[0]) for _, end in cycle]
     return Diagnostic(
         RULE,
-        f"messages go round for ever: {way}",
+        f"messages circulate forever: {path}",
         first[1],
-        tuple(Label(place, f"'{end_name(end)}' passes them on") for end, place in others),
-        "let a timer publish, or add a 'when' that ends it",
+        tuple(Label(place, f"'{end_name(end)}' republishes them") for end, place in others),
+        "publish from a timer, or add a 'when' condition that breaks the cycle",
     )

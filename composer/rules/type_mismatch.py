@@ -1,4 +1,4 @@
-"""Two types on one topic, service or action."""
+"""Different types on one topic, service or action."""
 
 from __future__ import annotations
 
@@ -15,8 +15,11 @@ RULE = register(
         code="RC303",
         name="type-mismatch",
         severity=Severity.ERROR,
-        summary="The ends of one topic, service or action have different types.",
-        why="DDS does not join ends of different types: nothing arrives, and nothing says so.",
+        summary="The endpoints of a topic, service or action have different types.",
+        why=(
+            "DDS does not match endpoints of different types: no data arrives, and no error is "
+            "reported."
+        ),
         bad="""\
 system: types
 nodes:
@@ -36,12 +39,12 @@ nodes:
     )
 )
 
-#: So many of the ends that agree with a wrong one are shown beside it.
+#: Maximum number of further endpoints with the same wrong type to show.
 _SHOWN = 3
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Compare the types on every channel; each type that is not the common one is a finding."""
+    """Compare the types on every channel; report each type other than the most common one."""
     for channel in context.channels:
         yield from _channel(context, channel)
 
@@ -53,7 +56,7 @@ def _channel(context: Context, channel: Channel) -> Iterator[Diagnostic]:
             by_type[end.port.interface.value].append(end)
     if len(by_type) < 2:
         return
-    common = max(by_type, key=lambda name: len(by_type[name]))  # the first, of equals
+    common = max(by_type, key=lambda name: len(by_type[name]))  # the first one in case of a tie
     usual = by_type.pop(common)[0]
     for name, ends in by_type.items():
         odd = ends[0]

@@ -1,4 +1,4 @@
-"""A subscription that nobody publishes to."""
+"""A subscription to a topic without publishers."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ RULE = register(
         code="RC323",
         name="unfed-subscription",
         severity=Severity.WARNING,
-        summary="Nothing in the system publishes on a topic that is subscribed to.",
+        summary="No node in the system publishes to a subscribed topic.",
         why=(
-            "The node waits for messages that never come: most often a name differs on the two "
-            "sides. Where the messages come from outside, 'external: true' says so; where the "
-            "node can do without, 'required: false'."
+            "The node waits for messages that never arrive. The usual cause is a name that "
+            "differs between publisher and subscription. If an external node publishes the "
+            "messages, set 'external: true'; if the node works without them, 'required: false'."
         ),
         bad="""\
 system: unfed
@@ -43,13 +43,13 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look for topics with subscriptions only."""
+    """Check for topics that have only subscriptions."""
     for end in lonely_ends(context, PortKind.SUBSCRIPTION):
         if end.port.required is None:
             place, labels = place_of(end)
             yield Diagnostic(
                 RULE,
-                f"nobody in this system publishes '{end.port.full_name}', "
+                f"no node in this system publishes '{end.port.full_name}', "
                 f"which '{end_name(end)}' subscribes to",
                 place,
                 labels,

@@ -1,4 +1,4 @@
-"""A value that cannot be put where it is to go."""
+"""A value that does not fit its field."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ RULE = register(
         code="RC305",
         name="unfit-value",
         severity=Severity.ERROR,
-        summary="A constant or an expression does not fit the field it is to fill.",
+        summary="A constant or an expression does not fit the field it is assigned to.",
         why=(
-            "Message fields are typed and bounded: 300 does not fit a uint8, a text no number, "
-            "and a condition must be true or false. At run time the reaction would fail."
+            "Message fields are typed and bounded: 300 does not fit a uint8, text does not fit a "
+            "number, and a condition must be a bool. The reaction would fail at run time."
         ),
         bad="""\
 system: values

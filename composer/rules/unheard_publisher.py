@@ -1,4 +1,4 @@
-"""A publisher that nobody listens to."""
+"""A publisher without subscriptions."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ RULE = register(
         code="RC324",
         name="unheard-publisher",
         severity=Severity.INFO,
-        summary="Nothing in the system subscribes to a topic that is published.",
+        summary="No node in the system subscribes to a published topic.",
         why=(
-            "It may be meant for a tool or for another system; then 'external: true' says so. "
-            "Otherwise a name is wrong on one side, or the work is for nothing."
+            "If the topic is for tools or another system, set 'external: true'. Otherwise a name "
+            "is wrong on one side, or the messages are not needed."
         ),
         bad="""\
 system: unheard
@@ -37,13 +37,13 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look for topics with publishers only."""
+    """Check for topics that have only publishers."""
     for end in lonely_ends(context, PortKind.PUBLISHER):
         if end.port.required is None:
             place, labels = place_of(end)
             yield Diagnostic(
                 RULE,
-                f"nobody in this system subscribes to '{end.port.full_name}', "
+                f"no node in this system subscribes to '{end.port.full_name}', "
                 f"which '{end_name(end)}' publishes",
                 place,
                 labels,

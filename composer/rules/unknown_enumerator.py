@@ -1,4 +1,4 @@
-"""A number that a message has no name for."""
+"""A number that is none of the constants of its field."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ RULE = register(
         code="RC306",
         name="unknown-enumerator",
         severity=Severity.WARNING,
-        summary="A field that the message has constants for is given none of them.",
+        summary="A field for which the message defines constants is set to another number.",
         why=(
-            "A message that defines STATUS_IDLE and STATUS_BUSY means its field 'status' to be one "
-            "of them. Whoever receives another number does not know what to do."
+            "A message that defines STATUS_IDLE and STATUS_BUSY expects one of them in its field "
+            "'status'. Subscribers cannot interpret any other number."
         ),
         bad="""\
 system: battery
@@ -37,12 +37,12 @@ nodes:
     )
 )
 
-#: So many names are told in a hint.
+#: Maximum number of names in a hint.
 _SHOWN = 6
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the numbers that fields of messages are filled with."""
+    """Check the numbers that message fields are set to."""
     for template, message in contents(context):
         yield from _template(template, message, context.interfaces)
 
@@ -73,9 +73,9 @@ def _number(constant: Constant, field: str, message: Message) -> Iterator[Diagno
     listed = ", ".join(names[:_SHOWN]) + (", ..." if len(names) > _SHOWN else "")
     yield Diagnostic(
         RULE,
-        f"{message.name} has no {field.upper()}_... of {value}",
+        f"{message.name} has no constant {field.upper()}_* with the value {value}",
         constant.span,
-        hint=f"it has: {listed}",
+        hint=f"valid here: {listed}",
     )
 
 
@@ -90,7 +90,7 @@ def _enumerators(message: Message, field: str) -> Mapping[str, int]:
 
 
 def _is_combination(value: int, known: set[int]) -> bool:
-    """Say whether the constants are flags, and ``value`` a combination of some of them."""
+    """Return whether the constants are flags and ``value`` is a combination of them."""
     flags = known - {0}
     if not all(flag > 0 and flag.bit_count() == 1 for flag in flags) or max(flags, default=0) < 4:
         return False

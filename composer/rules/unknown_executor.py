@@ -1,4 +1,4 @@
-"""A node put on an executor that the system does not have."""
+"""A node on an executor that is not declared."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ RULE = register(
         code="RC207",
         name="unknown-executor",
         severity=Severity.ERROR,
-        summary="A node is put on an executor that is not under executors.",
-        why="Nobody would call the node's callbacks.",
+        summary="A node runs on an executor that is not declared under executors.",
+        why="The callbacks of the node would never run.",
         bad="""\
 system: threads
 executors:
@@ -36,7 +36,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the executor of every node that names one."""
+    """Check the executor of every node that names one."""
     known = {executor.name.value for executor in context.system.executors} | {DEFAULT_EXECUTOR}
     for node in context.system.nodes if not context.is_partial else ():
         name = node.executor

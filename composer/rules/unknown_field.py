@@ -13,8 +13,8 @@ RULE = register(
         code="RC304",
         name="unknown-field",
         severity=Severity.ERROR,
-        summary="An expression reads, or a map fills, a field that the message does not have.",
-        why="At run time the reaction would fail at every message.",
+        summary="An expression reads, or a map sets, a field that the message does not have.",
+        why="The reaction would fail on every message.",
         bad="""\
 system: fields
 nodes:
@@ -34,7 +34,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Report the fields that are missing."""
+    """Report the fields that do not exist."""
     for problem in context.once(field_problems):
         if problem.missing:
             yield Diagnostic(RULE, problem.message, problem.span, hint=problem.hint)

@@ -1,4 +1,4 @@
-"""A type of messages, services or actions that is nowhere to be found."""
+"""An interface type that does not exist."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ RULE = register(
         code="RC301",
         name="unknown-interface",
         severity=Severity.ERROR,
-        summary="A port's type is neither installed nor in an interface package of the project.",
-        why="Without its definition the port cannot be made, and nothing that uses it be checked.",
+        summary=(
+            "A port's type is neither installed nor defined in an interface package of the project."
+        ),
+        why="Without the definition, the port cannot be created, and its uses cannot be checked.",
         bad="""\
 system: types
 nodes:
@@ -69,5 +71,5 @@ def _hint(context: Context, port: Port) -> str | None:
         return f"write '{full}'"
     hint = similar_interface(full if slash else name, known)
     if hint is not None or not slash:
-        return hint or f"write it with its package, as std_msgs/{folder}/Name"
+        return hint or f"include the package, as in std_msgs/{folder}/Name"
     return f"package '{package}' is neither installed nor among the project's interfaces"

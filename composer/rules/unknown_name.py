@@ -1,4 +1,4 @@
-"""An expression that uses a name which means nothing where it stands."""
+"""An expression with a name that is not in scope."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ RULE = register(
         code="RC209",
         name="unknown-name",
         severity=Severity.ERROR,
-        summary="An expression uses a name that is not in scope where it stands.",
+        summary="An expression uses a name that is not in scope.",
         why=(
-            "What can be used depends on what is reacted to: 'message' in a subscription, "
-            "'request' in a service, 'response' in on_response, and so on; 'parameters', 'state', "
-            "'count', 'now' and 'node' everywhere."
+            "The available names depend on the event: 'message' in a subscription, 'request' in a "
+            "service, 'response' in on_response, and so on. 'parameters', 'state', 'count', 'now' "
+            "and 'node' are always available."
         ),
         bad="""\
 system: names
@@ -39,14 +39,14 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the first part of every path."""
+    """Check the first part of every path."""
     for site in context.once(sites):
         for path in site.expression.paths:
             if path.root in site.names:
                 continue
             yield Diagnostic(
                 RULE,
-                f"'{path.root}' is not a name that can be used here",
+                f"name '{path.root}' is not available here",
                 part_of_path(site.span, site.expression, path),
                 hint=_hint(path.root, site),
             )
@@ -59,5 +59,5 @@ def _hint(name: str, site: Site) -> str | None:
         return f"write 'state.{name}'"
     own = EVENT_NAMES.get(site.event) if site.event is not None else None
     if own and any(name in names for names in EVENT_NAMES.values()):
-        return f"here it is '{own[0]}'"
+        return f"use '{own[0]}' here"
     return suggestion(name, site.names)

@@ -1,4 +1,4 @@
-"""A connection, a dependency or a setting that names a node the system does not have."""
+"""A reference to a node that the system does not have."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RULE = register(
         name="unknown-node",
         severity=Severity.ERROR,
         summary="A connection, a dependency or --set names a node that is not in this system.",
-        why="The connection would join nothing, and the dependency could never be met.",
+        why="The connection would have no effect, and the dependency could never be met.",
         bad="""\
 system: dependency
 nodes:
@@ -34,7 +34,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the ends of connections, at what nodes depend on, at the command line."""
+    """Check the endpoints of connections, the dependencies of nodes, and the command line."""
     if context.is_partial:
         return
     for endpoint in endpoints(context.system):

@@ -1,4 +1,4 @@
-"""A node of a type that there is no file for."""
+"""A node of a type that does not exist."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ RULE = register(
         code="RC201",
         name="unknown-node-type",
         severity=Severity.ERROR,
-        summary="A node's type is neither in the project's nodes/ nor one of the composer's own.",
-        why="Without its type nothing is known of the node: neither its ports nor its behaviour.",
+        summary="A node's type is neither in the project's nodes/ folder nor built in.",
+        why="Without the type, the ports and the behavior of the node are unknown.",
         bad="""\
 system: stubs
 nodes:
@@ -33,20 +33,20 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the type of every node that names one."""
+    """Check the type of every node that names one."""
     for node in context.system.nodes:
         name = node.type_name
         if name is None or node.type_found or is_opaque(name.value):
             continue
         if context.catalog.find(name.value) is not None:
-            continue  # the file is there but broken, and that has been said
+            continue  # the file exists but is invalid, which is reported elsewhere
         if context.catalog.stray(name.value) is not None:
-            message = f"the file of node type '{name}' is a link that leads out of the project"
-            yield Diagnostic(RULE, message, name.span, hint="copy the file it leads to")
+            message = f"the file of node type '{name}' is a symbolic link that leaves the project"
+            yield Diagnostic(RULE, message, name.span, hint="copy the target into the project")
             continue
         yield Diagnostic(
             RULE,
-            f"node '{node.name}' is of type '{name}', which does not exist",
+            f"node '{node.name}' has type '{name}', which does not exist",
             name.span,
             hint=suggestion(name.value, context.catalog.names()),
         )

@@ -16,10 +16,10 @@ RULE = register(
         code="RC206",
         name="unknown-parameter",
         severity=Severity.ERROR,
-        summary="A value is given to, or an expression reads, a parameter that is not declared.",
+        summary="A parameter that is not declared is set, or read by an expression.",
         why=(
-            "A misspelt parameter leaves the real one at its default, and nothing shows it until "
-            "the robot moves at the wrong speed."
+            "A misspelled parameter leaves the real one at its default, which goes unnoticed "
+            "until the robot moves at the wrong speed."
         ),
         bad="""\
 system: parameters
@@ -44,7 +44,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the values that instances give and at what expressions read."""
+    """Check the values that instances set and the parameters that expressions read."""
     for node in context.system.nodes:
         for unknown in node.unknown:
             if unknown.section == "parameters":
@@ -64,7 +64,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
         if name not in names[node_name] and not doubts.may_have(node_name, "parameters"):
             yield Diagnostic(
                 RULE,
-                f"the node declares no parameter '{name}'",
+                f"the node does not declare parameter '{name}'",
                 span,
                 hint=suggestion(name, known[node_name]),
             )

@@ -18,7 +18,7 @@ RULE = register(
         name="unknown-port",
         severity=Severity.ERROR,
         summary="A connection, a reaction or an instance names a port that the node does not have.",
-        why="Nothing would flow there: a port has to be declared by the node or by its type.",
+        why="No data would flow: a port must be declared by the node or by its type.",
         bad="""\
 system: ports
 nodes:
@@ -44,7 +44,7 @@ _SENDERS = {
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the ends of connections, at what reactions send through, at what instances refine."""
+    """Check the ports that connections, chains, reactions and overrides refer to."""
     doubts = context.once(doubt)
     for endpoint in endpoints(context.system):
         if not doubts.may_have(endpoint.node, *PORT_SECTIONS):
@@ -65,7 +65,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             hint=suggestion(name.value, candidates),
         )
     for node in context.system.nodes:
-        yield from _refinements(node)
+        yield from _overrides(node)
 
 
 def _endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
@@ -83,7 +83,7 @@ def _endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
     )
 
 
-def _refinements(node: Node) -> Iterator[Diagnostic]:
+def _overrides(node: Node) -> Iterator[Diagnostic]:
     for unknown in node.unknown:
         if unknown.section not in _SECTIONS:
             continue

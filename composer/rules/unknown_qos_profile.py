@@ -1,4 +1,4 @@
-"""A QoS profile used by a name that nobody gave to one."""
+"""A reference to a QoS profile that does not exist."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ RULE = register(
         code="RC205",
         name="unknown-qos-profile",
         severity=Severity.ERROR,
-        summary="A QoS profile is used that is neither in qos_profiles nor a preset.",
+        summary="A QoS profile is neither declared under qos_profiles nor a preset.",
         why=(
-            "Falling back on some other profile could leave two ends that never match, without a "
-            "word at run time."
+            "Falling back to another profile could create endpoints that never match, without an "
+            "error at run time."
         ),
         bad="""\
 system: profile
@@ -36,10 +36,10 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at every use of a profile by name."""
+    """Check every reference to a profile by name."""
     for name in context.once(unknown_profiles):
         hint = (
-            "leave 'qos' out for rclpy's defaults, or say 'command', which is the same"
+            "omit 'qos' to use rclpy's defaults, or use 'command', which is the same"
             if name.value == "default"
             else suggestion(name.value, known_profiles(context))
         )
@@ -47,7 +47,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 
 def unknown_profiles(context: Context) -> tuple[Located[str], ...]:
-    """Return the uses of names that no profile has."""
+    """Return the references to profiles that do not exist."""
     known = known_profiles(context)
     if context.is_partial:
         return ()

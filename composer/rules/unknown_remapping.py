@@ -15,8 +15,8 @@ RULE = register(
         code="RC208",
         name="unknown-remapping",
         severity=Severity.ERROR,
-        summary="A remapping names a topic, service or action that no port of the node has.",
-        why="ROS ignores such a remapping without a word, and the port keeps its old name.",
+        summary="A remapping names a topic, service or action that no port of the node uses.",
+        why="ROS ignores such a remapping silently, and the port keeps its name.",
         bad="""\
 system: renamed
 nodes:
@@ -57,7 +57,7 @@ _EVERY_NODE = (
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at what every remapping renames."""
+    """Check the name that each remapping replaces."""
     for node in context.system.nodes:
         if not node.complete or any(is_opaque(port.ros_name.value) for port in node.ports):
             continue
@@ -66,7 +66,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 source = remapping.source
                 yield Diagnostic(
                     RULE,
-                    f"node '{node.name}' has no port with the name '{source}' to remap",
+                    f"node '{node.name}' has no port named '{source}' to remap",
                     source.span,
                     hint=_hint(node, source.value),
                 )
@@ -75,7 +75,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
 def _known(node: Node, remapping: Remapping) -> bool:
     source = remapping.source.value
     if is_opaque(source) or topic_name_problem(source) is not None:
-        return True  # nothing to say, or another rule's to say
+        return True  # cannot be checked, or is reported by another rule
     return any(matched_ports(node, remapping)) or own_name(node, source) in {
         own_name(node, name) for name in _EVERY_NODE
     }
@@ -84,5 +84,5 @@ def _known(node: Node, remapping: Remapping) -> bool:
 def _hint(node: Node, source: str) -> str | None:
     port = node.port(source)
     if port is not None:
-        return f"the {port.kind.channel} of port '{source}' is called '{port.ros_name}'"
+        return f"the {port.kind.channel} of port '{source}' is named '{port.ros_name}'"
     return suggestion(source, [port.ros_name.value for port in node.ports])

@@ -1,4 +1,4 @@
-"""A part of the node's own memory that was not declared."""
+"""A state variable that is not declared."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ RULE = register(
         code="RC210",
         name="unknown-state",
         severity=Severity.ERROR,
-        summary="A name under 'state' is used or set that the node does not declare.",
-        why="What a node remembers is declared with its first value, so that it always has one.",
+        summary="A reaction uses or sets a state variable that the node does not declare.",
+        why="State variables are declared with their initial value, so that they always have one.",
         bad="""\
 system: memory
 nodes:
@@ -39,7 +39,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at what reactions set and at what expressions read."""
+    """Check the state that reactions set and expressions read."""
     doubts = context.once(doubt)
     known = {
         node.name.value: frozenset(name.value for name, _ in node.state)
@@ -50,7 +50,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
         if name not in known[of_node] and not doubts.may_have(of_node, "state"):
             names = [declared.value for declared, _ in node.state]
             hint = suggestion(name, names) or f"declare it: 'state: {{{name}: 0}}'"
-            yield Diagnostic(RULE, f"the node declares no state '{name}'", span, hint=hint)
+            yield Diagnostic(RULE, f"the node does not declare state '{name}'", span, hint=hint)
 
 
 def _uses(context: Context) -> Iterator[tuple[Node, str, Span]]:

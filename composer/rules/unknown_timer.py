@@ -1,4 +1,4 @@
-"""An instance that refines a timer its node type does not have."""
+"""An override of a timer that the node type does not have."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ RULE = register(
         code="RC204",
         name="unknown-timer",
         severity=Severity.ERROR,
-        summary="An instance refines a timer that its node type does not have.",
-        why="A node of a type has the timers of the type; the change would reach none of them.",
+        summary="An instance overrides a timer that its node type does not have.",
+        why="A node has only the timers of its type, so the override would have no effect.",
         bad="""\
 system: source
 nodes:
@@ -37,7 +37,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the timers that instances refine."""
+    """Check the timers that instances override."""
     for node in context.system.nodes:
         for unknown in node.unknown:
             if unknown.section == "timers":

@@ -1,4 +1,4 @@
-"""A watch over the silence of a publisher that the node does not have."""
+"""Silence monitoring of a publisher that does not exist."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RULE = register(
         name="unknown-watched-publisher",
         severity=Severity.ERROR,
         summary="topic_silence_ms names a publisher that the node does not have.",
-        why="Nothing would be watched, and the node could fall silent unnoticed.",
+        why="The publisher would not be monitored, and its silence would go unnoticed.",
         bad="""\
 system: watching
 nodes:
@@ -35,7 +35,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Hold the publishers that are watched against those there are."""
+    """Compare the watched publishers with the declared ones."""
     doubts = context.once(doubt)
     for node in context.system.nodes:
         if not node.complete or doubts.may_have(node.name.value, *PORT_SECTIONS):

@@ -1,4 +1,4 @@
-"""Parameters for a node that is not there."""
+"""Parameters for a node that does not exist."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ RULE = register(
         code="RC246",
         name="unmatched-parameters",
         severity=Severity.WARNING,
-        summary="A parameter file has values for a node that the system does not have.",
+        summary="A parameter file sets values for a node that the system does not have.",
         why=(
-            "The names in a parameter file are those that nodes have in ROS, namespace and all. "
-            "Values under any other name are read by nobody, and the node keeps its defaults."
+            "Parameter files use the full ROS names of nodes, including the namespace. Values "
+            "under any other name are ignored, and the node keeps its defaults."
         ),
         bad="""\
 # file: system.yaml
@@ -40,12 +40,12 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the names in parameter files that are no node's."""
+    """Check the node names in parameter files."""
     names = [node.full_name for node in context.system.nodes]
     for name in context.system.unmatched_parameters if not context.is_partial else ():
         yield Diagnostic(
             RULE,
-            f"no node of this system is called '{name}'",
+            f"no node of this system is named '{name}'",
             name.span,
             hint=suggestion(name.value, names),
         )

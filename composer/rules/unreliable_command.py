@@ -1,4 +1,4 @@
-"""Orders that may be lost."""
+"""A command topic with best-effort delivery."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ RULE = register(
         code="RC316",
         name="unreliable-command",
         severity=Severity.INFO,
-        summary="A topic that carries commands, by its name, is best effort.",
+        summary="A topic whose name suggests commands is best effort.",
         why=(
-            "A lost reading is followed by the next one; a lost order is not carried out. The "
-            "preset 'command' is reliable."
+            "A lost reading is followed by the next one; a lost command is never executed. The "
+            "'command' preset is reliable."
         ),
         bad="""\
 system: orders
@@ -41,7 +41,7 @@ _COMMAND = re.compile(r"(^|[/_])(cmd|command|commands|order|orders)($|[/_])")
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the reliability of publishers whose topic is called a command."""
+    """Check the reliability of publishers whose topic name suggests commands."""
     for node in context.system.nodes:
         for port in node.ports_of(PortKind.PUBLISHER):
             if not port.qos.known or port.qos.profile.reliability is Reliability.RELIABLE:
@@ -49,7 +49,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             if _COMMAND.search(port.full_name):
                 yield Diagnostic(
                     RULE,
-                    f"'{port.full_name}' carries commands, but may lose them: it is best effort",
+                    f"'{port.full_name}' carries commands, but is best effort and may lose them",
                     port.qos.policy_span("reliability"),
                     hint="use 'qos: command'",
                 )

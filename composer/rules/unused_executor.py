@@ -1,4 +1,4 @@
-"""An executor without a node."""
+"""An executor without nodes."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ RULE = register(
         code="RC245",
         name="unused-executor",
         severity=Severity.INFO,
-        summary="No node runs on an executor of executors.",
-        why="It is left over, or a node that was meant for it runs on another one.",
+        summary="No node runs on a declared executor.",
+        why="The executor is left over, or a node that was meant for it runs on another one.",
         bad="""\
 system: threads
 executors:
@@ -35,13 +35,13 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Hold the executors against the nodes. One called ``default`` is that of all other nodes."""
+    """Compare the executors with the nodes. An executor named ``default`` runs all other nodes."""
     used = {
         node.executor.value if node.executor else DEFAULT_EXECUTOR for node in context.system.nodes
     }
     known = {executor.name.value for executor in context.system.executors} | {DEFAULT_EXECUTOR}
     if not used <= known or context.once(doubt).any:
-        return  # the unknown name may be meant for the unused one
+        return  # an unknown name may be a misspelling of the unused one
     for executor in context.system.executors:
         if executor.name.value not in used:
             yield Diagnostic(RULE, f"no node runs on '{executor.name}'", executor.name.span)

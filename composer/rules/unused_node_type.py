@@ -1,4 +1,4 @@
-"""A node type of the project that none of its systems uses."""
+"""A node type that no system uses."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ RULE = register(
         code="RC244",
         name="unused-node-type",
         severity=Severity.INFO,
-        summary="No system that was looked at uses a node type that was looked at.",
+        summary="No validated system uses a validated node type.",
         why=(
-            "It is left over, or a system that was meant to use it uses another one. It is told "
-            "only when systems and node types are validated together."
+            "The node type is left over, or a system uses another one instead. Reported only if "
+            "systems and node types are validated together."
         ),
         bad="""\
 nodes/planner.yaml
@@ -32,7 +32,7 @@ systems/pipeline.yaml    # uses planner
 
 
 def unused_node_types(loaded: Iterable[System]) -> Iterator[Diagnostic]:
-    """Look at all systems and node types of a run together."""
+    """Check all systems and node types of a run together."""
     node_types: list[System] = []
     systems: list[System] = []
     for system in loaded:

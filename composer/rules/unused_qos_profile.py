@@ -1,4 +1,4 @@
-"""A QoS profile that nobody uses."""
+"""A QoS profile that is not used."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ RULE = register(
         code="RC242",
         name="unused-qos-profile",
         severity=Severity.INFO,
-        summary="A profile of qos_profiles is used by no port, connection or other profile.",
-        why="It is left over, or a port that was meant to use it has other QoS than people think.",
+        summary="A declared QoS profile is not used by any port, connection or other profile.",
+        why=(
+            "The profile is left over, or a port that should use it has a different QoS profile "
+            "than intended."
+        ),
         bad="""\
 system: profiles
 qos_profiles:
@@ -36,13 +39,13 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Hold the profiles against their uses."""
+    """Compare the profiles with the references to them."""
     if (
         context.once(doubt).any
         or context.once(unknown_profiles)
         or not all(node.complete for node in context.system.nodes)
     ):
-        return  # what is unknown there may be meant for the unused one
+        return  # an unknown name may be a misspelling of the unused one
     used = {reference.name.value for reference in context.system.qos_references}
     for profile in context.system.qos_profiles:
         if profile.name.value not in used:

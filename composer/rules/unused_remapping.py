@@ -1,4 +1,4 @@
-"""A remapping that changes nothing."""
+"""A remapping that has no effect."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ RULE = register(
         code="RC241",
         name="unused-remapping",
         severity=Severity.WARNING,
-        summary="A remapping has no effect, because a connection names the port anew.",
+        summary="A remapping has no effect, because a connection renames the port.",
         why=(
-            "The name in a connection wins over a remapping. Whoever reads the remapping expects "
-            "the port under a name that it does not have."
+            "The name in a connection takes precedence over a remapping, so the port does not "
+            "have the name that the remapping suggests."
         ),
         bad="""\
 system: renamed
@@ -45,7 +45,7 @@ connections:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the names that remapped ports have in the end."""
+    """Check the final names of remapped ports."""
     for node in context.system.nodes:
         for remapping in node.remappings:
             yield from _remapping(node, remapping)
@@ -56,14 +56,14 @@ def _remapping(node: Node, remapping: Remapping) -> Iterator[Diagnostic]:
     ports = list(matched_ports(node, remapping))
     if not ports or is_opaque(target):
         return
-    wanted = own_name(node, target)
-    actual = sorted({port.full_name for port in ports} - {wanted})
-    if any(port.full_name == wanted for port in ports) or not actual:
+    expected = own_name(node, target)
+    actual = sorted({port.full_name for port in ports} - {expected})
+    if any(port.full_name == expected for port in ports) or not actual:
         return
     yield Diagnostic(
         RULE,
         f"remapping '{remapping.source}' to '{target}' has no effect: "
-        f"the name is '{actual[0]}' in the end",
+        f"the final name is '{actual[0]}'",
         remapping.source.span,
-        hint="remove the remapping, or the port from its connection",
+        hint="remove the remapping, or remove the port from its connection",
     )

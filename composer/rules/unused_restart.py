@@ -1,4 +1,4 @@
-"""Settings for restarts where nothing is restarted."""
+"""Restart settings that have no effect."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ RULE = register(
         code="RC407",
         name="unused-restart",
         severity=Severity.WARNING,
-        summary="restart is set, but what fails is not restarted.",
-        why="Without 'on_failure: restart' a node that fails stays down, whatever 'restart' says.",
+        summary="restart is set, but failed nodes are not restarted.",
+        why="Without 'on_failure: restart', a failed node stays down, and 'restart' has no effect.",
         bad="""\
 system: restarting
 nodes:
@@ -35,7 +35,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look for declared budgets that no node uses."""
+    """Check for restart budgets that no node uses."""
     system = context.system
     declared: dict[Span, None] = {}
     used: set[Span] = set()
@@ -50,11 +50,14 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for span in declared:
         if span not in used:
             yield Diagnostic(
-                RULE, "nothing is restarted by this", span, hint="add 'on_failure: restart'"
+                RULE,
+                "the restart settings have no effect",
+                span,
+                hint="add 'on_failure: restart'",
             )
 
 
 def _uses(supervision: Supervision) -> bool:
-    """Say whether the settings matter; errors are counted within their window, too."""
+    """Return whether the settings have an effect; errors are counted within their window, too."""
     counts_errors = supervision.watch.max_errors is not None
     return supervision.policy is OnFailure.RESTART or counts_errors

@@ -1,4 +1,4 @@
-"""A service type on a topic, or any other mixture of kinds."""
+"""An interface of the wrong kind, such as a service type on a topic."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ RULE = register(
         code="RC302",
         name="wrong-interface-kind",
         severity=Severity.ERROR,
-        summary="A port has a type of another kind: a service type on a topic, say.",
-        why="Topics carry messages, services and actions have types of their own.",
+        summary="A port has an interface of the wrong kind, such as a service type on a topic.",
+        why="Topics use message types; services and actions have their own kinds of type.",
         bad="""\
 system: kinds
 nodes:
@@ -32,7 +32,7 @@ nodes:
     )
 )
 
-_WANTED = {
+_EXPECTED = {
     ChannelKind.TOPIC: "a message type",
     ChannelKind.SERVICE: "a service type",
     ChannelKind.ACTION: "an action type",
@@ -45,7 +45,7 @@ _KINDS = {
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the kind of every port's type."""
+    """Check the kind of every port's type."""
     for node in context.system.nodes:
         for port in node.ports:
             found = context.interfaces.find(port.interface.value)
@@ -53,7 +53,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 continue
             yield Diagnostic(
                 RULE,
-                f"'{port.interface}' is {_WANTED[_KINDS[type(found)]]}, "
-                f"but {a(port.kind)} needs {_WANTED[port.kind.channel]}",
+                f"'{port.interface}' is {_EXPECTED[_KINDS[type(found)]]}, "
+                f"but {a(port.kind)} needs {_EXPECTED[port.kind.channel]}",
                 port.interface.span,
             )

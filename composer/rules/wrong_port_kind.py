@@ -1,4 +1,4 @@
-"""A port used as what it is not: a subscription as a source, a service in ``publish``."""
+"""A port of the wrong kind, such as a subscription as a source."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ RULE = register(
         code="RC211",
         name="wrong-port-kind",
         severity=Severity.ERROR,
-        summary="A port stands where a port of another kind is needed.",
+        summary="A port is used where a port of another kind is required.",
         why=(
-            "Messages leave from publishers and arrive at subscriptions; requests leave from "
-            "clients and arrive at services. The other way round nothing could flow."
+            "Messages go from publishers to subscriptions, requests from clients to services. In "
+            "the other direction, no data can flow."
         ),
         bad="""\
 system: swapped
@@ -44,7 +44,7 @@ connections:
     )
 )
 
-#: For each kind of channel the keys of a connection and the kinds of port they take.
+#: For each kind of channel, the keys of a connection and the kinds of port they accept.
 _ENDS = {
     ChannelKind.TOPIC: (("from", PortKind.PUBLISHER), ("to", PortKind.SUBSCRIPTION)),
     ChannelKind.SERVICE: (("server", PortKind.SERVICE), ("clients", PortKind.CLIENT)),
@@ -57,7 +57,7 @@ _SENDERS = {
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Look at the ends of connections and at the ports that reactions send through."""
+    """Check the endpoints of connections and the ports that reactions send through."""
     for connection in context.system.connections:
         yield from _connection(context, connection)
     for chain in context.system.chains:
@@ -81,7 +81,7 @@ def _chain(context: Context, chain: Chain) -> Iterator[Diagnostic]:
         if port is not None and port.kind is not PortKind.PUBLISHER:
             yield Diagnostic(
                 RULE,
-                f"chain '{chain.name}' goes through publishers, but '{endpoint.text}' "
+                f"chain '{chain.name}' consists of publishers, but '{endpoint.text}' "
                 f"is {a(port.kind)}",
                 endpoint.text.span,
                 (Label(port.name.span, f"declared as {a(port.kind)}"),),
@@ -89,12 +89,12 @@ def _chain(context: Context, chain: Chain) -> Iterator[Diagnostic]:
 
 
 @dataclass(frozen=True, slots=True)
-class _End:
-    """An end of a connection: its key, the kind of port it takes, and the port that is there."""
+class _Slot:
+    """An endpoint of a connection: its key, the kind of port it requires, and the actual port."""
 
     endpoint: Endpoint
     key: str
-    wanted: PortKind
+    expected: PortKind
     port: Port
 
     @property
@@ -104,7 +104,7 @@ class _End:
 
 def _connection(context: Context, connection: Connection) -> Iterator[Diagnostic]:
     ends = list(_ends(context, connection))
-    wrong = [end for end in ends if end.port.kind is not end.wanted]
+    wrong = [end for end in ends if end.port.kind is not end.expected]
     kinds = {end.port.kind.channel for end in wrong}
     if len(wrong) > 1 and len(wrong) == len(ends) and len(kinds) == 1:
         yield _all_wrong(connection, wrong, kinds.pop())
@@ -113,7 +113,7 @@ def _connection(context: Context, connection: Connection) -> Iterator[Diagnostic
         actual = end.port.kind
         yield Diagnostic(
             RULE,
-            f"'{end.key}' of {connection.kind} '{connection.name}' needs {a(end.wanted)}, "
+            f"'{end.key}' of {connection.kind} '{connection.name}' needs {a(end.expected)}, "
             f"but '{end.endpoint.text}' is {a(actual)}",
             end.endpoint.text.span,
             (Label(end.port.name.span, f"declared as {a(actual)}"),),
@@ -121,24 +121,25 @@ def _connection(context: Context, connection: Connection) -> Iterator[Diagnostic
         )
 
 
-def _ends(context: Context, connection: Connection) -> Iterator[_End]:
+def _ends(context: Context, connection: Connection) -> Iterator[_Slot]:
     groups = (connection.sources, connection.sinks)
     for endpoints, (key, kind) in zip(groups, _ENDS[connection.kind], strict=True):
         for endpoint in endpoints:
             port = context.system.port(endpoint)
             if port is not None:
-                yield _End(endpoint, key, kind, port)
+                yield _Slot(endpoint, key, kind, port)
 
 
-def _all_wrong(connection: Connection, ends: list[_End], kind: ChannelKind) -> Diagnostic:
-    """Tell as one mistake what makes every end of a connection wrong."""
+def _all_wrong(connection: Connection, ends: list[_Slot], kind: ChannelKind) -> Diagnostic:
+    """Report one diagnostic for a connection whose endpoints are all wrong."""
     (source_key, _), (sink_key, _) = _ENDS[connection.kind]
     if kind is connection.kind:
-        message = f"the ends of {kind} '{connection.name}' are swapped"
-        hint = f"exchange '{source_key}' and '{sink_key}'"
+        message = f"the endpoints of {kind} '{connection.name}' are swapped"
+        hint = f"swap '{source_key}' and '{sink_key}'"
     else:
         message = (
-            f"'{connection.name}' joins the ends of {_an(kind)}, not of {_an(connection.kind)}"
+            f"'{connection.name}' connects the endpoints of {_an(kind)}, "
+            f"not of {_an(connection.kind)}"
         )
         (source_key, _), (sink_key, _) = _ENDS[kind]
         hint = f"write '{kind}:', '{source_key}:' and '{sink_key}:'"
@@ -150,7 +151,7 @@ def _belongs(connection: Connection, actual: PortKind) -> str:
     if actual.channel is connection.kind:
         other = next(key for key, kind in _ENDS[connection.kind] if kind is actual)
         return f"{a(actual)} belongs under '{other}'"
-    return f"{a(actual)} belongs in a connection that begins with '{actual.channel}:'"
+    return f"{a(actual)} belongs in a connection that starts with '{actual.channel}:'"
 
 
 def _an(kind: ChannelKind) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.rules.ignores import ignores_in
+from composer.rules.unused_ignore import ignores_in
 from composer.source import SourceFile
 from tests.unit.support.checking import findings_in, quoted, rules_broken
 
@@ -88,7 +88,7 @@ def test_no_comment_silences_an_error(tmp_path: Path) -> None:
     commented = text.replace("MARK", "compose: ignore[qos-incompatible] on purpose")
     found = findings_in(commented, tmp_path)
     assert [item.rule.name for item in found] == ["unused-ignore", "qos-incompatible"]
-    assert found[0].message == "'qos-incompatible' finds an error here, which no comment silences"
+    assert found[0].message == "'qos-incompatible' is an error here"
 
 
 def test_a_comment_in_a_python_file_silences_what_is_found_there(tmp_path: Path) -> None:

@@ -1,0 +1,144 @@
+"""Comments that suppress a rule: ``# compose: ignore[rule]``.
+
+A comment applies to its own line or, on a line of its own, to the next line. It suppresses the
+diagnostics that have their primary location, or a related one, on that line. Names and codes of
+rules are separated by commas; a reason may follow the bracket.
+
+Errors cannot be ignored: a system with errors does not run, and a comment must not start a robot.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from composer.diagnostics import Diagnostic, Rule, Severity, nearest, register, registered_rules
+from composer.source import SourceFile, Span
+
+RULE = register(
+    Rule(
+        code="RC502",
+        name="unused-ignore",
+        severity=Severity.WARNING,
+        summary="An ignore comment suppresses no diagnostic.",
+        why=(
+            "The problem has been fixed, or the rule's name is misspelled. If the comment stays, "
+            "it hides the next problem on that line. Errors cannot be ignored, because a system "
+            "with errors does not run."
+        ),
+        bad="""\
+system: silence
+nodes:
+  talker:
+    # compose: ignore[unheard-publisher]
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
+""",
+        good="""\
+system: silence
+nodes:
+  talker:
+    # compose: ignore[unheard-publisher] read with ros2 topic echo
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+""",
+    )
+)
+
+_MARK = "compose:"
+#: A comment, not the end of a quoted string: no quote follows.
+_COMMENT = re.compile(r"""(?:^|\s)\#\s*compose:\s*ignore\[(?P<names>[^\]]*)\][^"']*$""")
+_NAME = re.compile(r"[^\s,]+")
+_ONLY_COMMENT = re.compile(r"\s*(#.*)?$")
+
+
+@dataclass(frozen=True, slots=True)
+class Ignore:
+    """A rule, by name or code, that is ignored on a line; ``span`` is its span in the comment."""
+
+    rule: str
+    line: int
+    span: Span
+
+    def matches(self, rule: Rule) -> bool:
+        """Return whether ``rule`` is ignored."""
+        return self.rule in {rule.name, rule.code}
+
+
+def without_ignored(
+    diagnostics: Iterable[Diagnostic], source: SourceFile, *, complete: bool
+) -> list[Diagnostic]:
+    """Return the diagnostics that no comment ignores, and one for each unused comment.
+
+    Unused comments are reported for ``source`` only, and only if ``complete``: if every rule ran.
+    """
+    table = _Table()
+    used: set[Span] = set()
+    errors: set[Span] = set()
+    kept = []
+    for diagnostic in diagnostics:
+        ignores = {
+            ignore.span
+            for span in (diagnostic.primary, *(label.span for label in diagnostic.related))
+            for ignore in table.at(span)
+            if ignore.matches(diagnostic.rule)
+        }
+        if diagnostic.severity is Severity.ERROR:
+            errors |= ignores
+        else:
+            used |= ignores
+        if diagnostic.severity is Severity.ERROR or not ignores:
+            kept.append(diagnostic)
+    if complete:
+        unused = (ignore for ignore in ignores_in(source) if ignore.span not in used)
+        kept += [_unused(ignore, is_error=ignore.span in errors) for ignore in unused]
+    return kept
+
+
+def ignores_in(source: SourceFile) -> Iterator[Ignore]:
+    """Yield the rules that the comments of a file ignore."""
+    if _MARK not in source.text:
+        return
+    for number, text in enumerate(source.lines, start=1):
+        found = _COMMENT.search(text) if _MARK in text else None
+        if found is None:
+            continue
+        line = _next_line(source, number) if _ONLY_COMMENT.match(text) else number
+        for name in _NAME.finditer(text, *found.span("names")):
+            length = name.end() - name.start()
+            yield Ignore(name[0], line, Span(source, number, name.start() + 1, length))
+
+
+class _Table:
+    """The ignored rules by line, for every file with a diagnostic."""
+
+    def __init__(self) -> None:
+        self._files: dict[str, dict[int, list[Ignore]]] = {}
+
+    def at(self, span: Span) -> list[Ignore]:
+        """Return the rules that are ignored on the line of ``span``."""
+        path = span.file.path
+        if path not in self._files:
+            lines: dict[int, list[Ignore]] = {}
+            for ignore in ignores_in(span.file):
+                lines.setdefault(ignore.line, []).append(ignore)
+            self._files[path] = lines
+        return self._files[path].get(span.line, [])
+
+
+def _next_line(source: SourceFile, number: int) -> int:
+    """Return the first line after line ``number`` that is not blank or a comment."""
+    following = range(number + 1, len(source.lines) + 1)
+    return next((line for line in following if not _ONLY_COMMENT.match(source.line(line))), number)
+
+
+def _unused(ignore: Ignore, *, is_error: bool) -> Diagnostic:
+    if is_error:
+        message = f"'{ignore.rule}' is an error here"
+        return Diagnostic(RULE, message, ignore.span, hint="errors cannot be ignored; fix it")
+    names = {name for rule in registered_rules() for name in (rule.code, rule.name)}
+    if ignore.rule in names:
+        message = f"there is no '{ignore.rule}' to ignore here"
+        return Diagnostic(RULE, message, ignore.span, hint="remove the comment")
+    close = nearest(ignore.rule, names)
+    hint = f"did you mean '{close}'?" if close is not None else "'compose rule' lists the rules"
+    return Diagnostic(RULE, f"no rule is named '{ignore.rule}'", ignore.span, hint=hint)
