@@ -1,4 +1,4 @@
-"""Findings: what is wrong, where, what was expected, and which rule says so."""
+"""Diagnostics: what is wrong and where, with a hint and the rule behind it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from composer.spelling import vocabulary
 
 
 class Severity(Enum):
-    """How much a finding weighs. Only errors keep a system from running."""
+    """The severity of a diagnostic. Only errors prevent a system from running."""
 
     ERROR = "error"
     WARNING = "warning"
@@ -22,17 +22,17 @@ class Severity(Enum):
 _CODE_OR_BAND = re.compile(r"RC\d{1,3}")
 _YAML_WORDS = {None: "null", True: "true", False: "false"}
 
-#: How much of a value from a file is repeated in a message, in characters.
+#: Maximum length of a value from a file in a message, in characters.
 LONGEST_ECHO = 80
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One thing that can be wrong, with all that ``compose rule`` and the catalogue say of it.
+    """One kind of problem, with what ``compose rule`` and the documentation show about it.
 
-    ``code`` never changes its meaning and is never used again. Bands: 0xx reading, 1xx schema,
+    ``code`` never changes its meaning and is never reused. Bands: 0xx reading, 1xx schema,
     2xx names and references, 3xx types, QoS and wiring, 4xx lifecycle, timers, parameters and
-    behaviours, 5xx style, 9xx internal.
+    behaviors, 5xx style, 9xx internal.
     """
 
     code: str
@@ -43,8 +43,8 @@ class Rule:
     bad: str
     good: str
 
-    def is_meant_by(self, text: str) -> bool:
-        """Say whether ``text`` is the rule's name, its code, or the beginning of it (``RC3``)."""
+    def matches(self, text: str) -> bool:
+        """Return whether ``text`` is the rule's name, its code, or a code prefix (``RC3``)."""
         if text == self.name:
             return True
         return _CODE_OR_BAND.fullmatch(text) is not None and self.code.startswith(text)
@@ -52,7 +52,7 @@ class Rule:
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A second place that belongs to a finding, and what it has to do with it."""
+    """A secondary location of a diagnostic, with a message."""
 
     span: Span
     message: str
@@ -60,7 +60,7 @@ class Label:
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One finding. ``hint`` says how to mend it, in the imperative."""
+    """A problem at a location. ``hint`` says how to fix it, in the imperative."""
 
     rule: Rule
     message: str
@@ -70,12 +70,12 @@ class Diagnostic:
 
     @property
     def severity(self) -> Severity:
-        """The severity of the rule behind the finding."""
+        """The severity of the rule."""
         return self.rule.severity
 
     @property
     def sort_key(self) -> tuple[str, int, int, str, str]:
-        """File, line, column; then code and message, so that any order is reproducible."""
+        """File, line and column, then code and message, for a reproducible order."""
         span = self.primary
         return (span.file.path, span.line, span.column, self.rule.code, self.message)
 
@@ -84,7 +84,7 @@ _rules: dict[str, Rule] = {}
 
 
 def register(rule: Rule) -> Rule:
-    """Add ``rule`` to the catalogue and return it. Raises ValueError when code or name is taken."""
+    """Register ``rule`` and return it. Raises ValueError if its code or name is taken."""
     for known in _rules.values():
         if rule.code == known.code or rule.name == known.name:
             raise ValueError(f"rule {rule.code} {rule.name!r} repeats {known.code} {known.name!r}")
@@ -93,12 +93,12 @@ def register(rule: Rule) -> Rule:
 
 
 def registered_rules() -> Iterator[Rule]:
-    """Yield the rules of every module imported so far, by code."""
+    """Yield the rules of all modules imported so far, sorted by code."""
     yield from (_rules[code] for code in sorted(_rules))
 
 
 def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
-    """Return the findings sorted by place, each once."""
+    """Return the diagnostics sorted by location, without duplicates."""
     # By key, not by equality: spans compare without their file.
     unique: dict[tuple[str, int, int, str, str], Diagnostic] = {}
     for diagnostic in diagnostics:
@@ -107,14 +107,14 @@ def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
-    """Say whether any finding is an error."""
+    """Return whether any diagnostic is an error."""
     return any(diagnostic.severity is Severity.ERROR for diagnostic in diagnostics)
 
 
 def shown(value: object, *, limit: int = LONGEST_ECHO) -> str:
-    """Return ``value`` as messages echo it, no longer than ``limit``.
+    """Return ``value`` as text for messages, at most ``limit`` characters long.
 
-    Characters that could steer a terminal or hide become escapes, as Python writes them.
+    Characters that are invisible or control a terminal are escaped as in Python.
     """
     text = _YAML_WORDS[value] if value is None or isinstance(value, bool) else str(value)
     cut = text if len(text) <= limit else f"{text[: limit - 3]}..."
@@ -126,12 +126,12 @@ def shown(value: object, *, limit: int = LONGEST_ECHO) -> str:
 
 
 def nearest(name: str, candidates: Iterable[str]) -> str | None:
-    """Return the candidate that ``name`` was most likely meant to be, or None."""
+    """Return the candidate closest to ``name``, or None."""
     return next(iter(vocabulary(tuple(candidates)).close(name)), None)
 
 
 def suggestion(name: str, candidates: Iterable[str], *, limit: int = 8) -> str | None:
-    """Return a hint: the nearest candidate, else a short list of all, else None."""
+    """Return a hint with the nearest candidate, else a short list of all, else None."""
     known = vocabulary(tuple(candidates))
     for close in known.close(name):
         return f"did you mean '{close}'?"

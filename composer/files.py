@@ -1,4 +1,4 @@
-"""Which files of a folder are ours: systems and node types, among whatever else is there."""
+"""Find systems and node types among the files of a folder."""
 
 from __future__ import annotations
 
@@ -15,62 +15,62 @@ from composer.project import SETTINGS_FILE, Project
 from composer.source import SourceFile, Span
 
 _SUFFIXES = frozenset({".yaml", ".yml"})
-#: The first line that says something, in a file of ours.
+#: The first line with content in a system or node type.
 _MARKER = re.compile(r"""\{?\s*["']?(system|node)["']?\s*:(\s|$)""")
-#: A line further down that says the same, with a name: in other files, these words begin maps.
+#: A later line with the same key and a name. In other files, these keys begin maps.
 _LATER_MARKER = re.compile(r"""^(system|node):[ \t]+["']?\w""", re.MULTILINE)
-#: As much of a file as may be licence and comments before its first key.
+#: The part of a file that may hold a license and comments before the first key.
 _HEAD_BYTES = 65_536
-#: Folders that tools made: environments, what colcon built, packages of others.
+#: Folders made by tools: environments, colcon builds, installed packages.
 _FOREIGN_FOLDERS = frozenset({"__pycache__", "node_modules", "site-packages"})
 _FOREIGN_FOLDER_MARKS = frozenset({"AMENT_IGNORE", "COLCON_IGNORE", "pyvenv.cfg"})
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """The files under some paths.
+class FoundFiles:
+    """The files below some paths.
 
-    ``files`` are to be looked at: those that were named, and in folders the systems and node types.
-    ``foreign`` are YAML files in folders that are something else. ``findings`` are about links in
-    folders that lead out of the project: they are not followed.
+    ``files`` are those that were named, and the systems and node types in folders. ``foreign`` are
+    other YAML files in these folders. ``diagnostics`` are about symbolic links out of the project,
+    which are not followed.
     """
 
     files: tuple[Path, ...]
     foreign: tuple[Path, ...]
-    findings: tuple[Diagnostic, ...]
+    diagnostics: tuple[Diagnostic, ...]
 
 
-def find_files(paths: Iterable[Path]) -> Found:
-    """Find the files to look at.
+def find_files(paths: Iterable[Path]) -> FoundFiles:
+    """Find the files to check.
 
-    In a folder, files that do not say ``system:`` or ``node:`` are left alone, and so are links to
-    folders, hidden folders, and those that tools made. A path that does not exist is among the
-    files, for whoever reads it to say so.
+    In folders, this skips files without ``system:`` or ``node:``, symbolic links to folders, hidden
+    folders and folders made by tools. A path that does not exist is among the files: reading it
+    reports the error.
     """
     search = _Search()
     for path in paths:
         if _is_folder(path):
-            search.look_below(path)
+            search.search_folder(path)
         else:
             search.files[path] = None
-    return Found(tuple(search.files), tuple(search.foreign), tuple(search.findings))
+    return FoundFiles(tuple(search.files), tuple(search.foreign), tuple(search.diagnostics))
 
 
 @dataclass(slots=True)
 class _Search:
     files: dict[Path, None] = field(default_factory=dict)
     foreign: dict[Path, None] = field(default_factory=dict)
-    findings: list[Diagnostic] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
 
-    def look_below(self, folder: Path) -> None:
+    def search_folder(self, folder: Path) -> None:
         project = Project.at(folder)
         for path in sorted(self._yaml_files(folder)):
             if path.name == SETTINGS_FILE or not _is_regular(path):
-                continue  # settings are not looked at, but kept to
+                continue  # settings are not checked as a file of their own
             if path.is_symlink() and not project.holds(path):
-                self.findings.append(_stray(path))
+                self.diagnostics.append(_link_out_of_project(path))
             else:
-                (self.files if _is_ours(path) else self.foreign)[path] = None
+                (self.files if _is_composer_file(path) else self.foreign)[path] = None
 
     def _yaml_files(self, folder: Path) -> Iterator[Path]:
         for parent, folders, files in os.walk(folder, onerror=self._note_unreadable):
@@ -82,7 +82,7 @@ class _Search:
 
     def _note_unreadable(self, error: OSError) -> None:
         why = f"this folder cannot be read: {error.strerror}"
-        self.findings.append(
+        self.diagnostics.append(
             Diagnostic(UNREADABLE_FILE, why, Span(SourceFile(str(Path(error.filename))), 1, 1))
         )
 
@@ -95,32 +95,32 @@ def _has_suffix(name: str) -> bool:
     return not name.startswith(".") and Path(name).suffix in _SUFFIXES
 
 
-def _stray(path: Path) -> Diagnostic:
+def _link_out_of_project(path: Path) -> Diagnostic:
     return Diagnostic(
         UNREADABLE_FILE,
-        "this is a link that leads out of the project",
+        "this is a symbolic link out of the project",
         Span(SourceFile(str(path)), 1, 1),
-        hint="copy the file it leads to",
+        hint="copy the file it points to",
     )
 
 
-def _is_ours(path: Path) -> bool:
-    """Say whether a file is for the composer, without parsing what may be foreign."""
+def _is_composer_file(path: Path) -> bool:
+    """Return whether a file is a system or node type, without parsing it."""
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
     except OSError:
-        return True  # whoever reads it says why it cannot be read
-    first = next((line for line in head.splitlines() if _says_something(line)), "")
+        return True  # reading it reports the error
+    first = next((line for line in head.splitlines() if _has_content(line)), "")
     return _MARKER.match(first) is not None or _LATER_MARKER.search(head) is not None
 
 
-def _says_something(line: str) -> bool:
+def _has_content(line: str) -> bool:
     return bool(line.strip()) and not line.startswith(("#", "%", "---"))
 
 
 def _is_regular(path: Path) -> bool:
-    """Say whether ``path`` can be opened without waiting for somebody at its other end."""
+    """Return whether ``path`` is a regular file, which can be opened without blocking."""
     try:
         return stat.S_ISREG(path.stat().st_mode)
     except OSError:
@@ -130,5 +130,5 @@ def _is_regular(path: Path) -> bool:
 def _is_folder(path: Path) -> bool:
     try:
         return path.is_dir()
-    except (OSError, ValueError):  # too long, or not a path at all: told when it is read
+    except (OSError, ValueError):  # too long or not a valid path: reported when it is read
         return False

@@ -1,28 +1,28 @@
-"""The whole pure pipeline: from a file to its model and everything that is wrong with it.
+"""The static pipeline: from a file to its model and all of its diagnostics.
 
-Document, kind, what is included, variables, schema, model, checks - each stage runs on whatever the
-one before left it, so that one run shows every finding.
+:func:`_run_pipeline` calls the stages in order. Each stage works on what the one before it
+produced, even if that has errors, so that one run shows every diagnostic.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable
 from collections.abc import Mapping as Map
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
-from composer.assembly import NodeTypeFile, assemble, inherited
-from composer.assembly.telling import once, with_includes
-from composer.catalog import Catalog, interface_folders
+from composer.assembly import NodeTypeFile, assemble, inherit
+from composer.assembly.deduplication import add_include_labels, deduplicate
 from composer.diagnostics import Diagnostic, Severity, has_errors, in_order, registered_rules
 from composer.document import parse_bytes, read_document
 from composer.expand import expand
 from composer.interfaces import Interfaces
 from composer.model import System
-from composer.project import SETTINGS_FILE, Project, Settings
-from composer.project.choices import told, wrong_choices
-from composer.resolve import NOTHING_SAID, CommandLine, Overrides, read_overrides, resolve
+from composer.node_types import NodeTypes, interface_folders
+from composer.project import SETTINGS_FILE, Project
+from composer.project.rule_selection import apply_rule_settings, check_rule_settings
+from composer.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
 from composer.rules import Context, all_checks, run_checks
 from composer.rules.unused_ignore import without_ignored
 from composer.rules.unused_node_type import unused_node_types
@@ -34,264 +34,282 @@ from composer.tree import Mapping
 
 @dataclass(frozen=True, slots=True)
 class LoadResult:
-    """What came of a file. ``system`` is None when too little of it could be read.
+    """The model and the diagnostics of a file.
 
-    ``source`` is the text, ``project`` what it belongs to; ``catalog`` and ``interfaces`` are what
-    the checks knew. ``tree`` is all that the file says together with what it includes or extends.
+    ``system`` is None if too little of the file could be read. ``node_types`` and ``interfaces``
+    are the definitions that the file could refer to. ``tree`` is the file merged with everything
+    that it includes or extends.
     """
 
     system: System | None
     diagnostics: list[Diagnostic]
     source: SourceFile
     project: Project
-    catalog: Catalog
+    node_types: NodeTypes
     interfaces: Interfaces
     tree: Mapping | None = None
 
     @property
-    def sound(self) -> bool:
-        """True when there is a system or a node type, whole and without errors."""
+    def is_valid(self) -> bool:
+        """True for a system or node type without errors."""
         return self.system is not None and not has_errors(self.diagnostics)
 
     @property
-    def runnable(self) -> bool:
-        """True when there is a system, whole and without errors."""
-        return self.system is not None and not self.system.node_type and self.sound
+    def is_runnable(self) -> bool:
+        """True for a system without errors."""
+        return self.system is not None and not self.system.node_type and self.is_valid
 
 
 def load(
     path: Path,
     *,
     shown: str | None = None,
-    said: CommandLine = NOTHING_SAID,
+    overrides: OverrideOptions = NO_OVERRIDES,
     interfaces: Interfaces | None = None,
 ) -> LoadResult:
     """Read, resolve and check the system or node type in the file ``path``.
 
-    ``shown`` is the file's name in findings, ``said`` what a command line says on top of the file.
-    ``interfaces`` may be given by who loads many files of one project: reading them is what takes
-    time.
+    ``shown`` is the name of the file in diagnostics, ``overrides`` are options of a command line.
+    Pass ``interfaces`` to load many files of one project: reading the interfaces takes most time.
     """
-    overrides, found = read_overrides(said)
-    known = _Known.of(_real_folder(path), interfaces)
-    return _load_file(path, shown, known, overrides, found)
+    parsed, diagnostics = read_overrides(overrides)
+    definitions = _Definitions.of(_real_folder(path), interfaces)
+    return _run_pipeline(_read(path, shown), definitions, parsed, diagnostics)
 
 
 def load_files(paths: Iterable[Path]) -> list[LoadResult]:
-    """Load the files, each called as it is given; files of one project share its interfaces."""
+    """Load the files. Files of one project share its interfaces."""
     shared: dict[tuple[Path, ...], Interfaces] = {}
-    by_folder: dict[Path, _Known] = {}
-    loadings = []
+    by_folder: dict[Path, _Definitions] = {}
+    results = []
     for path in paths:
         folder = _real_folder(path)
         if folder not in by_folder:
-            by_folder[folder] = _Known.shared(folder, shared)
-        loadings.append(_load_file(path, str(path), by_folder[folder]))
-    return loadings
-
-
-def _load_file(
-    path: Path,
-    shown: str | None,
-    known: _Known,
-    overrides: Overrides | None = None,
-    found: Iterable[Diagnostic] = (),
-) -> LoadResult:
-    tree, source, findings = read_document(path, shown)
-    if path.name == SETTINGS_FILE:  # what is wrong with it is told of its project
-        tree, findings = None, []
-    return _load(tree, source, [*findings, *found], known, overrides or Overrides())
+            by_folder[folder] = _Definitions.with_shared_interfaces(folder, shared)
+        results.append(_run_pipeline(_read(path, str(path)), by_folder[folder]))
+    return results
 
 
 def load_bytes(
     content: bytes, folder: Path, *, shown: str, interfaces: Interfaces | None = None
 ) -> LoadResult:
-    """Do the same for what came from elsewhere, as if it were a file in ``folder``."""
-    tree, source, findings = parse_bytes(content, shown)
-    return _load(
-        tree, source, findings, _Known.of(_real_folder(folder / shown), interfaces), Overrides()
-    )
-
-
-def means_the_same(loading: LoadResult, text: str) -> bool:
-    """Say whether ``text`` in the place of the file that was loaded would give the same model."""
-    again = load_bytes(
-        text.encode(), Path.cwd(), shown=loading.source.path, interfaces=loading.interfaces
-    )
-    return again.system == loading.system
-
-
-def findings_of(loadings: Collection[LoadResult]) -> list[Diagnostic]:
-    """Return what is to be said of all files together, and of each, everything once.
-
-    What is found in a file that is itself among them is told of it alone, and not again of the
-    systems that include or use it; in another file it is told of the first of these systems.
-    """
-    teller: dict[_Told, LoadResult] = {}
-    for loading in loadings:
-        for finding in loading.diagnostics:
-            if finding.primary.file == loading.source:
-                teller[_told(finding)] = loading
-    findings = project_findings(loadings)
-    for loading in loadings:
-        findings += (
-            finding
-            for finding in loading.diagnostics
-            if teller.setdefault(_told(finding), loading) is loading
-        )
-    return in_order(findings)
-
-
-_Told: TypeAlias = tuple[str, str]
-
-
-def _told(finding: Diagnostic) -> _Told:
-    """Return what tells a finding from others, whatever the system that it was found in."""
-    return (finding.rule.code, str(finding.primary))
-
-
-def project_findings(loadings: Collection[LoadResult]) -> list[Diagnostic]:
-    """Return what is to be said of files only when they are looked at together."""
-    systems = [loading.system for loading in loadings if loading.system is not None]
-    settings = {loading.source.path: loading.project.settings for loading in loadings}
-    findings: list[Diagnostic] = []
-    for finding in unused_node_types(systems):
-        kept = without_ignored([finding], finding.primary.file, complete=False)
-        findings += told(kept, settings[finding.primary.file.path])
-    return in_order(findings)
+    """Load a text, such as standard input, as if it were the file ``shown`` in ``folder``."""
+    document = _Document(*parse_bytes(content, shown))
+    return _run_pipeline(document, _Definitions.of(_real_folder(folder / shown), interfaces))
 
 
 @dataclass(frozen=True, slots=True)
-class _Known:
-    """What a file may refer to."""
+class _Document:
+    """A file as a located tree."""
+
+    tree: Mapping | None
+    source: SourceFile
+    diagnostics: list[Diagnostic]
+
+
+@dataclass(frozen=True, slots=True)
+class _Definitions:
+    """The node types and interfaces that files in ``folder`` may refer to."""
 
     folder: Path
     project: Project
-    catalog: Catalog
+    node_types: NodeTypes
     interfaces: Interfaces
 
     @classmethod
-    def of(cls, folder: Path, interfaces: Interfaces | None) -> _Known:
+    def of(cls, folder: Path, interfaces: Interfaces | None) -> _Definitions:
         project = Project.at(folder)
-        known = interfaces
-        if known is None:
-            known = Interfaces.load(interface_folders(project))
-        return cls(folder, project, Catalog.of(project), known)
+        if interfaces is None:
+            interfaces = Interfaces.load(interface_folders(project))
+        return cls(folder, project, NodeTypes.of(project), interfaces)
 
     @classmethod
-    def shared(cls, folder: Path, shared: dict[tuple[Path, ...], Interfaces]) -> _Known:
-        """Return the same with the interfaces that other folders of the project have, too."""
+    def with_shared_interfaces(
+        cls, folder: Path, shared: dict[tuple[Path, ...], Interfaces]
+    ) -> _Definitions:
+        """Return the definitions, with interfaces that other folders of the project share."""
         project = Project.at(folder)
         folders = interface_folders(project)
         if folders not in shared:
             shared[folders] = Interfaces.load(folders)
-        return cls(folder, project, Catalog.of(project), shared[folders])
-
-
-def _load(
-    tree: Mapping | None,
-    source: SourceFile,
-    found: list[Diagnostic],
-    known: _Known,
-    overrides: Overrides,
-) -> LoadResult:
-    resolved = _resolved(tree, source, known, overrides) if tree else _Resolved()
-    system = resolved.system
-    findings = [*found, *resolved.findings]
-    if system is not None:
-        refused = tuple(item.primary for item in findings if item.severity is Severity.ERROR)
-        context = Context(
-            system, known.interfaces, known.catalog, refused, is_partial=resolved.is_partial
-        )
-        findings.extend(run_checks(context))
-        findings = once(findings, (node.name for node in system.nodes))
-    findings = with_includes(findings, resolved.included)
-    # In a node type alone much goes unsaid that its comments may be about.
-    judged = system is not None and not system.node_type
-    kept = without_ignored(findings, source, complete=judged)
-    settings = known.project.settings
-    chosen = [*told(kept, settings), *known.project.findings, *_wrong_choices(settings)]
-    return LoadResult(
-        system,
-        in_order(chosen),
-        source,
-        known.project,
-        known.catalog,
-        known.interfaces,
-        resolved.tree,
-    )
-
-
-def _wrong_choices(settings: Settings) -> Iterator[Diagnostic]:
-    all_checks()  # their rules are known once they are imported
-    return wrong_choices(settings, tuple(registered_rules()))
-
-
-def _real_folder(path: Path) -> Path:
-    """Return the folder that a file is in; of a link, the one of what it leads to."""
-    try:
-        return path.resolve().parent
-    except (OSError, RuntimeError, ValueError):  # told when it is read
-        return Path.cwd()
+        return cls(folder, project, NodeTypes.of(project), shared[folders])
 
 
 @dataclass(frozen=True, slots=True)
-class _Resolved:
-    """What came of a tree: all of it in one tree, and as a model."""
+class _Merged:
+    """A file merged with what it includes or extends.
+
+    ``tree`` is what ``compose config`` shows, ``expanded`` has values in place of variables.
+    ``folders`` and ``included`` are the folders of all files and the places that include them, by
+    file name. ``is_partial`` is true if nodes may be missing.
+    """
 
     tree: Mapping | None = None
-    system: System | None = None
-    findings: tuple[Diagnostic, ...] = ()
+    expanded: Mapping | None = None
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    folders: Map[str, Path] = field(default_factory=dict)
     included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
     is_partial: bool = False
 
 
-def _resolved(
-    tree: Mapping,
-    source: SourceFile,
-    known: _Known,
-    overrides: Overrides,
-) -> _Resolved:
+def _run_pipeline(
+    document: _Document,
+    definitions: _Definitions,
+    overrides: Overrides | None = None,
+    override_diagnostics: Iterable[Diagnostic] = (),
+) -> LoadResult:
+    # Document: the caller has parsed the YAML.
+    source = document.source
+    diagnostics = [*document.diagnostics, *override_diagnostics]
+
+    # Kind, includes or inheritance, variables and copies, schema.
+    merged = _merge(document, definitions)
+    diagnostics += merged.diagnostics
+
+    # Resolve: tree to model.
+    system = None
+    if merged.expanded is not None:
+        system, found = resolve(
+            merged.expanded,
+            source,
+            definitions.node_types,
+            folders=merged.folders,
+            overrides=overrides or Overrides(),
+        )
+        diagnostics += found
+
+    # Rules: check the model.
+    if system is not None:
+        errors = tuple(item.primary for item in diagnostics if item.severity is Severity.ERROR)
+        context = Context(
+            system,
+            definitions.interfaces,
+            definitions.node_types,
+            errors,
+            is_partial=merged.is_partial,
+        )
+        diagnostics += run_checks(context)
+        diagnostics = deduplicate(diagnostics, (node.name for node in system.nodes))
+
+    # Selection: comments in the files and settings of the project silence diagnostics.
+    diagnostics = add_include_labels(diagnostics, merged.included)
+    # Comments in a node type may be about rules that only apply to the systems that use it.
+    is_complete = system is not None and not system.node_type
+    kept = without_ignored(diagnostics, source, complete=is_complete)
+    project = definitions.project
+    all_checks()  # import every rule, so that all names in the settings are known
+    selected = [
+        *apply_rule_settings(kept, project.settings),
+        *project.diagnostics,
+        *check_rule_settings(project.settings, tuple(registered_rules())),
+    ]
+    return LoadResult(
+        system,
+        in_order(selected),
+        source,
+        project,
+        definitions.node_types,
+        definitions.interfaces,
+        merged.tree,
+    )
+
+
+def _merge(document: _Document, definitions: _Definitions) -> _Merged:
+    tree = document.tree
+    if not tree:
+        return _Merged()
     match kind_of(tree):
         case kinds.SYSTEM:
-            return _resolved_system(tree, source, known, overrides)
+            return _merge_system(tree, document.source, definitions)
         case kinds.NODE:
-            return _resolved_node_type(tree, source, known, overrides)
+            return _merge_node_type(tree, document.source, definitions)
         case _:
-            wrong = check_kind(tree, source)
-            return _Resolved(findings=() if wrong is None else (wrong,))
+            problem = check_kind(tree, document.source)
+            return _Merged(diagnostics=[] if problem is None else [problem])
 
 
-def _resolved_system(
-    tree: Mapping, source: SourceFile, known: _Known, overrides: Overrides
-) -> _Resolved:
-    whole = assemble(tree, source, known.folder, known.project)
-    if whole.tree is None:
-        return _Resolved(findings=tuple(whole.findings), included=whole.included)
-    system, found = resolve(
-        whole.tree,
-        source,
-        known.catalog,
-        folders=whole.folders,
-        overrides=overrides,
+def _merge_system(tree: Mapping, source: SourceFile, definitions: _Definitions) -> _Merged:
+    # Each file is expanded and checked against the schema before it is merged.
+    assembly = assemble(tree, source, definitions.folder, definitions.project)
+    return _Merged(
+        assembly.tree,
+        assembly.tree,
+        assembly.diagnostics,
+        assembly.folders,
+        assembly.included,
+        assembly.is_partial,
     )
-    findings = (*whole.findings, *found)
-    return _Resolved(whole.tree, system, findings, whole.included, whole.is_partial)
 
 
-def _resolved_node_type(
-    tree: Mapping, source: SourceFile, known: _Known, overrides: Overrides
-) -> _Resolved:
-    whole = inherited(NodeTypeFile(known.folder / Path(source.path).name, source, tree))
-    if whole.tree is None:
-        return _Resolved(findings=tuple(whole.findings))
-    expanded, findings = expand(whole.tree, {})
-    findings = [*whole.findings, *findings, *check_schema(expanded, kinds.NODE)]
-    system, found = resolve(
-        expanded,
-        source,
-        known.catalog,
-        folders=whole.folders,
-        overrides=overrides,
+def _merge_node_type(tree: Mapping, source: SourceFile, definitions: _Definitions) -> _Merged:
+    file = NodeTypeFile(definitions.folder / Path(source.path).name, source, tree)
+    inherited = inherit(file)
+    if inherited.tree is None:
+        return _Merged(diagnostics=inherited.diagnostics)
+    expanded, found = expand(inherited.tree, {})
+    diagnostics = [*inherited.diagnostics, *found, *check_schema(expanded, kinds.NODE)]
+    return _Merged(inherited.tree, expanded, diagnostics, inherited.folders)
+
+
+def _read(path: Path, shown: str | None) -> _Document:
+    tree, source, diagnostics = read_document(path, shown)
+    if path.name == SETTINGS_FILE:  # its diagnostics are those of the project
+        tree, diagnostics = None, []
+    return _Document(tree, source, diagnostics)
+
+
+def _real_folder(path: Path) -> Path:
+    """Return the folder of a file; of a symbolic link, the folder of its target."""
+    try:
+        return path.resolve().parent
+    except (OSError, RuntimeError, ValueError):  # reported when the file is read
+        return Path.cwd()
+
+
+def gives_same_model(result: LoadResult, text: str) -> bool:
+    """Return whether ``text``, in place of the loaded file, gives the same model."""
+    again = load_bytes(
+        text.encode(), Path.cwd(), shown=result.source.path, interfaces=result.interfaces
     )
-    return _Resolved(whole.tree, system, (*findings, *found))
+    return again.system == result.system
+
+
+def collect_diagnostics(results: Collection[LoadResult]) -> list[Diagnostic]:
+    """Return the diagnostics of all files together, each once.
+
+    A diagnostic in a file that was loaded itself is reported with that file, not with the systems
+    that include or use it; any other is reported with the first of these systems.
+    """
+    reporter: dict[_Identity, LoadResult] = {}
+    for result in results:
+        for diagnostic in result.diagnostics:
+            if diagnostic.primary.file == result.source:
+                reporter[_identity(diagnostic)] = result
+    diagnostics = project_diagnostics(results)
+    for result in results:
+        diagnostics += (
+            diagnostic
+            for diagnostic in result.diagnostics
+            if reporter.setdefault(_identity(diagnostic), result) is result
+        )
+    return in_order(diagnostics)
+
+
+_Identity: TypeAlias = tuple[str, str]
+
+
+def _identity(diagnostic: Diagnostic) -> _Identity:
+    """Return what identifies a diagnostic across the systems in which it appears."""
+    return (diagnostic.rule.code, str(diagnostic.primary))
+
+
+def project_diagnostics(results: Collection[LoadResult]) -> list[Diagnostic]:
+    """Return the diagnostics that need several files, such as unused node types."""
+    systems = [result.system for result in results if result.system is not None]
+    settings = {result.source.path: result.project.settings for result in results}
+    diagnostics: list[Diagnostic] = []
+    for diagnostic in unused_node_types(systems):
+        file = diagnostic.primary.file
+        kept = without_ignored([diagnostic], file, complete=False)
+        diagnostics += apply_rule_settings(kept, settings[file.path])
+    return in_order(diagnostics)

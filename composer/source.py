@@ -13,7 +13,7 @@ U = TypeVar("U")
 
 @dataclass(frozen=True, slots=True)
 class SourceFile:
-    """A text that was read once and is kept, so that findings can quote it.
+    """A text that was read once and is kept, so that diagnostics can quote it.
 
     ``path`` is the path as people know it (what they typed, or relative to it); two source
     files are equal when their paths are.

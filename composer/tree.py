@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from composer.diagnostics import shown
 from composer.source import Span
 
 #: A YAML 1.2 core-schema scalar.
@@ -89,3 +90,20 @@ def plain(tree: Tree) -> Plain:
             return [plain(item) for item in tree.items]
         case Mapping():
             return {entry.name: plain(entry.value) for entry in tree}
+
+
+def describe(tree: Tree) -> str:
+    """Return ``a map``, ``a list``, ``nothing``, ``true``, ``the number 5`` or ``text 'abc'``."""
+    match tree:
+        case Mapping():
+            return "a map"
+        case Sequence():
+            return "a list"
+        case Scalar(value=None):
+            return "nothing"
+        case Scalar(value=bool()):
+            return shown(tree.value)
+        case Scalar(value=str()):
+            return f"text '{shown(tree.value)}'"
+        case Scalar():
+            return f"the number {shown(tree.value)}"

@@ -50,7 +50,7 @@ def main() -> None:
         path.write_text(yaml.safe_dump(system_tree(task), sort_keys=False), encoding="utf-8")
         started_s = time.perf_counter()
         loading = load(path)
-        if loading.system is None or not loading.runnable:
+        if loading.system is None or not loading.is_runnable:
             sys.exit("; ".join(str(item) for item in loading.diagnostics))
         system = loading.system
         options = HostOptions(tracing=task.tracing)

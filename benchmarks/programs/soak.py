@@ -65,7 +65,7 @@ def main() -> None:
         path = Path(folder, "soak.yaml")
         path.write_text(yaml.safe_dump(tree, sort_keys=False), encoding="utf-8")
         loading = load(path)
-        if loading.system is None or not loading.runnable:
+        if loading.system is None or not loading.is_runnable:
             sys.exit("; ".join(item.message for item in loading.diagnostics))
         system = loading.system
         host = Host(system, bring_up(system), tear_down(system), report=on_event)

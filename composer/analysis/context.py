@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from composer.catalog import Catalog
 from composer.interfaces import Action, Interfaces, Message, Service
 from composer.model import Channel, ChannelKind, Port, System, channels
+from composer.node_types import NodeTypes
 from composer.source import Span
 
 T = TypeVar("T")
@@ -31,7 +31,7 @@ class Context:
 
     system: System
     interfaces: Interfaces
-    catalog: Catalog
+    node_types: NodeTypes
     refused: tuple[Span, ...] = ()
     is_partial: bool = False
     _answers: dict[Callable[[Context], Any], Any] = field(

@@ -9,10 +9,10 @@ from collections.abc import Mapping as Map
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from composer.assembly.budget import Budget, TooMuch
-from composer.assembly.including import Including, system_file
-from composer.assembly.inheritance import Inherited, NodeTypeFile, inherited
-from composer.assembly.reading import Reader
+from composer.assembly.include_entries import IncludeReader
+from composer.assembly.includes import IncludeResolver, system_file
+from composer.assembly.inheritance import Inherited, NodeTypeFile, inherit
+from composer.assembly.limits import IncludeLimits, LimitExceeded
 from composer.assembly.rules import INCLUDE_CYCLE, INVALID_INCLUDE
 from composer.diagnostics import Diagnostic
 from composer.expand.rules import DUPLICATE_NODE_NAME, TOO_LARGE
@@ -20,7 +20,7 @@ from composer.project import Project
 from composer.source import SourceFile, Span
 from composer.tree import Mapping
 
-__all__ = ["Assembly", "Inherited", "NodeTypeFile", "assemble", "inherited"]
+__all__ = ["Assembly", "Inherited", "NodeTypeFile", "assemble", "inherit"]
 
 
 #: What leaves nodes out, or gives them other names.
@@ -37,7 +37,7 @@ class Assembly:
     """
 
     tree: Mapping | None
-    findings: list[Diagnostic]
+    diagnostics: list[Diagnostic]
     is_partial: bool = False
     folders: Map[str, Path] = field(default_factory=dict)
     included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
@@ -49,19 +49,19 @@ def assemble(tree: Mapping, source: SourceFile, folder: Path, project: Project) 
     ``folder`` is where its file is; everything that is included is in ``project``. What is found
     wrong includes what the schema says of every file.
     """
-    findings: list[Diagnostic] = []
-    budget = Budget()
-    including = Including(Reader(project, budget, findings), budget, findings)
+    diagnostics: list[Diagnostic] = []
+    limits = IncludeLimits()
+    resolver = IncludeResolver(IncludeReader(project, limits, diagnostics), limits, diagnostics)
     try:
-        whole = including.whole(system_file(tree, source, folder), {})
-    except TooMuch as stopped:
-        return Assembly(None, [stopped.finding])
+        whole = resolver.merge(system_file(tree, source, folder), {})
+    except LimitExceeded as stopped:
+        return Assembly(None, [stopped.diagnostic])
     is_partial = (
-        including.is_partial
-        or any(item.rule in _LEAVING_OUT for item in findings)
+        resolver.is_partial
+        or any(item.rule in _LEAVING_OUT for item in diagnostics)
         or _has_unmade_copies(whole)
     )
-    return Assembly(whole, findings, is_partial, including.folders, including.included)
+    return Assembly(whole, diagnostics, is_partial, resolver.folders, resolver.included)
 
 
 def _has_unmade_copies(tree: Mapping) -> bool:

@@ -6,14 +6,14 @@ from collections.abc import Mapping as Map
 from dataclasses import dataclass
 from pathlib import Path
 
-from composer.assembly.budget import Budget, TooMuch
-from composer.assembly.merging import merged
+from composer.assembly.limits import IncludeLimits, LimitExceeded
+from composer.assembly.merging import merge_maps
 from composer.assembly.rules import EXTENDS_CYCLE, UNKNOWN_BASE
-from composer.catalog import Catalog
 from composer.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.document import read_document
 from composer.document.limits import MAX_INCLUDE_DEPTH
-from composer.expand.scope import measured
+from composer.expand.scope import measure
+from composer.node_types import NodeTypes
 from composer.project import Project
 from composer.schema.kinds import NODE, check_kind
 from composer.source import Located, SourceFile, shown_path
@@ -47,7 +47,7 @@ class Inherited:
     """
 
     tree: Mapping | None
-    findings: list[Diagnostic]
+    diagnostics: list[Diagnostic]
     files: tuple[NodeTypeFile, ...]
 
     @property
@@ -56,56 +56,59 @@ class Inherited:
         return {file.source.path: file.path.parent for file in self.files}
 
 
-def inherited(file: NodeTypeFile) -> Inherited:
+def inherit(file: NodeTypeFile) -> Inherited:
     """Return the node type in ``file`` laid over the ones that it extends.
 
     Every key and value keeps its place. Variables are not put in yet: a type may give other values
     to those of its base.
     """
     files = [file]
-    findings: list[Diagnostic] = []
-    budget = Budget()
+    diagnostics: list[Diagnostic] = []
+    limits = IncludeLimits()
     try:
         while (name := files[-1].base) is not None:
-            base = _base(name, files, budget, findings)
+            base = _base(name, files, limits, diagnostics)
             if base is None:
-                return Inherited(None, findings, tuple(files))
+                return Inherited(None, diagnostics, tuple(files))
             files.append(base)
-    except TooMuch as stopped:
-        return Inherited(None, [stopped.finding], tuple(files))
+    except LimitExceeded as stopped:
+        return Inherited(None, [stopped.diagnostic], tuple(files))
     tree = files[-1].tree
     for child in reversed(files[:-1]):
-        tree = merged(tree, _without_extends(child.tree))
-    return Inherited(tree, findings, tuple(files))
+        tree = merge_maps(tree, _without_extends(child.tree))
+    return Inherited(tree, diagnostics, tuple(files))
 
 
 def _base(
-    name: Located[str], files: list[NodeTypeFile], budget: Budget, findings: list[Diagnostic]
+    name: Located[str],
+    files: list[NodeTypeFile],
+    limits: IncludeLimits,
+    diagnostics: list[Diagnostic],
 ) -> NodeTypeFile | None:
     """Return the file of the type called ``name``, which the last of ``files`` extends."""
-    catalog = Catalog.of(Project.at(files[-1].path.parent))
-    path = catalog.find(name.value)
+    node_types = NodeTypes.of(Project.at(files[-1].path.parent))
+    path = node_types.find(name.value)
     if path is None:
         message = f"there is no node type '{shown(name.value)}' to extend"
-        hint = suggestion(name.value, catalog.names())
-        findings.append(Diagnostic(UNKNOWN_BASE, message, name.span, hint=hint))
+        hint = suggestion(name.value, node_types.names())
+        diagnostics.append(Diagnostic(UNKNOWN_BASE, message, name.span, hint=hint))
         return None
     known = [number for number, file in enumerate(files) if file.path.resolve() == path.resolve()]
     if known:
-        findings.append(_cycle(files[known[0] :]))
+        diagnostics.append(_cycle(files[known[0] :]))
         return None
     if len(files) > MAX_INCLUDE_DEPTH:
         message = f"node types extend each other more than {MAX_INCLUDE_DEPTH} deep"
-        raise TooMuch(message, name.span)
+        raise LimitExceeded(message, name.span)
     tree, source, found = read_document(path, shown_path(path))
-    findings += found
+    diagnostics += found
     if tree is None:
         return None
-    budget.read(len(source.text), name.span)
-    budget.add(measured(tree).values, name.span)
+    limits.read(len(source.text), name.span)
+    limits.add(measure(tree).values, name.span)
     wrong_kind = check_kind(tree, source, (NODE,))
     if wrong_kind is not None:
-        findings.append(wrong_kind)
+        diagnostics.append(wrong_kind)
         return None
     return NodeTypeFile(path, source, tree)
 

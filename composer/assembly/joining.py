@@ -22,7 +22,7 @@ _MAPS = {
 _LISTS = ("parameter_files", "connections")
 _SEVERAL = 2
 #: What holds for a system as a whole, and what that is where nothing is said.
-_OF_THE_WHOLE: dict[tuple[str, ...], ScalarValue] = {
+_SYSTEM_SETTINGS: dict[tuple[str, ...], ScalarValue] = {
     ("lifecycle", "implied_dependencies"): True,
     ("delivery",): "auto",
 }
@@ -36,25 +36,25 @@ class Part:
     span: Span
 
 
-def joined(own: Mapping, parts: Iterable[Part], findings: list[Diagnostic]) -> Mapping:
+def join_parts(own: Mapping, parts: Iterable[Part], diagnostics: list[Diagnostic]) -> Mapping:
     """Return ``own`` with everything that is in ``parts`` as well, before what it says itself.
 
-    Of two things of one name the first stays, and what is told of them is added to ``findings``.
+    Of two things of one name the first stays, and what is told of them is added to ``diagnostics``.
     """
-    whole = [*_once(parts, findings), Part(own, own.span)]
+    whole = [*_without_repeats(parts, diagnostics), Part(own, own.span)]
     if len(whole) == 1 and own.entry(INCLUDE) is None:
         return own
     sections = {
-        **{name: _joined_maps(name, whole, findings) for name in _MAPS},
+        **{name: _joined_maps(name, whole, diagnostics) for name in _MAPS},
         **{name: _joined_lists(name, whole) for name in _LISTS},
     }
-    findings.extend(_misfits(own, whole[:-1]))
+    diagnostics.extend(_system_conflicts(own, whole[:-1]))
     kept = [sections.pop(entry.name, None) or entry for entry in own if entry.name != INCLUDE]
     added = [entry for entry in sections.values() if entry is not None]
     return Mapping((*kept, *added), own.span)
 
 
-def _once(parts: Iterable[Part], findings: list[Diagnostic]) -> Iterator[Part]:
+def _without_repeats(parts: Iterable[Part], diagnostics: list[Diagnostic]) -> Iterator[Part]:
     """Yield the parts but for those from a file whose nodes are there under these names already."""
     known: dict[tuple[str, str], Part] = {}
     for part in parts:
@@ -70,10 +70,10 @@ def _once(parts: Iterable[Part], findings: list[Diagnostic]) -> Iterator[Part]:
         message = "this file is included twice, with the same names for its nodes"
         hint = "give each include a 'prefix' of its own"
         related = (label,) if str(earlier.span) != str(part.span) else ()
-        findings.append(Diagnostic(DUPLICATE_NODE_NAME, message, part.span, related, hint))
+        diagnostics.append(Diagnostic(DUPLICATE_NODE_NAME, message, part.span, related, hint))
 
 
-def _joined_maps(name: str, whole: list[Part], findings: list[Diagnostic]) -> Entry | None:
+def _joined_maps(name: str, whole: list[Part], diagnostics: list[Diagnostic]) -> Entry | None:
     sections = _sections(name, whole)
     if not all(isinstance(section.value, Mapping) for section in sections):
         return sections[-1]
@@ -85,7 +85,7 @@ def _joined_maps(name: str, whole: list[Part], findings: list[Diagnostic]) -> En
         for entry in section if isinstance(section, Mapping) else ():
             earlier = found.setdefault(entry.name, entry)
             if earlier is not entry:
-                findings.extend(_conflict(name, entry, earlier))
+                diagnostics.extend(_conflict(name, entry, earlier))
     return Entry(sections[-1].key, Mapping(tuple(found.values()), sections[-1].value.span))
 
 
@@ -119,11 +119,11 @@ def _conflict(section: str, entry: Entry, earlier: Entry) -> Iterator[Diagnostic
         yield Diagnostic(INCLUDE_CONFLICT, message, entry.key.span, (label,), hint)
 
 
-def _misfits(own: Mapping, parts: list[Part]) -> Iterator[Diagnostic]:
+def _system_conflicts(own: Mapping, parts: list[Part]) -> Iterator[Diagnostic]:
     """Yield what parts say of the system as a whole, where the system says something else."""
     for part in parts:
-        for path, usual in _OF_THE_WHOLE.items():
-            theirs, ours = _said(part.tree, path), _said(own, path)
+        for path, usual in _SYSTEM_SETTINGS.items():
+            theirs, ours = _setting(part.tree, path), _setting(own, path)
             if theirs is None or theirs.value == (usual if ours is None else ours.value):
                 continue
             message = f"an included file has another '{path[-1]}' than the system"
@@ -132,7 +132,7 @@ def _misfits(own: Mapping, parts: list[Part]) -> Iterator[Diagnostic]:
             yield Diagnostic(INCLUDE_CONFLICT, message, theirs.span, labels, hint)
 
 
-def _said(tree: Mapping, path: tuple[str, ...]) -> Scalar | None:
+def _setting(tree: Mapping, path: tuple[str, ...]) -> Scalar | None:
     found: Tree | None = tree
     for name in path:
         found = found.get(name) if isinstance(found, Mapping) else None

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+from composer.assembly.rules import UNKNOWN_OVERRIDE
+from composer.diagnostics import Diagnostic, shown, suggestion
+from composer.source import SourceFile
 from composer.tree import Entry, Mapping, Scalar, Tree
 
 PARAMETERS = "parameters"
@@ -9,7 +14,7 @@ PARAMETERS = "parameters"
 _ALTERNATIVES = frozenset({"period_ms", "rate_hz"})
 
 
-def merged(base: Mapping, upper: Mapping) -> Mapping:
+def merge_maps(base: Mapping, upper: Mapping) -> Mapping:
     """Return ``base`` with what ``upper`` says in it.
 
     Maps are merged key by key, everything else is replaced. A plain value for a declared parameter
@@ -31,8 +36,8 @@ def _merged_entry(base: Entry, upper: Entry) -> Entry:
     if not isinstance(base.value, Mapping) or not isinstance(upper.value, Mapping):
         return upper
     if base.name == PARAMETERS:
-        return Entry(base.key, merged(base.value, _as_declared(base.value, upper.value)))
-    return Entry(base.key, merged(base.value, upper.value))
+        return Entry(base.key, merge_maps(base.value, _as_declared(base.value, upper.value)))
+    return Entry(base.key, merge_maps(base.value, upper.value))
 
 
 def _as_declared(base: Mapping, upper: Mapping) -> Mapping:
@@ -51,3 +56,44 @@ def _as_declared(base: Mapping, upper: Mapping) -> Mapping:
 
 def _default(value: Tree) -> Mapping:
     return Mapping((Entry(Scalar("default", value.span, verbatim=False), value),), value.span)
+
+
+_SECTIONS = {
+    "nodes": "node",
+    "qos_profiles": "QoS profile",
+    "executors": "executor",
+    "chains": "chain",
+}
+
+
+def apply_overrides(
+    tree: Mapping, overrides: Mapping, source: SourceFile, diagnostics: list[Diagnostic]
+) -> Mapping:
+    """Return a system with what ``overrides`` say of the things that it has.
+
+    Names are those of the included file ``source``. What it does not have is told and left out.
+    """
+    known: list[Entry] = []
+    for section in overrides:
+        of_system = tree.get(section.name)
+        if section.name not in _SECTIONS or not isinstance(section.value, Mapping):
+            continue
+        names = [entry.name for entry in of_system] if isinstance(of_system, Mapping) else []
+        diagnostics.extend(_unknown(section, names, source))
+        kept = tuple(
+            entry
+            for entry in section.value
+            if entry.name in names and isinstance(entry.value, Mapping)
+        )
+        if kept:
+            known.append(Entry(section.key, Mapping(kept, section.value.span)))
+    return merge_maps(tree, Mapping(tuple(known), overrides.span)) if known else tree
+
+
+def _unknown(section: Entry, names: list[str], source: SourceFile) -> Iterator[Diagnostic]:
+    for entry in section.value if isinstance(section.value, Mapping) else ():
+        if entry.name not in names:
+            what = _SECTIONS[section.name]
+            message = f"'{source.path}' has no {what} '{shown(entry.name)}'"
+            hint = suggestion(entry.name, names)
+            yield Diagnostic(UNKNOWN_OVERRIDE, message, entry.key.span, hint=hint)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
-from composer.assembly.budget import Budget
+from composer.assembly.limits import IncludeLimits
 from composer.names import fits
 from composer.source import Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 WILDCARD = "*"
-_ENDS = frozenset({"from", "to", "server", "clients"})
+_ENDPOINT_KEYS = frozenset({"from", "to", "server", "clients"})
 
 
 @dataclass(slots=True)
@@ -19,7 +19,7 @@ class Wildcards:
     """Puts names in the place of patterns, in which ``*`` is any text."""
 
     names: tuple[str, ...]
-    budget: Budget
+    limits: IncludeLimits
     _found: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def in_connections(self, tree: Tree) -> Tree:
@@ -62,10 +62,13 @@ class Wildcards:
 
     def _in_connection(self, tree: Tree) -> Tree:
         return _changed(
-            tree, lambda entry: self._end(entry.value) if entry.name in _ENDS else entry.value
+            tree,
+            lambda entry: (
+                self._endpoints(entry.value) if entry.name in _ENDPOINT_KEYS else entry.value
+            ),
         )
 
-    def _end(self, tree: Tree) -> Tree:
+    def _endpoints(self, tree: Tree) -> Tree:
         items = tree.items if isinstance(tree, Sequence) else (tree,)
         if not _has_wildcard(items):
             return tree
@@ -92,9 +95,9 @@ class Wildcards:
         if WILDCARD not in pattern:
             return ()
         if pattern not in self._found:
-            self.budget.compare(len(self.names) * (1 + len(pattern) // 64), span)
+            self.limits.compare(len(self.names) * (1 + len(pattern) // 64), span)
             self._found[pattern] = tuple(name for name in self.names if fits(pattern, name))
-        self.budget.add(len(self._found[pattern]), span)
+        self.limits.add(len(self._found[pattern]), span)
         return self._found[pattern]
 
 

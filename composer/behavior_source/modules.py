@@ -26,7 +26,7 @@ def module_file(module: str, folder: Path, project: Project) -> Path | None:
     """Return the file of ``module``, a dotted name, or None.
 
     It is looked for beside the YAML file (``folder``), in the folders of node types of its project,
-    and where Python would find it. Raises Unreadable for a link that leads out of the project.
+    and where Python would find it. Raises Unreadable for a symbolic link out of the project.
     """
     parts = module.split(".")
     if not all(part.isidentifier() for part in parts):
@@ -90,7 +90,7 @@ def _below(base: Path, parts: Sequence[str]) -> Path | None:
 
 def _held(path: Path, project: Project) -> Path:
     if not project.holds(path):
-        raise Unreadable("is a link that leads out of the project")
+        raise Unreadable("is a symbolic link out of the project")
     return path
 
 

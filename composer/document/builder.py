@@ -12,17 +12,16 @@ from composer.document.characters import check_value
 from composer.document.limits import MAX_DEPTH, MAX_VALUES
 from composer.document.scalars import NumberRefused, resolve_plain
 from composer.document.spans import Mark, collection_span, scalar_span, span_at
-from composer.document.words import described
 from composer.source import SourceFile, Span
-from composer.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree
+from composer.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, describe
 
 
 class Stopped(Exception):
-    """Nothing more can be read; the finding says why."""
+    """Nothing more can be read; the diagnostic says why."""
 
-    def __init__(self, finding: Diagnostic) -> None:
-        super().__init__(finding.message)
-        self.finding = finding
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic.message)
+        self.diagnostic = diagnostic
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +66,7 @@ class TreeBuilder:
 
     def __init__(self, source: SourceFile) -> None:
         self.root: Tree | None = None
-        self.findings: list[Diagnostic] = []
+        self.diagnostics: list[Diagnostic] = []
         self._source = source
         self._open: list[_Open] = []
         self._anchors: dict[str, _Anchored | None] = {}  # None while what they mark is being read
@@ -166,7 +165,7 @@ class TreeBuilder:
         else:
             hint = "put a text with braces or brackets in quotes"
             self._report(
-                rules.KEY_NOT_TEXT, f"a key is text, found {described(tree)}", tree.span, hint
+                rules.KEY_NOT_TEXT, f"a key is text, found {describe(tree)}", tree.span, hint
             )
             parent.awaits_value, parent.key = True, None
 
@@ -179,8 +178,8 @@ class TreeBuilder:
             if event.tag is None:
                 value = self._plain(event.value, span)
         else:
-            value, findings = check_value(event.value, span)
-            self.findings += findings
+            value, diagnostics = check_value(event.value, span)
+            self.diagnostics += diagnostics
         return Scalar(value, span, verbatim, offset)
 
     def _plain(self, text: str, span: Span) -> ScalarValue:
@@ -202,7 +201,7 @@ class TreeBuilder:
         key = scalar
         if not isinstance(scalar.value, str):
             text = shown(event.value)
-            message = f"a key is text, found {described(scalar)}"
+            message = f"a key is text, found {describe(scalar)}"
             self._report(rules.KEY_NOT_TEXT, message, scalar.span, f"put it in quotes: '{text}'")
             key = Scalar(event.value, scalar.span, scalar.verbatim, scalar.content_offset)
         first = parent.keys.setdefault(str(key.value), key)
@@ -211,7 +210,7 @@ class TreeBuilder:
         label = Label(first.span, "first here")
         message = f"the key '{shown(key.value)}' stands here a second time"
         hint = "rename one of them, or put what they say together"
-        self.findings.append(Diagnostic(rules.DUPLICATE_KEY, message, key.span, (label,), hint))
+        self.diagnostics.append(Diagnostic(rules.DUPLICATE_KEY, message, key.span, (label,), hint))
         return None
 
     def _check_value_in_braces(self, parent: _Open, value: Scalar) -> None:
@@ -245,11 +244,11 @@ class TreeBuilder:
             raise Stopped(too_many_values(self._source, mark))
 
     def _report(self, rule: Rule, message: str, span: Span, hint: str | None) -> None:
-        self.findings.append(Diagnostic(rule, message, span, hint=hint))
+        self.diagnostics.append(Diagnostic(rule, message, span, hint=hint))
 
 
 def too_many_values(source: SourceFile, mark: Mark | None) -> Diagnostic:
-    """Return the finding for more than MAX_VALUES values; ``mark`` is where one is too many."""
+    """Return the diagnostic for more than MAX_VALUES values; ``mark`` is where one is too many."""
     message = f"this file says more than {MAX_VALUES:,} things"
     return Diagnostic(rules.TOO_MANY_VALUES, message, span_at(source, mark))
 

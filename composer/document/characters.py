@@ -11,7 +11,7 @@ from composer.source import SourceFile, Span
 
 #: Controls (all but tab and line ends), characters that end a line for YAML 1.1 only, those that
 #: change the direction of text or are invisible, half surrogate pairs, byte-order marks inside
-#: the text, and code points that are no characters.
+#: the text, and noncharacters.
 _FORBIDDEN = (
     "\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f"
     "\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069"
@@ -22,7 +22,7 @@ _FORBIDDEN_IN_VALUE = re.compile(f"[{_FORBIDDEN}\r]")
 
 
 def check_text(source: SourceFile) -> list[Diagnostic]:
-    """Return a finding for the first character in the text that may not be there."""
+    """Return a diagnostic for the first forbidden character in the text."""
     if _FORBIDDEN_IN_TEXT.search(source.text) is None:
         return []
     for number, line in enumerate(source.lines, start=1):
@@ -37,18 +37,18 @@ def check_text(source: SourceFile) -> list[Diagnostic]:
 
 
 def check_value(value: str, span: Span) -> tuple[str, list[Diagnostic]]:
-    """Return ``value`` without the characters that escapes must not make, and a finding if any."""
+    """Return ``value`` without forbidden characters from escapes, and a diagnostic if any."""
     match = _FORBIDDEN_IN_VALUE.search(value)
     if match is None:
         return value, []
     message = f"this text contains {_character(match[0])}, which is not allowed"
-    finding = Diagnostic(
+    diagnostic = Diagnostic(
         FORBIDDEN_CHARACTER,
         message,
         span,
         hint="leave the escape out; only \\t and \\n may stand for control characters",
     )
-    return _FORBIDDEN_IN_VALUE.sub("", value), [finding]
+    return _FORBIDDEN_IN_VALUE.sub("", value), [diagnostic]
 
 
 def _character(character: str) -> str:

@@ -27,7 +27,7 @@ _WIDE_ENCODINGS = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
 
 
 class _NotRead(Exception):
-    """Nothing was read; the finding's message and hint."""
+    """Nothing was read; the diagnostic's message and hint."""
 
     def __init__(self, message: str, hint: str | None = None) -> None:
         super().__init__(message)
@@ -35,7 +35,7 @@ class _NotRead(Exception):
 
 
 def read_bytes(path: Path, source: SourceFile) -> tuple[bytes, list[Diagnostic]]:
-    """Return what is in a regular file of at most MAX_BYTES, or a finding at ``source``."""
+    """Return what is in a regular file of at most MAX_BYTES, or a diagnostic at ``source``."""
     start = Span(source, 1, 1)
     try:
         data = _read(path)
@@ -47,7 +47,7 @@ def read_bytes(path: Path, source: SourceFile) -> tuple[bytes, list[Diagnostic]]
 
 
 def too_large(source: SourceFile) -> Diagnostic:
-    """Return the finding for a text of more than MAX_BYTES."""
+    """Return the diagnostic for a text of more than MAX_BYTES."""
     return Diagnostic(
         FILE_TOO_LARGE,
         f"this file is larger than {MAX_BYTES:,} bytes",
@@ -57,7 +57,7 @@ def too_large(source: SourceFile) -> Diagnostic:
 
 
 def decode(data: bytes, shown_path: str) -> tuple[SourceFile, list[Diagnostic]]:
-    """Return the text of UTF-8 ``data`` (a byte-order mark is dropped), or a finding."""
+    """Return the text of UTF-8 ``data`` (a byte-order mark is dropped), or a diagnostic."""
     content = data.removeprefix(codecs.BOM_UTF8)
     try:
         return SourceFile(shown_path, content.decode("utf-8")), []

@@ -13,9 +13,9 @@ from composer.diagnostics import Diagnostic, Label, shown
 from composer.expand import rules
 from composer.expand.copies import COPYING
 from composer.expand.order import dependency_order
-from composer.expand.scope import Scope, measured, read_scope
+from composer.expand.references import references
+from composer.expand.scope import Scope, measure, read_scope
 from composer.expand.substitution import Substitution, TooLarge
-from composer.expand.text import references
 from composer.schema import kind_of
 from composer.tree import Entry, Mapping, Scalar, Tree
 
@@ -31,18 +31,18 @@ def expand(tree: Mapping, given: Map[str, Tree]) -> tuple[Mapping, list[Diagnost
     ``given`` goes before what the file itself says: the arguments that a system has for a node
     type, or for a system that it includes. What says ``for_each`` is there as often as it asks for.
     A value that stands for ``${name}`` alone keeps the place where it was written, so that a
-    finding points at the argument; a text with values in it keeps its own. The section
+    diagnostic points at the argument; a text with values in it keeps its own. The section
     ``variables`` stays as it is. Takes time in proportion to the expanded file, which is bounded.
     """
     scope = read_scope(tree, is_node_type=kind_of(tree) == "node")
     substitution = Substitution(scope)
-    findings = list(_unknown_arguments(tree, scope, given))
+    diagnostics = list(_unknown_arguments(tree, scope, given))
     try:
-        findings += _work_out(substitution, given)
+        diagnostics += _work_out(substitution, given)
         expanded = _filled(substitution, tree)
     except TooLarge as stopped:
-        return tree, [*findings, *substitution.findings, stopped.finding]
-    return expanded, [*findings, *substitution.findings, *_unused(scope)]
+        return tree, [*diagnostics, *substitution.diagnostics, stopped.diagnostic]
+    return expanded, [*diagnostics, *substitution.diagnostics, *_unused(scope)]
 
 
 def missing_variables(tree: Mapping, given: Map[str, Tree]) -> tuple[str, ...]:
@@ -64,7 +64,7 @@ def missing_variables(tree: Mapping, given: Map[str, Tree]) -> tuple[str, ...]:
 def _work_out(substitution: Substitution, given: Map[str, Tree]) -> list[Diagnostic]:
     """Give every variable its value, each after those it uses; return the circles."""
     scope = substitution.scope
-    scope.values.update((name, measured(value)) for name, value in given.items())
+    scope.values.update((name, measure(value)) for name, value in given.items())
     own = {
         name: variable.value
         for name, variable in scope.declared.items()

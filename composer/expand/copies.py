@@ -17,9 +17,9 @@ from math import prod
 from composer.diagnostics import Diagnostic, Label, shown
 from composer.document.limits import MAX_COPIES
 from composer.expand import rules
+from composer.expand.references import has_reference
 from composer.expand.scope import Declared
 from composer.expand.substitution import Substitution
-from composer.expand.text import has_reference
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 FOR_EACH = "for_each"
@@ -40,7 +40,7 @@ def _nodes(section: Tree, substitution: Substitution) -> Tree:
             key = _key(entry.key, copy)
             made = Entry(key, copy.add(body, _DEPTH).tree)
             if made.name in found:
-                substitution.findings.append(_twice(entry, written[made.name], made.name))
+                substitution.diagnostics.append(_twice(entry, written[made.name], made.name))
             else:
                 found[made.name], written[made.name] = made, entry
     return Mapping(tuple(found.values()), section.span)

@@ -46,7 +46,7 @@ class Scope:
     def inner(self, declared: dict[str, Declared], *, is_known: bool = True) -> Scope:
         """Return a scope in which these names stand for something, before those of this one."""
         values = {
-            name: measured(variable.value)
+            name: measure(variable.value)
             for name, variable in declared.items()
             if variable.value is not None
         }
@@ -101,15 +101,15 @@ def _default(entry: Entry) -> Tree | None:
     return entry.value.get("default") if isinstance(entry.value, Mapping) else None
 
 
-def measured(tree: Tree) -> Sized:
+def measure(tree: Tree) -> Sized:
     """Return a tree that is as it stays, with its size."""
     match tree:
         case Scalar():
             return Sized(tree, 1, 0)
         case Sequence():
-            parts = [measured(item) for item in tree.items]
+            parts = [measure(item) for item in tree.items]
         case Mapping():
-            parts = [measured(entry.value) for entry in tree]
+            parts = [measure(entry.value) for entry in tree]
     keys = len(parts) if isinstance(tree, Mapping) else 0
     values = 1 + keys + sum(part.values for part in parts)
     return Sized(tree, values, 1 + max((part.height for part in parts), default=0))

@@ -7,17 +7,17 @@ from dataclasses import dataclass, field
 from composer.diagnostics import Diagnostic, Rule, shown
 from composer.document.limits import MAX_BYTES, MAX_COPIES, MAX_DEPTH, MAX_VALUES
 from composer.expand import rules
+from composer.expand.references import Reference, has_reference, pieces
 from composer.expand.scope import Scope, Sized
-from composer.expand.text import Reference, has_reference, pieces
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 
 class TooLarge(Exception):
-    """The variables make the file grow beyond all limits; the finding says where."""
+    """The variables make the file grow beyond all limits; the diagnostic says where."""
 
-    def __init__(self, finding: Diagnostic) -> None:
-        super().__init__(finding.message)
-        self.finding = finding
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic.message)
+        self.diagnostic = diagnostic
 
 
 @dataclass(slots=True)
@@ -34,12 +34,12 @@ class Substitution:
     """Puts the variables of one file into its trees, and keeps count of what that adds."""
 
     scope: Scope
-    findings: list[Diagnostic] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
     growth: Growth = field(default_factory=Growth)
 
     def within(self, scope: Scope) -> Substitution:
         """Return what puts in the variables of another scope, and keeps the same count."""
-        return Substitution(scope, self.findings, self.growth)
+        return Substitution(scope, self.diagnostics, self.growth)
 
     def put_into(self, tree: Tree, depth: int = 0) -> Sized:
         """Return ``tree``, which stands in ``depth`` maps and lists, with variables put in.
@@ -160,7 +160,7 @@ class Substitution:
         hint: str | None = None,
     ) -> None:
         span = scalar.part(reference.start, len(reference.written))
-        self.findings.append(Diagnostic(rule, message, span, hint=hint))
+        self.diagnostics.append(Diagnostic(rule, message, span, hint=hint))
 
 
 def _sized(tree: Tree, parts: list[Sized], keys: int) -> Sized:

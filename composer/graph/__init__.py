@@ -11,7 +11,7 @@ from enum import StrEnum
 from composer.diagnostics import Diagnostic
 from composer.drift import Snapshot
 from composer.graph import declared, live
-from composer.graph.findings import Findings
+from composer.graph.diagnostics import DiagnosticIndex
 from composer.graph.picture import Graph
 from composer.graph.scene import Scene
 from composer.graph.views import connections, deployment, lifecycle, nodes, states
@@ -38,8 +38,8 @@ _VIEWS: dict[View, Callable[[Scene], Graph]] = {
 
 
 def scene_of(systems: Sequence[System], diagnostics: Iterable[Diagnostic] = ()) -> Scene:
-    """Return what there is to see in systems; what a finding points at is marked as wrong."""
-    return declared.scene_of(systems, Findings(diagnostics))
+    """Return what there is to see in systems; what a diagnostic points at is marked as wrong."""
+    return declared.scene_of(systems, DiagnosticIndex(diagnostics))
 
 
 def live_scene_of(snapshot: Snapshot, rates_hz: Mapping[str, float]) -> Scene:

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from composer.drift.expected import states_after_bring_up
+from composer.graph.diagnostics import DiagnosticIndex
 from composer.graph.facts import node_facts, port_facts
-from composer.graph.findings import Findings
 from composer.graph.labels import qos_label
 from composer.graph.rates import publishing_rates_hz
 from composer.graph.scene import Actor, End, ExecutorGroup, Scene, Wait
@@ -32,7 +32,7 @@ class _BroughtUp:
         return cls(said, states_after_bring_up(system))
 
 
-def scene_of(systems: Sequence[System], findings: Findings) -> Scene:
+def scene_of(systems: Sequence[System], diagnostics: DiagnosticIndex) -> Scene:
     """Return the nodes of one or several systems as one scene.
 
     ROS knows nodes by their full names: of two that share one, the first is drawn and marked.
@@ -42,7 +42,7 @@ def scene_of(systems: Sequence[System], findings: Findings) -> Scene:
     for system in systems:
         brought_up = _BroughtUp.of(system)
         for node in system.nodes:
-            actor = _actor(node, system, brought_up, findings, several)
+            actor = _actor(node, system, brought_up, diagnostics, several)
             known = actors.get(actor.full_name)
             actors[actor.full_name] = actor if known is None else _twice(known)
     return Scene(
@@ -56,7 +56,7 @@ def scene_of(systems: Sequence[System], findings: Findings) -> Scene:
 
 
 def _actor(
-    node: Node, system: System, brought_up: _BroughtUp, findings: Findings, several: bool
+    node: Node, system: System, brought_up: _BroughtUp, diagnostics: DiagnosticIndex, several: bool
 ) -> Actor:
     rates_hz = publishing_rates_hz(node)
     return Actor(
@@ -67,9 +67,9 @@ def _actor(
         state=brought_up.states[node.name.value],
         steps=brought_up.steps.get(node.name.value, ""),
         executor=_executor_key(system, _executor_name(node)),
-        ends=tuple(_end(port, rates_hz.get(port.name.value), findings) for port in node.ports),
+        ends=tuple(_end(port, rates_hz.get(port.name.value), diagnostics) for port in node.ports),
         details=node_facts(node, rates_hz),
-        wrong=findings.about_node(node),
+        wrong=diagnostics.about_node(node),
     )
 
 
@@ -85,7 +85,7 @@ def _note(node: Node, system: System, several: bool) -> str:
     return " · ".join(filter(None, (said, system.name.value if several else "")))
 
 
-def _end(port: Port, rate_hz: float | None, findings: Findings) -> End:
+def _end(port: Port, rate_hz: float | None, diagnostics: DiagnosticIndex) -> End:
     return End(
         kind=port.kind,
         name=port.name.value,
@@ -94,7 +94,7 @@ def _end(port: Port, rate_hz: float | None, findings: Findings) -> End:
         qos=qos_label(port.qos.profile) if port.qos.explicit else "",
         rate_hz=rate_hz,
         details=port_facts(port, rate_hz),
-        wrong=findings.about_port(port),
+        wrong=diagnostics.about_port(port),
     )
 
 

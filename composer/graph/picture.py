@@ -49,7 +49,7 @@ class Vertex:
     """Something drawn as a shape. ``key`` is unique in its graph; ``lines`` is the label.
 
     ``cluster`` is the key of the cluster it stands in, empty for none; ``namespace`` is where it
-    belongs by its name. ``wrong`` is the finding that colours it, empty for none.
+    belongs by its name. ``wrong`` is the diagnostic that colours it, empty for none.
     """
 
     key: str

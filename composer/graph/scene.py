@@ -22,7 +22,7 @@ class End:
 
     ``name`` is the port's (of a running node, that of the channel); ``rate_hz`` is how often it
     publishes, None where nobody knows. ``qos`` says the profile in short, and is empty where
-    nothing was said about it. ``wrong`` is the finding about it, empty for none.
+    nothing was said about it. ``wrong`` is the diagnostic about it, empty for none.
     """
 
     kind: PortKind

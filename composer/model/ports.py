@@ -108,7 +108,7 @@ class Reaction:
 
     Carried out in the order of the fields: nothing at all unless ``when`` is true; then the new
     ``state`` (all values worked out from the old one), the log line, the messages, the calls and
-    goals, the response. ``when_span`` is the place of the expression's text, so that a finding
+    goals, the response. ``when_span`` is the place of the expression's text, so that a diagnostic
     can point into it.
     """
 
@@ -228,7 +228,7 @@ class Parameter:
     """
 
     name: Located[str]
-    type: Located[str]  # a ParameterType; other text is kept for the finding
+    type: Located[str]  # a ParameterType; other text is kept for the diagnostic
     value: Located[Plain] | None
     default: Located[Plain] | None
     span: Span = field(compare=False)

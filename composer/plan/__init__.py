@@ -1,23 +1,22 @@
-"""Plans: the steps that bring a system, or parts of it, up and down, each step with its cause.
+"""Plans to bring a system, or parts of it, up and down: steps, each with its cause.
 
-A plan is data: this package decides everything, and the runtime executes it without decisions of
-its own. Nodes are configured and then activated after the nodes that they depend on, and taken down
-in reverse order; independent nodes may move at the same time. :mod:`composer.model.dependencies`
-defines which node waits for which.
+A plan is data: it decides everything, and the runtime carries it out. Nodes are configured and then
+activated after the nodes they depend on, and taken down in reverse order; independent nodes may
+move at the same time. :mod:`composer.model.dependencies` defines the dependencies.
 """
 
-from composer.plan.reach import reach
+from composer.plan.bringup import bring_up, start_causes, start_goals, tear_down
 from composer.plan.reconciliation import (
     Decision,
     DesiredState,
     Fault,
     FaultKind,
-    judge,
-    mend,
-    wanted,
+    decide,
+    desired_states,
+    reconcile,
 )
 from composer.plan.steps import Plan, Step, TransitionName
-from composer.plan.whole import bring_up, start_causes, start_goals, tear_down
+from composer.plan.transitions import plan_transitions
 
 __all__ = [
     "Decision",
@@ -28,11 +27,11 @@ __all__ = [
     "Step",
     "TransitionName",
     "bring_up",
-    "judge",
-    "mend",
-    "reach",
+    "decide",
+    "desired_states",
+    "plan_transitions",
+    "reconcile",
     "start_causes",
     "start_goals",
     "tear_down",
-    "wanted",
 ]

@@ -1,9 +1,8 @@
-"""What is done about a node that has failed: decided here, as data, and done by the runtime.
+"""Decide how to handle failed nodes, and plan the transitions from observed to desired states.
 
-The whole of it is one idea: nodes that have failed are wanted down, nodes that need them are wanted
-no further than inactive, all others where they were wanted before; and a plan leads from where the
-nodes are to where they are wanted (:func:`composer.plan.reach`). A restart is a failed node that
-after a while is wanted up again.
+The desired state of a failed node is unconfigured, that of the nodes that depend on it at most
+inactive; all others keep theirs. The plan leads from the observed states to the desired ones
+(:func:`composer.plan.plan_transitions`). A restart releases a failed node after a backoff.
 """
 
 from __future__ import annotations
@@ -14,24 +13,24 @@ from enum import StrEnum
 
 from composer.model import OnFailure, PrimaryState, System
 from composer.model.dependencies import Edge, dependency_edges, in_dependency_order
-from composer.plan.reach import reach
 from composer.plan.steps import Plan, rank
+from composer.plan.transitions import plan_transitions
 
 
 class FaultKind(StrEnum):
-    """How it was found that a node has failed."""
+    """How the failure of a node was detected."""
 
-    TRANSITION = "transition"  # one that was asked for from outside ended in an error
-    STEP = "step"  # one of a plan did not lead where it should
+    TRANSITION = "transition"  # requested externally, ended in an error
+    STEP = "step"  # a step of a plan failed
     SILENCE = "silence"
-    CALLBACK = "callback"  # one took too long, and was interrupted
-    ERRORS = "errors"  # too many
+    CALLBACK = "callback"  # took too long and was interrupted
+    ERRORS = "errors"  # too many of them
     LOST = "lost"  # a callback does not return and cannot be interrupted
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A node has failed. ``node`` is its key in the system, ``at_s`` a time of a steady clock."""
+    """A failure of a node. ``node`` is its key in the system, ``at_s`` a steady-clock time."""
 
     node: str
     kind: FaultKind
@@ -41,10 +40,10 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What is to be done about a fault.
+    """How to handle a fault.
 
-    With ``restart`` the node is taken down now and up again in ``wait_s``; that is attempt number
-    ``attempt`` within the window of its budget.
+    For ``restart``, the node is taken down now and brought up after ``wait_s``, as attempt number
+    ``attempt`` within the window of its restart policy.
     """
 
     action: OnFailure
@@ -55,100 +54,102 @@ class Decision:
 
 @dataclass(frozen=True, slots=True)
 class DesiredState:
-    """What has to be kept up, by the keys of nodes.
+    """The desired state of each node, by its key.
 
-    ``goals`` is where each node is wanted, ``down`` why failed ones are held down nevertheless,
-    ``restarts`` when each was restarted, oldest first.
+    ``goals`` are the states requested for the nodes, ``down`` the reasons why failed nodes are kept
+    down anyway, ``restarts`` the times of each node's restarts in seconds, oldest first.
     """
 
     goals: Mapping[str, PrimaryState]
     down: Mapping[str, str] = field(default_factory=dict)
     restarts: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
-    def want(self, goals: Mapping[str, PrimaryState]) -> DesiredState:
-        """Return this with other goals for some of the nodes."""
+    def with_goals(self, goals: Mapping[str, PrimaryState]) -> DesiredState:
+        """Return a copy with new goals for some of the nodes."""
         return replace(self, goals={**self.goals, **goals})
 
     def fail(self, fault: Fault) -> DesiredState:
-        """Return this with the node of ``fault`` held down."""
+        """Return a copy that keeps the node of ``fault`` down."""
         return replace(self, down={**self.down, fault.node: fault.text})
 
     def restart(self, node: str, at_s: float) -> DesiredState:
-        """Return this with the node wanted up again, and one more restart to count."""
+        """Return a copy that releases the node and counts one more restart."""
         restarts = {**self.restarts, node: (*self.restarts.get(node, ()), at_s)}
         return replace(self.release(node), restarts=restarts)
 
     def release(self, node: str) -> DesiredState:
-        """Return this with the node held down no longer."""
+        """Return a copy that no longer keeps the node down."""
         return replace(self, down={name: why for name, why in self.down.items() if name != node})
 
 
-def judge(system: System, upkeep: DesiredState, fault: Fault) -> Decision | None:
-    """Return what is to be done about ``fault``; None when the node is held down already."""
+def decide(system: System, desired: DesiredState, fault: Fault) -> Decision | None:
+    """Return how to handle ``fault``; None if the node is unknown or already kept down."""
     node = system.node(fault.node)
-    if node is None or fault.node in upkeep.down:
+    if node is None or fault.node in desired.down:
         return None
     policy = node.supervision.policy
     if policy is not OnFailure.RESTART:
         return Decision(policy, fault.text)
     if fault.kind is FaultKind.LOST:
         return Decision(OnFailure.SHUTDOWN, f"{fault.text}; it cannot be restarted")
-    budget = node.supervision.restart
-    since_s = fault.at_s - budget.window_ms / 1000.0
-    attempts = sum(at_s > since_s for at_s in upkeep.restarts.get(fault.node, ()))
-    if attempts >= budget.max_attempts:
+    restart = node.supervision.restart
+    since_s = fault.at_s - restart.window_ms / 1000.0
+    attempts = sum(at_s > since_s for at_s in desired.restarts.get(fault.node, ()))
+    if attempts >= restart.max_attempts:
         times = "once" if attempts == 1 else f"{attempts} times"
-        within = f"within {budget.window_ms / 1000.0:g} s"
+        within = f"within {restart.window_ms / 1000.0:g} s"
         return Decision(OnFailure.SHUTDOWN, f"{fault.text}; restarted {times} {within} before")
-    return Decision(OnFailure.RESTART, fault.text, budget.backoff_s(attempts), attempts + 1)
+    return Decision(OnFailure.RESTART, fault.text, restart.backoff_s(attempts), attempts + 1)
 
 
-def wanted(system: System, upkeep: DesiredState) -> Mapping[str, PrimaryState]:
-    """Return where every node is to be, as long as the failed ones are held down."""
-    held = held_back(system, upkeep)
-    goals = dict(upkeep.goals)
-    for name, goal in upkeep.goals.items():
-        if name in upkeep.down:
+def desired_states(system: System, desired: DesiredState) -> Mapping[str, PrimaryState]:
+    """Return the desired state of every node while the failed ones are kept down."""
+    blocked = blocked_nodes(system, desired)
+    goals = dict(desired.goals)
+    for name, goal in desired.goals.items():
+        if name in desired.down:
             goals[name] = PrimaryState.UNCONFIGURED
-        elif name in held:
+        elif name in blocked:
             goals[name] = min(goal, PrimaryState.INACTIVE, key=rank)
     return goals
 
 
-def held_back(system: System, upkeep: DesiredState) -> Mapping[str, str]:
-    """Return the nodes that cannot be active, each with the failed one it needs in the end."""
-    held: dict[str, str] = {}
+def blocked_nodes(system: System, desired: DesiredState) -> Mapping[str, str]:
+    """Return the nodes that cannot be active, each with the failed node that it depends on."""
+    blocked: dict[str, str] = {}
     for name, needs in _needs(system):
         for edge in needs:
-            if name in upkeep.down or name in held:
+            if name in desired.down or name in blocked:
                 break
-            if edge.on in upkeep.down:
-                held[name] = edge.on
-            elif edge.on in held and edge.state is PrimaryState.ACTIVE:
-                held[name] = held[edge.on]  # what is held back itself stays inactive
-    return held
+            if edge.on in desired.down:
+                blocked[name] = edge.on
+            elif edge.on in blocked and edge.state is PrimaryState.ACTIVE:
+                blocked[name] = blocked[edge.on]  # blocked nodes stay inactive themselves
+    return blocked
 
 
-def mend(
-    system: System, upkeep: DesiredState, states: Mapping[str, PrimaryState], why: str
+def reconcile(
+    system: System, desired: DesiredState, states: Mapping[str, PrimaryState], why: str
 ) -> Plan:
-    """Return the plan that leads from ``states`` to where the nodes are wanted now.
+    """Return the plan that leads from ``states`` to the desired states.
 
-    ``why`` is the cause of every step that no failed node is the cause of.
+    ``why`` is the cause of each step that is not caused by a failed node.
     """
-    held = held_back(system, upkeep)
+    blocked = blocked_nodes(system, desired)
     causes = {node.name.value: why for node in system.nodes}
-    causes |= {name: f"it needs {failed}, which is down" for name, failed in held.items()}
-    causes |= upkeep.down
-    return reach(system, states, _reachable(system, states, wanted(system, upkeep)), causes)
+    causes |= {name: f"it needs {failed}, which is down" for name, failed in blocked.items()}
+    causes |= desired.down
+    return plan_transitions(
+        system, states, _reachable(system, states, desired_states(system, desired)), causes
+    )
 
 
 def _reachable(
     system: System, states: Mapping[str, PrimaryState], goals: Mapping[str, PrimaryState]
 ) -> Mapping[str, PrimaryState]:
-    """Return the goals, without those that would take a node up before what it needs.
+    """Return the goals without those that would activate a node before what it depends on.
 
-    What somebody keeps low by hand takes nobody down, but nobody is sent after it either.
+    A dependency that a user keeps down takes no node down, but no node is activated without it.
     """
     reachable = dict(goals)
     for name, needs in _needs(system):
@@ -160,7 +161,7 @@ def _reachable(
 
 
 def _needs(system: System) -> Iterator[tuple[str, tuple[Edge, ...]]]:
-    """Yield every node, behind those it depends on, with what it depends on."""
+    """Yield every node in dependency order, with its dependencies."""
     edges = dependency_edges(system)
     needs: dict[str, list[Edge]] = {}
     for edge in edges:

@@ -1,4 +1,4 @@
-"""What a plan is: steps in phases, each with its cause and with what it waits for."""
+"""Plans: steps in phases, each with its cause and the steps that it waits for."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TransitionName: TypeAlias = Literal["configure", "activate", "deactivate", "clea
 class Step:
     """One transition of one node. ``number`` counts from 1; ``node`` is its key in the system.
 
-    ``after`` are the numbers of the steps of the same phase that have to be done first.
+    ``after`` are the numbers of the steps of the same phase that have to finish first.
     """
 
     number: int
@@ -34,16 +34,16 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Steps in an order that they can be made in."""
+    """Steps in an order in which they can be carried out."""
 
     steps: tuple[Step, ...]
 
     @property
     def phases(self) -> tuple[tuple[Step, ...], ...]:
-        """The steps by phase: neighbours with the same transition.
+        """The steps by phase: consecutive steps with the same transition.
 
-        A phase begins when the one before is over. Within a phase, steps that do not wait for each
-        other may be made at the same time.
+        A phase starts when the one before it has finished. Within a phase, steps that do not wait
+        for each other may run at the same time.
         """
         grouped = groupby(self.steps, key=lambda step: step.transition)
         return tuple(tuple(steps) for _, steps in grouped)
@@ -54,9 +54,9 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """Nodes that all make one transition, in order, and who waits for whom among them.
+    """Nodes that make the same transition, in order.
 
-    ``waits`` has (node, the one it waits for).
+    ``waits`` are pairs of a node and the node that it waits for.
     """
 
     transition: TransitionName
@@ -64,8 +64,8 @@ class Phase:
     waits: Iterable[tuple[str, str]]
 
 
-def plan_of(phases: Iterable[Phase], causes: Mapping[str, str]) -> Plan:
-    """Return the steps of the phases, numbered. A wait for a node that comes later is left out."""
+def build_plan(phases: Iterable[Phase], causes: Mapping[str, str]) -> Plan:
+    """Return the numbered steps of the phases, without waits for nodes that come later."""
     steps: list[Step] = []
     for phase in phases:
         numbers: dict[str, int] = {}
@@ -90,25 +90,25 @@ def plan_of(phases: Iterable[Phase], causes: Mapping[str, str]) -> Plan:
 
 
 def upward(edges: Iterable[Edge], state: PrimaryState) -> Iterable[tuple[str, str]]:
-    """Yield who waits for whom on the way up to ``state``: for those needed in that state."""
+    """Yield (node, dependency) for each dependency needed in ``state`` or above."""
     for edge in edges:
         if rank(edge.state) >= rank(state):
             yield edge.node, edge.on
 
 
 def downward(edges: Iterable[Edge], state: PrimaryState) -> Iterable[tuple[str, str]]:
-    """Yield who waits for whom on the way down from ``state``: the needed for those that need."""
+    """Yield (dependency, node): on the way down, a dependency waits for its dependents."""
     for node, other in upward(edges, state):
         yield other, node
 
 
 def rank(state: PrimaryState) -> int:
-    """Return how far up a state is: unconfigured 0, inactive 1, active 2."""
+    """Return the rank of a state: unconfigured 0, inactive 1, active 2."""
     return _RANK[state]
 
 
 def nodes_of(system: System, names: Iterable[str]) -> tuple[Node, ...]:
-    """Return the nodes with the given names, in their order."""
+    """Return the nodes with the given names, in the order of the names."""
     found = (system.node(name) for name in names)
     return tuple(node for node in found if node is not None)
 

@@ -24,12 +24,12 @@ INTERFACES = "interfaces"
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """A project as seen from ``folder``, a folder in it. ``findings`` are about its settings."""
+    """A project as seen from ``folder``, a folder in it. ``diagnostics`` are about its settings."""
 
     root: Path
     folder: Path
     settings: Settings = field(default_factory=Settings)
-    findings: tuple[Diagnostic, ...] = ()
+    diagnostics: tuple[Diagnostic, ...] = ()
 
     @classmethod
     def at(cls, folder: Path) -> Project:
@@ -39,8 +39,8 @@ class Project:
         if found is None:
             nodes = _nearest(NODES, (start, *start.parents))
             return cls(start if nodes is None else nodes.parent, start)
-        settings, findings = read_settings(found)
-        return cls(found.root, start, settings, (*found.findings, *findings))
+        settings, diagnostics = read_settings(found)
+        return cls(found.root, start, settings, (*found.diagnostics, *diagnostics))
 
     @property
     def node_folders(self) -> tuple[Path, ...]:

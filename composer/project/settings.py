@@ -8,7 +8,7 @@ from pathlib import Path
 
 from composer.diagnostics import Diagnostic, Severity, shown
 from composer.project.rules import BAD_SETTING
-from composer.project.sources import Written
+from composer.project.sources import SettingsSource
 from composer.schema import check_schema
 from composer.source import Located, SourceFile
 from composer.tree import Mapping, Scalar, Sequence
@@ -33,27 +33,27 @@ class Settings:
     severity: tuple[tuple[Located[str], Severity], ...] = ()
 
 
-def read_settings(written: Written) -> tuple[Settings, list[Diagnostic]]:
+def read_settings(written: SettingsSource) -> tuple[Settings, list[Diagnostic]]:
     """Return the settings, those that are wrong left out, and what is wrong."""
     tree = written.tree
     if tree is None:
         return Settings(written.source), []
-    findings = check_schema(tree, _SCHEMA)
+    diagnostics = check_schema(tree, _SCHEMA)
     strict = tree.get("strict")
     settings = Settings(
         written.source,
-        nodes=_folders(tree, "nodes", written.root, findings),
-        interfaces=_folders(tree, "interfaces", written.root, findings),
+        nodes=_folders(tree, "nodes", written.root, diagnostics),
+        interfaces=_folders(tree, "interfaces", written.root, diagnostics),
         strict=isinstance(strict, Scalar) and strict.value is True,
         select=tuple(_texts(tree, "select")),
         ignore=tuple(_texts(tree, "ignore")),
         severity=tuple(_severities(tree)),
     )
-    return settings, findings
+    return settings, diagnostics
 
 
 def _folders(
-    tree: Mapping, name: str, root: Path, findings: list[Diagnostic]
+    tree: Mapping, name: str, root: Path, diagnostics: list[Diagnostic]
 ) -> tuple[Path, ...] | None:
     if not isinstance(tree.get(name), Sequence):
         return None
@@ -66,7 +66,7 @@ def _folders(
         else:
             message = f"'{shown(text.value)}' {problem}"
             hint = "name a folder below the one that these settings are in"
-            findings.append(Diagnostic(BAD_SETTING, message, text.span, hint=hint))
+            diagnostics.append(Diagnostic(BAD_SETTING, message, text.span, hint=hint))
     return tuple(found)
 
 

@@ -22,16 +22,16 @@ PYPROJECT_FILE = "pyproject.toml"
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class SettingsSource:
     """Settings as they are written. ``tree`` is None where too little of them can be read."""
 
     root: Path
     source: SourceFile
     tree: Mapping | None
-    findings: tuple[Diagnostic, ...]
+    diagnostics: tuple[Diagnostic, ...]
 
 
-def find_settings(folder: Path) -> Written | None:
+def find_settings(folder: Path) -> SettingsSource | None:
     """Return the settings of the nearest of ``folder`` and the folders above that has any."""
     # Asked of every file, and for all folders above it: a Path for each is what takes time.
     root = str(folder)
@@ -56,7 +56,9 @@ def _stamp(path: str) -> _Stamp | None:
 
 
 @lru_cache(maxsize=32)
-def _written(folder: str, own_stamp: _Stamp | None, table_stamp: _Stamp | None) -> Written | None:
+def _written(
+    folder: str, own_stamp: _Stamp | None, table_stamp: _Stamp | None
+) -> SettingsSource | None:
     """Read what is in ``folder``: once while it stays so, for every file of a project asks."""
     root = Path(folder)
     own = _own_file(root) if own_stamp is not None else None
@@ -66,20 +68,22 @@ def _written(folder: str, own_stamp: _Stamp | None, table_stamp: _Stamp | None) 
     return _both(own, table)
 
 
-def _own_file(root: Path) -> Written:
+def _own_file(root: Path) -> SettingsSource:
     path = root / SETTINGS_FILE
     name = shown_path(path)
     if not _is_inside(path, root):
         source = SourceFile(name)
-        message = "this is a link that leads out of the project"
-        return Written(root, source, None, (Diagnostic(UNREADABLE_FILE, message, _start(source)),))
-    tree, source, findings = read_document(path, name)
-    if [finding.rule for finding in findings] == [NOT_A_MAP] and _says_nothing(source):
-        return Written(root, source, Mapping((), _start(source)), ())
-    return Written(root, source, tree, tuple(findings))
+        message = "this is a symbolic link out of the project"
+        return SettingsSource(
+            root, source, None, (Diagnostic(UNREADABLE_FILE, message, _start(source)),)
+        )
+    tree, source, diagnostics = read_document(path, name)
+    if [diagnostic.rule for diagnostic in diagnostics] == [NOT_A_MAP] and _says_nothing(source):
+        return SettingsSource(root, source, Mapping((), _start(source)), ())
+    return SettingsSource(root, source, tree, tuple(diagnostics))
 
 
-def _table(root: Path) -> Written | None:
+def _table(root: Path) -> SettingsSource | None:
     path = root / PYPROJECT_FILE
     if not _is_inside(path, root):
         return None
@@ -89,21 +93,21 @@ def _table(root: Path) -> Written | None:
     read = None if unread or undecoded else read_table(source)
     if read is None:
         return None
-    tree, findings = read
-    return Written(root, source, tree, tuple(findings))
+    tree, diagnostics = read
+    return SettingsSource(root, source, tree, tuple(diagnostics))
 
 
-def _both(own: Written, table: Written) -> Written:
+def _both(own: SettingsSource, table: SettingsSource) -> SettingsSource:
     """Keep the file, and say that the table is not read."""
     span = table.tree.span if table.tree is not None else _start(table.source)
-    finding = Diagnostic(
+    diagnostic = Diagnostic(
         BAD_SETTING,
         f"the table {TABLE} is not read: there is a {SETTINGS_FILE} beside it",
         span,
         (Label(_start(own.source), "these are the settings"),),
         "keep one of the two",
     )
-    return replace(own, findings=(*own.findings, finding))
+    return replace(own, diagnostics=(*own.diagnostics, diagnostic))
 
 
 def _is_inside(path: Path, root: Path) -> bool:

@@ -28,13 +28,13 @@ def chosen(
     """
     wanted, unwanted = list(select), list(ignore)
     for text in [*wanted, *unwanted]:
-        if not any(rule.is_meant_by(text) for rule in rules):
+        if not any(rule.matches(text) for rule in rules):
             raise UnknownRule(text, _close(text, rules))
     return [
         diagnostic
         for diagnostic in diagnostics
-        if (not wanted or any(diagnostic.rule.is_meant_by(text) for text in wanted))
-        and not any(diagnostic.rule.is_meant_by(text) for text in unwanted)
+        if (not wanted or any(diagnostic.rule.matches(text) for text in wanted))
+        and not any(diagnostic.rule.matches(text) for text in unwanted)
     ]
 
 

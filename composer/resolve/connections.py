@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from composer.model import ChannelKind, Connection, Delivery, Endpoint, Isolation, Port, Qos
+from composer.model import Chain, ChannelKind, Connection, Delivery, Endpoint, Isolation, Port, Qos
 from composer.names import join
 from composer.resolve.qos import QosTable, implicit_qos
-from composer.resolve.reading import choice, is_opaque, text, texts
+from composer.resolve.tree_values import choice, entries, is_opaque, key, number, text, texts
 from composer.tree import Entry, Mapping, Sequence, Tree
 
 T = TypeVar("T")
@@ -22,7 +22,7 @@ _ENDS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class PortConnection:
     """What a connection gives to a port: a full name and, where it says so, a profile."""
 
     kind: ChannelKind
@@ -32,21 +32,21 @@ class Joint:
     isolation: Isolation | None = None
 
 
-Joints = dict[tuple[str, str], list[Joint]]
+PortConnections = dict[tuple[str, str], list[PortConnection]]
 
 
-def connections(
+def read_connections(
     tree: Tree | None, namespace: str, qos: QosTable
-) -> tuple[tuple[Connection, ...], Joints]:
+) -> tuple[tuple[Connection, ...], PortConnections]:
     """Return what is declared under ``connections``, and by node and port what follows from it."""
     declared = []
-    joints: Joints = {}
+    port_connections: PortConnections = {}
     for item in tree.items if isinstance(tree, Sequence) else ():
         connection = _connection(item)
         if connection is None:
             continue
         declared.append(connection)
-        joint = Joint(
+        port_connection = PortConnection(
             connection.kind,
             full_name(connection.name.value, namespace),
             _profile(item, connection.kind, qos),
@@ -54,8 +54,8 @@ def connections(
             connection.isolation.value if connection.isolation else None,
         )
         for end in (*connection.sources, *connection.sinks):
-            joints.setdefault((end.node, end.port), []).append(joint)
-    return tuple(declared), joints
+            port_connections.setdefault((end.node, end.port), []).append(port_connection)
+    return tuple(declared), port_connections
 
 
 def full_name(name: str, namespace: str) -> str:
@@ -63,19 +63,21 @@ def full_name(name: str, namespace: str) -> str:
     return name if is_opaque(name) else join(namespace, name)
 
 
-def joint_of(port: Port, joints: Iterable[Joint]) -> Joint | None:
-    """Return the first joint of the port's kind, with what is first given to its name."""
-    fitting = [joint for joint in joints if joint.kind is port.kind.channel]
+def connection_of(port: Port, port_connections: Iterable[PortConnection]) -> PortConnection | None:
+    """Return the first connection of the port's kind, with what is first given to its name."""
+    fitting = [
+        connection for connection in port_connections if connection.kind is port.kind.channel
+    ]
     if not fitting:
         return None
     first = fitting[0]
-    same = [joint for joint in fitting if joint.full_name == first.full_name]
-    return Joint(
+    same = [connection for connection in fitting if connection.full_name == first.full_name]
+    return PortConnection(
         first.kind,
         first.full_name,
-        _first(joint.qos for joint in same),
-        _first(joint.delivery for joint in same),
-        _first(joint.isolation for joint in same),
+        _first(connection.qos for connection in same),
+        _first(connection.delivery for connection in same),
+        _first(connection.isolation for connection in same),
     )
 
 
@@ -118,3 +120,18 @@ def _profile(tree: Tree, kind: ChannelKind, qos: QosTable) -> Qos | None:
     if written is None:
         return None
     return qos.resolve(written, implicit_qos(kind, written.span))
+
+
+def read_chains(tree: Tree | None) -> tuple[Chain, ...]:
+    """Return what is declared under ``chains``; one without latency or way is left out."""
+    found = (_chain(entry) for entry in entries(tree))
+    return tuple(chain for chain in found if chain is not None)
+
+
+def _chain(entry: Entry) -> Chain | None:
+    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    latency_ms = number(tree.get("latency_ms"))
+    through = tuple(Endpoint(name) for name in texts(tree.get("through")))
+    if latency_ms is None or not through:
+        return None
+    return Chain(key(entry), through, latency_ms, entry.key.span)

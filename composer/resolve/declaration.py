@@ -16,12 +16,12 @@ from composer.model import (
     UnknownKey,
 )
 from composer.project import Project
-from composer.resolve.files import Places
-from composer.resolve.parameters import declarations
-from composer.resolve.ports import ports, timers
+from composer.resolve.parameters import read_parameters
+from composer.resolve.ports import read_ports, read_timers
 from composer.resolve.qos import QosTable
 from composer.resolve.reactions import NODE_EVENTS, Events, node_reactions
-from composer.resolve.reading import entries, key, plain_text, text
+from composer.resolve.source_folders import SourceFolders
+from composer.resolve.tree_values import entries, key, plain_text, text
 from composer.source import Located
 from composer.tree import Entry, Mapping, Plain, Tree, plain
 
@@ -41,20 +41,20 @@ class Declaration:
 
 
 def declare(
-    tree: Mapping, places: Places, qos: QosTable, findings: list[Diagnostic]
+    tree: Mapping, folders: SourceFolders, qos: QosTable, diagnostics: list[Diagnostic]
 ) -> Declaration:
-    """Read a node type or an inline node. ``places`` are those of the files it is written in."""
+    """Read a node type or an inline node. ``folders`` are those of the files it is written in."""
     behavior = text(tree.get("behavior"))
     return Declaration(
         description=plain_text(tree.get("description")),
-        behavior=_behavior(behavior, places.folder(behavior.span))
+        behavior=_behavior(behavior, folders.folder(behavior.span))
         if behavior is not None
         else None,
-        parameters=declarations(tree.get("parameters")),
-        ports=ports(tree, qos, findings),
-        timers=timers(tree, findings),
+        parameters=read_parameters(tree.get("parameters")),
+        ports=read_ports(tree, qos, diagnostics),
+        timers=read_timers(tree, diagnostics),
         state=tuple((key(entry), plain(entry.value)) for entry in entries(tree.get("state"))),
-        reactions=node_reactions(tree, findings),
+        reactions=node_reactions(tree, diagnostics),
         introspection=tree.get("introspection"),
     )
 

@@ -18,40 +18,39 @@ from composer.model import (
     UnknownKey,
 )
 from composer.names import expand_name, join
-from composer.resolve.connections import Joint, Joints, joint_of
+from composer.resolve.connections import PortConnection, PortConnections, connection_of
 from composer.resolve.declaration import Declaration, declare, refined, refines, unknown_keys
-from composer.resolve.files import Places
-from composer.resolve.introspection import introspection
+from composer.resolve.node_options import read_introspection, read_supervision
+from composer.resolve.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import ParameterFiles
-from composer.resolve.parameters import with_own_clock, with_values
+from composer.resolve.parameters import with_use_sim_time, with_values
 from composer.resolve.qos import QosTable
-from composer.resolve.reading import entries, is_opaque, key, plain_text, text, text_or_opaque
-from composer.resolve.supervision import supervision
-from composer.resolve.types import NodeTypes
+from composer.resolve.source_folders import SourceFolders
+from composer.resolve.tree_values import entries, is_opaque, key, plain_text, text, text_or_opaque
 from composer.source import Located
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
-    """What all nodes of a system have around them."""
+class SystemContext:
+    """What all nodes of a system have context them."""
 
-    places: Places
+    folders: SourceFolders
     namespace: Located[str]  # absolute
-    types: NodeTypes
+    types: NodeTypeLoader
     qos: QosTable
-    joints: Joints
+    port_connections: PortConnections
     overrides: Overrides
     supervision: Supervision
     introspection: Tree | None
     parameter_files: ParameterFiles
     use_sim_time: tuple[Entry, ...]  # what is said of all nodes, if anything is
-    findings: list[Diagnostic]
+    diagnostics: list[Diagnostic]
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
+class _Declared:
     """A declaration, and how much is known of it."""
 
     declaration: Declaration
@@ -64,21 +63,21 @@ class Made:
 _NOTHING = Declaration("", None, (), (), (), (), ())
 
 
-def node(entry: Entry, around: Surroundings) -> Node:
+def resolve_node(entry: Entry, context: SystemContext) -> Node:
     """Return the node that an entry of a system's ``nodes`` declares."""
     tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
     type_entry = tree.entry("type")
-    made = _inline(tree, around) if type_entry is None else _typed(type_entry, tree, around)
+    made = _inline(tree, context) if type_entry is None else _typed(type_entry, tree, context)
     declared = made.declaration
-    namespace = node_namespace(tree.get("namespace"), around.namespace)
+    namespace = node_namespace(tree.get("namespace"), context.namespace)
     known = frozenset(parameter.name.value for parameter in declared.parameters)
-    own_clock = type_entry is None and USE_SIM_TIME in known
-    given = {} if own_clock else {item.name: item for item in around.use_sim_time}
-    given |= around.parameter_files.given(join(namespace.value, entry.name), known)
+    has_use_sim_time = type_entry is None and USE_SIM_TIME in known
+    given = {} if has_use_sim_time else {item.name: item for item in context.use_sim_time}
+    given |= context.parameter_files.given(join(namespace.value, entry.name), known)
     if type_entry is not None:
         given |= {item.name: item for item in entries(tree.get("parameters"))}
-    given |= around.overrides.by_node.get(entry.name, {})
-    own = with_own_clock(declared.parameters, given)
+    given |= context.overrides.by_node.get(entry.name, {})
+    own = with_use_sim_time(declared.parameters, given)
     parameters, unknown = with_values(own, given, complete=made.complete)
     remappings = _remappings(tree.get("remappings"))
     lifecycle = tree.get("lifecycle")
@@ -93,7 +92,9 @@ def node(entry: Entry, around: Surroundings) -> Node:
         description=plain_text(tree.get("description")) or declared.description,
         behavior=declared.behavior,
         parameters=parameters,
-        ports=placed(declared.ports, entry.name, namespace.value, remappings, around.joints),
+        ports=place_ports(
+            declared.ports, entry.name, namespace.value, remappings, context.port_connections
+        ),
         timers=declared.timers,
         state=declared.state,
         reactions=declared.reactions,
@@ -101,9 +102,9 @@ def node(entry: Entry, around: Surroundings) -> Node:
         executor=text(tree.get("executor")),
         depends_on=_dependencies(lifecycle.get("depends_on")),
         autostart=state(lifecycle.get("autostart")),
-        supervision=supervision(lifecycle, around.supervision),
-        introspection=introspection(
-            declared.introspection, around.introspection, tree.get("introspection")
+        supervision=read_supervision(lifecycle, context.supervision),
+        introspection=read_introspection(
+            declared.introspection, context.introspection, tree.get("introspection")
         ),
         unknown=(*made.unknown, *unknown),
         complete=made.complete,
@@ -118,12 +119,12 @@ def node_namespace(tree: Tree | None, system: Located[str]) -> Located[str]:
     return own if is_opaque(own.value) else own.map(lambda name: join(system.value, name))
 
 
-def placed(
+def place_ports(
     ports: Iterable[Port],
     name: str,
     namespace: str,
     remappings: Iterable[Remapping],
-    joints: Joints,
+    port_connections: PortConnections,
 ) -> tuple[Port, ...]:
     """Return the ports with the full names they have in a node, and the profiles of connections.
 
@@ -137,48 +138,49 @@ def placed(
     for remapping in remappings:
         renamed.setdefault(expanded(remapping.source.value), expanded(remapping.target.value))
     return tuple(
-        _placed(port, joints.get((name, port.name.value), ()), expanded, renamed) for port in ports
+        _place_port(port, port_connections.get((name, port.name.value), ()), expanded, renamed)
+        for port in ports
     )
 
 
-def _placed(
+def _place_port(
     port: Port,
-    joints: Iterable[Joint],
+    port_connections: Iterable[PortConnection],
     expanded: Callable[[str], str],
     renamed: dict[str, str],
 ) -> Port:
-    joint = joint_of(port, joints)
-    if joint is None:
+    connection = connection_of(port, port_connections)
+    if connection is None:
         own = expanded(port.ros_name.value)
         return replace(port, full_name=renamed.get(own, own))
     return replace(
         port,
-        full_name=joint.full_name,
-        qos=joint.qos or port.qos,
-        delivery=joint.delivery,
-        isolation=joint.isolation or port.isolation,
+        full_name=connection.full_name,
+        qos=connection.qos or port.qos,
+        delivery=connection.delivery,
+        isolation=connection.isolation or port.isolation,
     )
 
 
-def _inline(tree: Mapping, around: Surroundings) -> Made:
-    return Made(declare(tree, around.places, around.qos, around.findings))
+def _inline(tree: Mapping, context: SystemContext) -> _Declared:
+    return _Declared(declare(tree, context.folders, context.qos, context.diagnostics))
 
 
-def _typed(type_entry: Entry, tree: Mapping, around: Surroundings) -> Made:
+def _typed(type_entry: Entry, tree: Mapping, context: SystemContext) -> _Declared:
     name = text(type_entry.value)
-    path = around.types.find(name) if name is not None else None
+    path = context.types.find(name) if name is not None else None
     if path is None:
-        return Made(_NOTHING, type_found=False, complete=False)
-    made = around.types.make(path, tree.get("variables"), type_entry.value.span)
+        return _Declared(_NOTHING, type_found=False, complete=False)
+    made = context.types.instantiate(path, tree.get("variables"), type_entry.value.span)
     if made is None:
-        return Made(_NOTHING, complete=False)
+        return _Declared(_NOTHING, complete=False)
     unknown = unknown_keys(made.tree, tree) if made.complete else ()
     declaration = made.declaration
     if refines(tree):
         # Expressions of the type that are compiled again say nothing that was not said before.
         merged = refined(made.tree, tree)
-        declaration = declare(merged, made.places, around.qos, around.findings)
-    return Made(declaration, unknown, complete=made.complete, type_files=made.files)
+        declaration = declare(merged, made.folders, context.qos, context.diagnostics)
+    return _Declared(declaration, unknown, complete=made.complete, type_files=made.files)
 
 
 def _remappings(tree: Tree | None) -> tuple[Remapping, ...]:

@@ -52,7 +52,7 @@ class Overrides:
 
 
 @dataclass(frozen=True, slots=True)
-class CommandLine:
+class OverrideOptions:
     """What is said on a command line: ``--set`` texts, each ``node.parameter=value``, and so on."""
 
     settings: tuple[str, ...] = ()
@@ -60,10 +60,10 @@ class CommandLine:
     use_sim_time: bool = False
 
 
-NOTHING_SAID = CommandLine()
+NO_OVERRIDES = OverrideOptions()
 
 
-def read_overrides(said: CommandLine) -> tuple[Overrides, list[Diagnostic]]:
+def read_overrides(said: OverrideOptions) -> tuple[Overrides, list[Diagnostic]]:
     """Read what a command line says.
 
     Values of settings are YAML, as they would stand in a file; of two for one parameter the last
@@ -71,11 +71,11 @@ def read_overrides(said: CommandLine) -> tuple[Overrides, list[Diagnostic]]:
     """
     texts = [setting.replace("\r", " ").replace("\n", " ") for setting in said.settings]
     source = SourceFile(SET, "\n".join(texts))
-    findings: list[Diagnostic] = []
-    found = (_override(text, source, line, findings) for line, text in enumerate(texts, start=1))
+    diagnostics: list[Diagnostic] = []
+    found = (_override(text, source, line, diagnostics) for line, text in enumerate(texts, start=1))
     parameters = tuple(item for item in found if item is not None)
     clock = _use_sim_time() if said.use_sim_time else None
-    return Overrides(parameters, _namespace(said.namespace), clock), findings
+    return Overrides(parameters, _namespace(said.namespace), clock), diagnostics
 
 
 def _namespace(namespace: str | None) -> Located[str] | None:
@@ -92,16 +92,16 @@ def _use_sim_time() -> Entry:
 
 
 def _override(
-    text: str, source: SourceFile, line: int, findings: list[Diagnostic]
+    text: str, source: SourceFile, line: int, diagnostics: list[Diagnostic]
 ) -> Override | None:
     target, equals, _ = text.partition("=")
     node, dot, parameter = target.partition(".")
     if not (equals and dot and node and parameter):
         span = Span(source, line, 1, max(len(text), 1))
         message = f"'{shown(text)}' is not of the form node.parameter=value"
-        findings.append(Diagnostic(RULE, message, span))
+        diagnostics.append(Diagnostic(RULE, message, span))
         return None
-    value = _value(text, len(target) + 1, source, line, findings)
+    value = _value(text, len(target) + 1, source, line, diagnostics)
     if value is None:
         return None
     name = Scalar(parameter, Span(source, line, len(node) + 2, len(parameter)))
@@ -109,14 +109,14 @@ def _override(
 
 
 def _value(
-    text: str, start: int, source: SourceFile, line: int, findings: list[Diagnostic]
+    text: str, start: int, source: SourceFile, line: int, diagnostics: list[Diagnostic]
 ) -> Tree | None:
     """Read what is behind the equals sign."""
     # As the value of a one-line document of the same width, so that its columns are right.
     key = "v" * (start - 2)
     document = SourceFile(SET, f"{key}: {text[start:]}")
     tree, found = parse_document(document)
-    findings.extend(_moved_finding(item, source, line) for item in found)
+    diagnostics.extend(_moved_diagnostic(item, source, line) for item in found)
     value = tree.get(key) if tree is not None else None
     return _moved(value, source, line) if value is not None else None
 
@@ -145,13 +145,14 @@ def _moved_span(span: Span, source: SourceFile, line: int) -> Span:
     return Span(source, line, span.column, span.length)
 
 
-def _moved_finding(finding: Diagnostic, source: SourceFile, line: int) -> Diagnostic:
+def _moved_diagnostic(diagnostic: Diagnostic, source: SourceFile, line: int) -> Diagnostic:
     return Diagnostic(
-        finding.rule,
-        finding.message,
-        _moved_span(finding.primary, source, line),
+        diagnostic.rule,
+        diagnostic.message,
+        _moved_span(diagnostic.primary, source, line),
         tuple(
-            Label(_moved_span(label.span, source, line), label.message) for label in finding.related
+            Label(_moved_span(label.span, source, line), label.message)
+            for label in diagnostic.related
         ),
-        finding.hint,
+        diagnostic.hint,
     )

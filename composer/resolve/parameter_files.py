@@ -18,7 +18,7 @@ from composer.document import read_document
 from composer.model import USE_SIM_TIME
 from composer.names import fits, join
 from composer.project import Project
-from composer.resolve.reading import is_opaque, texts
+from composer.resolve.tree_values import is_opaque, texts
 from composer.source import Located, shown_path
 from composer.tree import Entry, Mapping, Scalar, Tree
 
@@ -124,7 +124,7 @@ class ParameterFiles:
 
 
 def read_parameter_files(
-    tree: Tree | None, folder: Path, project: Project, findings: list[Diagnostic]
+    tree: Tree | None, folder: Path, project: Project, diagnostics: list[Diagnostic]
 ) -> ParameterFiles:
     """Read the files that ``parameter_files`` names, relative to the system's folder."""
     files = ParameterFiles()
@@ -134,36 +134,38 @@ def read_parameter_files(
         path = folder / name.value
         if not project.holds(path):
             message = f"parameter file '{shown(name.value)}' is outside the project"
-            findings.append(Diagnostic(RULE, message, name.span))
+            diagnostics.append(Diagnostic(RULE, message, name.span))
         elif not path.exists():
             message = f"there is no parameter file '{shown(name.value)}'"
-            findings.append(Diagnostic(RULE, message, name.span))
+            diagnostics.append(Diagnostic(RULE, message, name.span))
         else:
-            findings.extend(read_parameter_file(path, files))
+            diagnostics.extend(read_parameter_file(path, files))
     return files
 
 
 def read_parameter_file(path: Path, files: ParameterFiles) -> list[Diagnostic]:
     """Add what is in the file at ``path``; return what is wrong with it."""
-    content, _, findings = read_document(path, shown_path(path))
+    content, _, diagnostics = read_document(path, shown_path(path))
     if content is not None:
-        _read(content, "/", files, findings)
-    return findings
+        _read(content, "/", files, diagnostics)
+    return diagnostics
 
 
-def _read(tree: Mapping, namespace: str, files: ParameterFiles, findings: list[Diagnostic]) -> None:
+def _read(
+    tree: Mapping, namespace: str, files: ParameterFiles, diagnostics: list[Diagnostic]
+) -> None:
     for entry in tree:
         name = join(namespace, entry.name)
         if not isinstance(entry.value, Mapping):
             message = f"'{shown(entry.name)}' has no '{PARAMETERS}'"
-            findings.append(Diagnostic(RULE, message, entry.key.span))
+            diagnostics.append(Diagnostic(RULE, message, entry.key.span))
             continue
         parameters = entry.value.entry(PARAMETERS)
         if parameters is None:
-            _read(entry.value, name, files, findings)
+            _read(entry.value, name, files, diagnostics)
         elif not isinstance(parameters.value, Mapping):
             message = f"'{PARAMETERS}' is a map of parameters"
-            findings.append(Diagnostic(RULE, message, parameters.key.span))
+            diagnostics.append(Diagnostic(RULE, message, parameters.key.span))
         else:
             values = {item.name: item for item in _flat(parameters.value, "")}
             files.add(Located(name, entry.key.span), values)

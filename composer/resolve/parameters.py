@@ -7,7 +7,7 @@ from collections.abc import Mapping as Map
 from dataclasses import replace
 
 from composer.model import USE_SIM_TIME, Parameter, ParameterType, UnknownKey
-from composer.resolve.reading import (
+from composer.resolve.tree_values import (
     OPAQUE,
     entries,
     flag,
@@ -21,11 +21,11 @@ from composer.source import Located
 from composer.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree, plain
 
 #: The type of a parameter whose bare value tells none, such as an empty list.
-UNTOLD = ""
-_OF_USE_SIM_TIME = "Whether the time of the node is that of /clock."
+UNKNOWN_TYPE = ""
+_USE_SIM_TIME_DESCRIPTION = "Whether the time of the node is that of /clock."
 
 
-def declarations(tree: Tree | None) -> tuple[Parameter, ...]:
+def read_parameters(tree: Tree | None) -> tuple[Parameter, ...]:
     """Return what ``parameters`` of a node type or an inline node declares.
 
     A bare value declares a parameter of its own type with that default.
@@ -33,7 +33,7 @@ def declarations(tree: Tree | None) -> tuple[Parameter, ...]:
     return tuple(_declaration(entry) for entry in entries(tree))
 
 
-def with_own_clock(
+def with_use_sim_time(
     parameters: tuple[Parameter, ...], given: Map[str, Entry]
 ) -> tuple[Parameter, ...]:
     """Return the parameters with ``use_sim_time``, which every node has, where a value is given."""
@@ -41,7 +41,9 @@ def with_own_clock(
     if entry is None or any(item.name.value == USE_SIM_TIME for item in parameters):
         return parameters
     kind = Located(str(ParameterType.BOOL), entry.key.span)
-    own = Parameter(key(entry), kind, None, None, entry.key.span, description=_OF_USE_SIM_TIME)
+    own = Parameter(
+        key(entry), kind, None, None, entry.key.span, description=_USE_SIM_TIME_DESCRIPTION
+    )
     return (*parameters, own)
 
 
@@ -144,7 +146,7 @@ def _bare_type(value: Plain) -> str:
     items = value if isinstance(value, list) else [value]
     if value is None or any(isinstance(item, str) and is_opaque(item) for item in items):
         return OPAQUE
-    return inferred_type(value) or UNTOLD
+    return inferred_type(value) or UNKNOWN_TYPE
 
 
 def _with_value(parameter: Parameter, tree: Tree) -> Parameter:

@@ -15,7 +15,7 @@ from composer.model import (
 )
 from composer.resolve.qos import QosTable, implicit_qos
 from composer.resolve.reactions import RULE, Events, expression, nested, reaction, template
-from composer.resolve.reading import (
+from composer.resolve.tree_values import (
     choice,
     entries,
     flag,
@@ -49,28 +49,28 @@ _NESTED_EVENTS = {
 }
 
 
-def ports(node: Mapping, qos: QosTable, findings: list[Diagnostic]) -> tuple[Port, ...]:
+def read_ports(node: Mapping, qos: QosTable, diagnostics: list[Diagnostic]) -> tuple[Port, ...]:
     """Return the ports a node declares, with the names they declare for full names.
 
     What they are called in full is known once the node has a name and a namespace.
     """
     return tuple(
-        _port(kind, entry, qos, findings)
+        _port(kind, entry, qos, diagnostics)
         for kind in PortKind
         for entry in entries(node.get(kind.section))
     )
 
 
-def timers(node: Mapping, findings: list[Diagnostic]) -> tuple[Timer, ...]:
+def read_timers(node: Mapping, diagnostics: list[Diagnostic]) -> tuple[Timer, ...]:
     """Return the timers a node declares."""
-    return tuple(_timer(entry, findings) for entry in entries(node.get("timers")))
+    return tuple(_timer(entry, diagnostics) for entry in entries(node.get("timers")))
 
 
-def _port(kind: PortKind, entry: Entry, qos: QosTable, findings: list[Diagnostic]) -> Port:
+def _port(kind: PortKind, entry: Entry, qos: QosTable, diagnostics: list[Diagnostic]) -> Port:
     span = entry.key.span
     tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), span)
     ros_name = text(tree.get(kind.channel.value)) or key(entry)
-    accept = expression(tree.get("accept"), findings)
+    accept = expression(tree.get("accept"), diagnostics)
     return Port(
         kind=kind,
         name=key(entry),
@@ -79,13 +79,13 @@ def _port(kind: PortKind, entry: Entry, qos: QosTable, findings: list[Diagnostic
         full_name=ros_name.value,
         qos=qos.resolve(tree.get("qos"), implicit_qos(kind.channel, span)),
         span=span,
-        reactions=_reactions(kind, entry, tree, findings),
+        reactions=_reactions(kind, entry, tree, diagnostics),
         timeout_ms=_timeout(kind, tree, span),
         result_timeout_ms=number(tree.get("result_timeout_ms")),
         accept=accept.value if accept is not None else None,
         accept_span=accept.span if accept is not None else None,
-        feedback=_feedback(tree.entry("feedback"), findings),
-        result=template(tree.get("result"), findings),
+        feedback=_feedback(tree.entry("feedback"), diagnostics),
+        result=template(tree.get("result"), diagnostics),
         budget_ms=number(tree.get("budget_ms")),
         reentrant=flag(tree.get("reentrant"), default=False),
         always_on=flag(tree.get("always_on"), default=False),
@@ -106,37 +106,39 @@ def _timeout(kind: PortKind, tree: Mapping, span: Span) -> Located[float] | None
     return timeout_ms
 
 
-def _reactions(kind: PortKind, entry: Entry, tree: Mapping, findings: list[Diagnostic]) -> Events:
+def _reactions(
+    kind: PortKind, entry: Entry, tree: Mapping, diagnostics: list[Diagnostic]
+) -> Events:
     if kind in _INLINE_EVENTS:
-        found = reaction(tree, entry.key.span, findings)
+        found = reaction(tree, entry.key.span, diagnostics)
         return ((_INLINE_EVENTS[kind], found),) if found is not None else ()
     return tuple(
         found
         for name, event in _NESTED_EVENTS.get(kind, ())
-        for found in nested(tree.entry(name), event, findings)
+        for found in nested(tree.entry(name), event, diagnostics)
     )
 
 
-def _feedback(entry: Entry | None, findings: list[Diagnostic]) -> FeedbackSteps | None:
+def _feedback(entry: Entry | None, diagnostics: list[Diagnostic]) -> FeedbackSteps | None:
     if entry is None or not isinstance(entry.value, Mapping):
         return None
     count = integer(entry.value.get("count"))
     period_ms = number(entry.value.get("period_ms"))
-    content = template(entry.value.get("message"), findings)
+    content = template(entry.value.get("message"), diagnostics)
     if count is None or period_ms is None:
         return None
     return FeedbackSteps(count, period_ms, content, entry.key.span)
 
 
-def _timer(entry: Entry, findings: list[Diagnostic]) -> Timer:
+def _timer(entry: Entry, diagnostics: list[Diagnostic]) -> Timer:
     span = entry.key.span
     tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), span)
     clock = choice(tree.get("clock"), TimerClock)
     return Timer(
         name=key(entry),
-        period=_period(tree, span, findings),
+        period=_period(tree, span, diagnostics),
         span=span,
-        reaction=reaction(tree, span, findings),
+        reaction=reaction(tree, span, diagnostics),
         clock=TimerClock.ROS if clock is None else clock.value,
         budget_ms=number(tree.get("budget_ms")),
         reentrant=flag(tree.get("reentrant"), default=False),
@@ -145,27 +147,27 @@ def _timer(entry: Entry, findings: list[Diagnostic]) -> Timer:
     )
 
 
-def _period(tree: Mapping, span: Span, findings: list[Diagnostic]) -> Period:
+def _period(tree: Mapping, span: Span, diagnostics: list[Diagnostic]) -> Period:
     """Return how often a timer fires.
 
-    Where that cannot be read there is a finding already (or a load-time variable without value),
+    Where that cannot be read there is a diagnostic already (or a load-time variable without value),
     and a plain second keeps the timer in the model: nothing else is wrong with it.
     """
     for unit in PeriodUnit:
         written = tree.get(unit.value)
         if written is not None:
-            return _written_period(written, unit, findings)
+            return _written_period(written, unit, diagnostics)
     return Period(1000.0, PeriodUnit.MILLISECONDS, span)
 
 
-def _written_period(tree: Tree, unit: PeriodUnit, findings: list[Diagnostic]) -> Period:
+def _written_period(tree: Tree, unit: PeriodUnit, diagnostics: list[Diagnostic]) -> Period:
     value = number(tree)
     if value is not None:
         return Period(value.value, unit, tree.span)
-    compiled = template(tree, findings) if isinstance(tree, Scalar) else None
+    compiled = template(tree, diagnostics) if isinstance(tree, Scalar) else None
     if isinstance(compiled, Computed):
         return Period(compiled.expression, unit, compiled.span)
     if isinstance(compiled, Text):
-        message = f"'{unit}' takes a number or one '{{expression}}', not text around it"
-        findings.append(Diagnostic(RULE, message, tree.span))
+        message = f"'{unit}' takes a number or one '{{expression}}', not text context it"
+        diagnostics.append(Diagnostic(RULE, message, tree.span))
     return Period(1000.0, PeriodUnit.MILLISECONDS, tree.span)

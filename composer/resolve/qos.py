@@ -16,7 +16,7 @@ from composer.qos import (
     QosProfile,
     Reliability,
 )
-from composer.resolve.reading import entries, integer, is_opaque, key, number, text
+from composer.resolve.tree_values import entries, integer, is_opaque, key, number, text
 from composer.source import Located, Span
 from composer.tree import Entry, Mapping, Scalar, Tree
 
@@ -39,9 +39,9 @@ class QosTable:
             return _overlaid(tree, base, tree.span)
         name = text(tree)
         if name is None:
-            return default if tree is None else _guess(default)
+            return default if tree is None else _as_unknown(default)
         found = self.use(name)
-        return replace(found or _guess(default), span=name.span, explicit=True)
+        return replace(found or _as_unknown(default), span=name.span, explicit=True)
 
     def use(self, name: Located[str]) -> Qos | None:
         """Return the profile called ``name``, and remember that it was asked for."""
@@ -55,7 +55,7 @@ class QosTable:
         if extends is None:
             # What an inline profile leaves out is rclpy's, whatever the kind of port.
             return replace(default, profile=QosProfile())
-        return self.use(extends) or _guess(default)
+        return self.use(extends) or _as_unknown(default)
 
 
 def qos_table(tree: Tree | None) -> QosTable:
@@ -101,7 +101,7 @@ def _profile(entry: Entry, resolved: Map[str, Qos]) -> Qos:
     extends = _extends(entry)
     base = Qos(QosProfile(), entry.key.span)
     if extends is not None:
-        base = resolved.get(extends.value) or _preset(extends) or _guess(base)
+        base = resolved.get(extends.value) or _preset(extends) or _as_unknown(base)
     return _overlaid(entry.value, base, entry.key.span)
 
 
@@ -114,7 +114,7 @@ def _preset(name: Located[str]) -> Qos | None:
     return Qos(profile, name.span) if profile is not None else None
 
 
-def _guess(qos: Qos) -> Qos:
+def _as_unknown(qos: Qos) -> Qos:
     """Return the profile as what stands in for one that is not known."""
     return replace(qos, known=False)
 
@@ -136,10 +136,10 @@ def _overlaid(tree: Tree, base: Qos, span: Span) -> Qos:
     return Qos(profile, span, explicit=True, policy_spans=tuple(spans.items()), known=known)
 
 
-Reader = Callable[[Tree], "Located[Any] | None"]
+PolicyReader = Callable[[Tree], "Located[Any] | None"]
 
 
-def _one_of(values: type[History | Reliability | Durability | Liveliness]) -> Reader:
+def _one_of(values: type[History | Reliability | Durability | Liveliness]) -> PolicyReader:
     def read(tree: Tree) -> Located[Any] | None:
         found = text(tree)
         known = {item.value: item for item in values}
@@ -154,7 +154,7 @@ def _duration(tree: Tree) -> Located[Any] | None:
     return number(tree)
 
 
-_POLICIES: Map[str, Reader] = {
+_POLICIES: Map[str, PolicyReader] = {
     "history": _one_of(History),
     "depth": integer,
     "reliability": _one_of(Reliability),

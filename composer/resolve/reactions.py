@@ -5,7 +5,7 @@ from __future__ import annotations
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.expressions import Expression, ExpressionError, compile_expression
 from composer.model import Event, LogLevel, Reaction, Send
-from composer.resolve.reading import entries, is_opaque, key, text
+from composer.resolve.tree_values import entries, is_opaque, key, text
 from composer.source import Located, Span
 from composer.templates import Template, compile_template
 from composer.tree import Entry, Mapping, Scalar, Tree
@@ -45,7 +45,7 @@ NODE_EVENTS = (
 )
 
 
-def expression(tree: Tree | None, findings: list[Diagnostic]) -> Located[Expression] | None:
+def expression(tree: Tree | None, diagnostics: list[Diagnostic]) -> Located[Expression] | None:
     """Compile a condition. Its place is that of the text, without quotes."""
     if not isinstance(tree, Scalar) or not isinstance(tree.value, str) or is_opaque(tree.value):
         return None
@@ -53,17 +53,17 @@ def expression(tree: Tree | None, findings: list[Diagnostic]) -> Located[Express
         compiled = compile_expression(tree.value)
     except ExpressionError as error:
         span = tree.part(error.offset, error.length)
-        findings.append(Diagnostic(RULE, error.message, span, hint=error.hint))
+        diagnostics.append(Diagnostic(RULE, error.message, span, hint=error.hint))
         return None
     return Located(compiled, tree.part(0, len(tree.value)))
 
 
-def template(tree: Tree | None, findings: list[Diagnostic]) -> Template | None:
+def template(tree: Tree | None, diagnostics: list[Diagnostic]) -> Template | None:
     """Compile a value with ``{...}`` in its texts."""
     if tree is None:
         return None
     compiled, problems = compile_template(tree)
-    findings.extend(
+    diagnostics.extend(
         Diagnostic(RULE, problem.message, problem.span, hint=problem.hint) for problem in problems
     )
     return compiled
@@ -74,58 +74,60 @@ def has_reaction(tree: Mapping) -> bool:
     return any(entry.name in KEYS for entry in tree)
 
 
-def reaction(tree: Tree | None, span: Span, findings: list[Diagnostic]) -> Reaction | None:
+def reaction(tree: Tree | None, span: Span, diagnostics: list[Diagnostic]) -> Reaction | None:
     """Return what the reaction keys of ``tree`` declare; None when there are none."""
     if not isinstance(tree, Mapping) or not has_reaction(tree):
         return None
-    when = expression(tree.get("when"), findings)
-    log, level = _log(tree.get("log"), findings)
+    when = expression(tree.get("when"), diagnostics)
+    log, level = _log(tree.get("log"), diagnostics)
     return Reaction(
         span=span,
         when=when.value if when is not None else None,
         when_span=when.span if when is not None else None,
-        state=_templates(tree.get("set"), findings),
+        state=_templates(tree.get("set"), diagnostics),
         log=log,
         log_level=level,
-        publish=_sends(tree.get("publish"), findings),
-        call=_sends(tree.get("call"), findings),
-        respond=template(tree.get("respond"), findings),
+        publish=_sends(tree.get("publish"), diagnostics),
+        call=_sends(tree.get("call"), diagnostics),
+        respond=template(tree.get("respond"), diagnostics),
     )
 
 
-def nested(entry: Entry | None, event: Event, findings: list[Diagnostic]) -> Events:
+def nested(entry: Entry | None, event: Event, diagnostics: list[Diagnostic]) -> Events:
     """Return the reaction that stands under a key of its own, such as ``on_response``."""
-    found = reaction(entry.value, entry.key.span, findings) if entry is not None else None
+    found = reaction(entry.value, entry.key.span, diagnostics) if entry is not None else None
     return ((event, found),) if found is not None else ()
 
 
 Events = tuple[tuple[Event, Reaction], ...]
 
 
-def node_reactions(tree: Mapping, findings: list[Diagnostic]) -> Events:
+def node_reactions(tree: Mapping, diagnostics: list[Diagnostic]) -> Events:
     """Return the reactions of a node to its own transitions."""
     return tuple(
-        found for name, event in NODE_EVENTS for found in nested(tree.entry(name), event, findings)
+        found
+        for name, event in NODE_EVENTS
+        for found in nested(tree.entry(name), event, diagnostics)
     )
 
 
 def _templates(
-    tree: Tree | None, findings: list[Diagnostic]
+    tree: Tree | None, diagnostics: list[Diagnostic]
 ) -> tuple[tuple[Located[str], Template], ...]:
-    compiled = ((key(entry), template(entry.value, findings)) for entry in entries(tree))
+    compiled = ((key(entry), template(entry.value, diagnostics)) for entry in entries(tree))
     return tuple((name, value) for name, value in compiled if value is not None)
 
 
-def _sends(tree: Tree | None, findings: list[Diagnostic]) -> tuple[Send, ...]:
-    return tuple(Send(name, content) for name, content in _templates(tree, findings))
+def _sends(tree: Tree | None, diagnostics: list[Diagnostic]) -> tuple[Send, ...]:
+    return tuple(Send(name, content) for name, content in _templates(tree, diagnostics))
 
 
-def _log(tree: Tree | None, findings: list[Diagnostic]) -> tuple[Template | None, LogLevel]:
+def _log(tree: Tree | None, diagnostics: list[Diagnostic]) -> tuple[Template | None, LogLevel]:
     if not isinstance(tree, Mapping):
-        return template(tree, findings), LogLevel.INFO
+        return template(tree, diagnostics), LogLevel.INFO
     level = text(tree.get("level"))
     known = level is not None and level.value in {item.value for item in LogLevel}
     return (
-        template(tree.get("message"), findings),
+        template(tree.get("message"), diagnostics),
         LogLevel(level.value) if level is not None and known else LogLevel.INFO,
     )

@@ -15,17 +15,17 @@ from composer.model import (
     UnknownKey,
 )
 from composer.names import join
-from composer.resolve.chains import chains
-from composer.resolve.connections import connections
+from composer.resolve.connections import read_chains, read_connections
 from composer.resolve.declaration import declare
-from composer.resolve.files import Places
-from composer.resolve.introspection import introspection
-from composer.resolve.node import Surroundings, node, placed, state
+from composer.resolve.node import SystemContext, place_ports, resolve_node, state
+from composer.resolve.node_options import read_introspection, read_supervision
+from composer.resolve.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import read_parameter_files
-from composer.resolve.parameters import with_own_clock, with_values
+from composer.resolve.parameters import with_use_sim_time, with_values
 from composer.resolve.qos import qos_table
-from composer.resolve.reading import (
+from composer.resolve.source_folders import SourceFolders
+from composer.resolve.tree_values import (
     choice,
     entries,
     flag,
@@ -36,8 +36,6 @@ from composer.resolve.reading import (
     text,
     text_or_opaque,
 )
-from composer.resolve.supervision import supervision
-from composer.resolve.types import NodeTypes
 from composer.source import Located, SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence
 
@@ -46,34 +44,34 @@ DEFAULT_THREADS = 2
 
 
 def resolve_system(
-    tree: Mapping, source: SourceFile, places: Places, overrides: Overrides
+    tree: Mapping, source: SourceFile, folders: SourceFolders, overrides: Overrides
 ) -> tuple[System, list[Diagnostic]]:
     """Return the system that an expanded tree declares. See :func:`composer.resolve.resolve`."""
-    findings: list[Diagnostic] = []
+    diagnostics: list[Diagnostic] = []
     qos = qos_table(tree.get("qos_profiles"))
     namespace = _system_namespace(tree, overrides)
-    joined, joints = connections(tree.get("connections"), namespace.value, qos)
-    types = NodeTypes(places, qos, findings)
+    joined, port_connections = read_connections(tree.get("connections"), namespace.value, qos)
+    types = NodeTypeLoader(folders, qos, diagnostics)
     written = tree.get("lifecycle")
     lifecycle = written if isinstance(written, Mapping) else Mapping((), tree.span)
-    upkeep = supervision(lifecycle, DEFAULT_SUPERVISION)
+    supervision_default = read_supervision(lifecycle, DEFAULT_SUPERVISION)
     written = tree.get("parameter_files")
-    files = read_parameter_files(written, places.home, places.catalog.project, findings)
+    files = read_parameter_files(written, folders.home, folders.node_types.project, diagnostics)
     clock = _use_sim_time(tree, overrides)
-    around = Surroundings(
-        places,
+    context = SystemContext(
+        folders,
         namespace,
         types,
         qos,
-        joints,
+        port_connections,
         overrides,
-        upkeep,
+        supervision_default,
         tree.get("introspection"),
         files,
         clock,
-        findings,
+        diagnostics,
     )
-    nodes = tuple(node(entry, around) for entry in entries(tree.get("nodes")))
+    nodes = tuple(resolve_node(entry, context) for entry in entries(tree.get("nodes")))
     autostart = state(lifecycle.get("autostart"))
     delivery = choice(tree.get("delivery"), Delivery)
     system = System(
@@ -84,33 +82,33 @@ def resolve_system(
         namespace=namespace.value,
         description=plain_text(tree.get("description")),
         connections=joined,
-        chains=chains(tree.get("chains")),
+        chains=read_chains(tree.get("chains")),
         qos_profiles=qos.named,
         qos_references=tuple(qos.references),
         executors=tuple(_executor(entry) for entry in entries(tree.get("executors"))),
         autostart=autostart.value if autostart is not None else PrimaryState.ACTIVE,
-        supervision=upkeep,
+        supervision=supervision_default,
         delivery=delivery.value if delivery is not None else Delivery.AUTO,
         use_sim_time=any(flag(entry.value, default=False) for entry in clock),
         implied_dependencies=flag(lifecycle.get("implied_dependencies"), default=True),
         unknown=_unknown_nodes(nodes, overrides),
         unmatched_parameters=files.unmatched(frozenset(node.full_name for node in nodes)),
     )
-    return system, findings
+    return system, diagnostics
 
 
 def resolve_node_type(
-    tree: Mapping, source: SourceFile, places: Places, overrides: Overrides
+    tree: Mapping, source: SourceFile, folders: SourceFolders, overrides: Overrides
 ) -> tuple[System, list[Diagnostic]]:
     """Return a system of the one node that a node type declares, for validating it alone."""
-    findings: list[Diagnostic] = []
+    diagnostics: list[Diagnostic] = []
     qos = qos_table(None)
-    declared = declare(tree, places, qos, findings)
+    declared = declare(tree, folders, qos, diagnostics)
     name = _name(tree, "node")
     span = _name_span(tree, "node")
     namespace = _system_namespace(Mapping((), span), overrides)
     given = overrides.by_node.get(name.value, {})
-    own = with_own_clock(declared.parameters, given)
+    own = with_use_sim_time(declared.parameters, given)
     parameters, unknown = with_values(own, given, complete=True)
     alone = Node(
         name=name,
@@ -119,11 +117,11 @@ def resolve_node_type(
         description=declared.description,
         behavior=declared.behavior,
         parameters=parameters,
-        ports=placed(declared.ports, name.value, namespace.value, (), {}),
+        ports=place_ports(declared.ports, name.value, namespace.value, (), {}),
         timers=declared.timers,
         state=declared.state,
         reactions=declared.reactions,
-        introspection=introspection(declared.introspection),
+        introspection=read_introspection(declared.introspection),
         unknown=unknown,
     )
     system = System(
@@ -136,7 +134,7 @@ def resolve_node_type(
         node_type=True,
         unknown=_unknown_nodes((alone,), overrides),
     )
-    return system, findings
+    return system, diagnostics
 
 
 def _name(tree: Mapping, kind: str) -> Located[str]:

@@ -38,9 +38,9 @@ def check(context: Context) -> Iterator[Diagnostic]:
         name = node.type_name
         if name is None or node.type_found or is_opaque(name.value):
             continue
-        if context.catalog.find(name.value) is not None:
+        if context.node_types.find(name.value) is not None:
             continue  # the file exists but is invalid, which is reported elsewhere
-        if context.catalog.stray(name.value) is not None:
+        if context.node_types.find_outside_project(name.value) is not None:
             message = f"the file of node type '{name}' is a symbolic link that leaves the project"
             yield Diagnostic(RULE, message, name.span, hint="copy the target into the project")
             continue
@@ -48,5 +48,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
             RULE,
             f"node '{node.name}' has type '{name}', which does not exist",
             name.span,
-            hint=suggestion(name.value, context.catalog.names()),
+            hint=suggestion(name.value, context.node_types.names()),
         )

@@ -1,7 +1,7 @@
 """The shape of a file: which keys there are and what may stand under them, by JSON Schema.
 
 The schemas are files (``schemas/``), so that editors use the very same ones. What jsonschema says
-is told with the place of the key or value that is meant, in words of the language.
+is told with the place of the key or value that is intended_key, in words of the language.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 from composer.diagnostics import Diagnostic
 from composer.resources import schemas_folder
 from composer.schema import rules  # noqa: F401 - they are known before the first is broken
-from composer.schema.shape import Test, shape
+from composer.schema.fast_check import Check, compile_check
 from composer.tree import Mapping, plain
 
 __all__ = ["KINDS", "REPORT", "SCHEMAS", "check_schema", "kind_of", "schema"]
@@ -36,7 +36,7 @@ def check_schema(tree: Mapping, kind: str) -> list[Diagnostic]:
     The tree is the one after ``expand``. A load-time variable without value fits everywhere.
     """
     content = plain(tree)
-    if _shape(kind)(content):
+    if _compiled(kind)(content):
         return []
     # What explains mistakes takes a tenth of a second to import, and most files are right.
     from composer.schema.validation import explain  # noqa: PLC0415
@@ -54,5 +54,5 @@ def schema(name: str) -> dict[str, Any]:
 
 
 @cache
-def _shape(kind: str) -> Test:
-    return shape(schema(kind))
+def _compiled(kind: str) -> Check:
+    return compile_check(schema(kind))

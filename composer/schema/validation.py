@@ -9,8 +9,8 @@ from jsonschema.validators import extend
 from referencing import Registry
 
 from composer.diagnostics import Diagnostic
-from composer.schema.findings import findings_of
-from composer.schema.places import Places
+from composer.schema.explanations import explain_errors
+from composer.schema.locations import TreeIndex
 from composer.tree import Mapping, Plain
 
 _DEFINITIONS = "#/definitions/"
@@ -18,13 +18,13 @@ _validators: dict[str, Draft7Validator] = {}
 
 
 def explain(content: Plain, tree: Mapping, kind: str, whole: dict[str, Any]) -> list[Diagnostic]:
-    """Return what is wrong with ``content``, which is ``tree`` without places.
+    """Return what is wrong with ``content``, which is ``tree`` without index.
 
     ``whole`` is the schema of ``kind``.
     """
     if kind not in _validators:
         _validators[kind] = _validator(whole)
-    return findings_of(_validators[kind].iter_errors(content), Places(tree))
+    return explain_errors(_validators[kind].iter_errors(content), TreeIndex(tree))
 
 
 def _validator(whole: dict[str, Any]) -> Draft7Validator:

@@ -168,7 +168,7 @@ def test_no_link_leads_out_of_the_project(tmp_path: Path) -> None:
         "unreadable-file",
         "unreadable-file",
     ]
-    assert ended.out.count("a link that leads out of the project") == 5
+    assert ended.out.count("a symbolic link out of the project") == 5
     assert "confidential" not in ended.out + ended.err
 
 

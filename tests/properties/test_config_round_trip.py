@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from composer.assembly.canonical import canonical
 from composer.document import parse_document
-from composer.document.writing import write_document
-from composer.loading import LoadResult, load, means_the_same
+from composer.document.writer import write_document
+from composer.loading import LoadResult, gives_same_model, load
 from composer.resources import systems_folder
 from composer.source import SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, plain
@@ -64,7 +64,7 @@ def hold(loading: LoadResult) -> None:
     """Write what was loaded as one file: it must say the same, and be written so again."""
     assert loading.tree is not None
     text = write_document(canonical(loading.tree))
-    assert means_the_same(loading, text)
+    assert gives_same_model(loading, text)
     tree, findings = parse_document(SourceFile("it", text))
     assert findings == []
     assert tree is not None

@@ -7,11 +7,11 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from composer.catalog import Catalog
 from composer.model.dependencies import dependency_cycles
+from composer.node_types import NodeTypes
 from composer.plan import bring_up, tear_down
 from composer.project import Project
-from composer.resolve import CommandLine, read_overrides, resolve
+from composer.resolve import OverrideOptions, read_overrides, resolve
 from composer.source import SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
@@ -70,11 +70,11 @@ def files(draw: st.DrawFn) -> Mapping:
 @settings(max_examples=120, deadline=None)
 @given(tree=files(), text=st.sampled_from(TEXTS) | st.text(max_size=12))
 def test_every_tree_has_a_model_and_a_plan(tree: Mapping, text: str) -> None:
-    overrides, _ = read_overrides(CommandLine((f"a.b={text}", text), text))
+    overrides, _ = read_overrides(OverrideOptions((f"a.b={text}", text), text))
     system, _ = resolve(
         tree,
         SOURCE,
-        Catalog((FOLDER,), Project.at(FOLDER)),
+        NodeTypes((FOLDER,), Project.at(FOLDER)),
         folders={SOURCE.path: FOLDER},
         overrides=overrides,
     )

@@ -13,7 +13,7 @@ from jsonschema.validators import extend
 from composer.document import read_document
 from composer.resources import nodes_folder, systems_folder
 from composer.schema import SCHEMAS, schema
-from composer.schema.shape import shape
+from composer.schema.fast_check import compile_check
 from composer.tree import plain
 from tests.properties.mutation import mutated
 
@@ -23,7 +23,7 @@ STRICT = extend(
         "integer", lambda _, value: isinstance(value, int) and not isinstance(value, bool)
     ),
 )
-SHAPES = {name: shape(schema(name)) for name in SCHEMAS}
+SHAPES = {name: compile_check(schema(name)) for name in SCHEMAS}
 VALIDATORS = {name: STRICT(schema(name)) for name in SCHEMAS}
 FILES = [
     plain(tree)
@@ -74,7 +74,7 @@ def test_on_files_with_mistakes(content: Any) -> None:
     ],
 )
 def test_keyword(part: dict[str, Any], right: list[Any], wrong: list[Any]) -> None:
-    quick, thorough = shape(part), STRICT(part)
+    quick, thorough = compile_check(part), STRICT(part)
     for values, is_right in ((right, True), (wrong, False)):
         for value in values:
             assert quick(value) is is_right, value
@@ -83,4 +83,4 @@ def test_keyword(part: dict[str, Any], right: list[Any], wrong: list[Any]) -> No
 
 def test_an_unknown_keyword_is_not_passed_over() -> None:
     with pytest.raises(KeyError):
-        shape({"uniqueItems": True})
+        compile_check({"uniqueItems": True})

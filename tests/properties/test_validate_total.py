@@ -10,8 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from composer.assembly.canonical import canonical
-from composer.document.writing import write_document
-from composer.loading import findings_of, load
+from composer.document.writer import write_document
+from composer.loading import collect_diagnostics, load
 from tests.properties.mutation import mutated
 from tests.properties.validating import INTERFACES, SHIPPED, contents, hold, validate_and_check
 
@@ -100,7 +100,7 @@ def test_mistakes_in_what_is_included_and_extended(project: Path, part: bytes, b
         hold(loading.diagnostics)
         if loading.tree is not None:
             write_document(canonical(loading.tree))
-    found = findings_of(loadings)
+    found = collect_diagnostics(loadings)
     hold(found)
     assert {finding.rule for loading in loadings for finding in loading.diagnostics} == {
         finding.rule for finding in found if finding.rule.name != "unused-node-type"

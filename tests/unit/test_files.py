@@ -86,7 +86,7 @@ def test_links_are_followed_in_the_project_only(
     (tmp_path / "d.yaml").symlink_to(tmp_path / "d.yaml")
     found = find_files([tmp_path])
     assert found.files == (tmp_path / "a.yaml", tmp_path / "b.yaml")
-    (finding,) = found.findings
+    (finding,) = found.diagnostics
     assert (str(finding.primary), finding.rule.name) == (
         f"{tmp_path}/c.yaml:1:1",
         "unreadable-file",

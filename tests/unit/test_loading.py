@@ -8,7 +8,7 @@ from composer.diagnostics import Severity
 from composer.files import find_files
 from composer.interfaces import Interfaces
 from composer.loading import LoadResult, load, load_bytes
-from composer.resolve import CommandLine
+from composer.resolve import OverrideOptions
 from composer.resources import nodes_folder, systems_folder
 
 GOOD = """\
@@ -46,7 +46,7 @@ def write(folder: Path, text: str, name: str = "robot.yaml") -> Path:
 def test_a_good_system_can_run(tmp_path: Path, interfaces: Interfaces) -> None:
     loading = load(write(tmp_path, GOOD), interfaces=interfaces)
     assert errors(loading) == []
-    assert loading.runnable
+    assert loading.is_runnable
     assert loading.system is not None
     assert loading.system.name.value == "robot"
     assert loading.source.text == GOOD
@@ -58,7 +58,7 @@ def test_a_good_system_can_run(tmp_path: Path, interfaces: Interfaces) -> None:
 def test_everything_that_comes_with_the_composer_is_without_errors(path: Path) -> None:
     loading = load(path)
     assert errors(loading) == []
-    assert loading.runnable == (path.parent == systems_folder())
+    assert loading.is_runnable == (path.parent == systems_folder())
 
 
 def test_one_run_shows_what_every_stage_finds(tmp_path: Path, interfaces: Interfaces) -> None:
@@ -93,7 +93,7 @@ nodes:
     ):
         assert f"{line} {rule}" in found
     assert any(item.startswith(str(tmp_path / "nodes" / "camera.yaml") + ":2 ") for item in found)
-    assert not loading.runnable
+    assert not loading.is_runnable
     places = [finding.sort_key for finding in loading.diagnostics]
     assert places == sorted(places)
 
@@ -102,7 +102,7 @@ def test_the_command_line_is_checked_like_the_file(tmp_path: Path, interfaces: I
     path = write(tmp_path, GOOD)
     loading = load(
         path,
-        said=CommandLine(
+        overrides=OverrideOptions(
             ("talker.speed=9.0", "talker.sped=1.0", "nobody.speed=1.0", "nonsense"), "//"
         ),
         interfaces=interfaces,
@@ -118,7 +118,7 @@ def test_the_command_line_is_checked_like_the_file(tmp_path: Path, interfaces: I
 def test_a_good_setting_is_taken(tmp_path: Path, interfaces: Interfaces) -> None:
     loading = load(
         write(tmp_path, GOOD),
-        said=CommandLine(("talker.speed=2",), "left"),
+        overrides=OverrideOptions(("talker.speed=2",), "left"),
         interfaces=interfaces,
     )
     assert errors(loading) == []
@@ -147,7 +147,7 @@ def test_what_is_no_file_of_ours_has_a_finding_and_no_system(
 ) -> None:
     loading = load(write(tmp_path, text), interfaces=interfaces)
     assert loading.system is None
-    assert not loading.runnable
+    assert not loading.is_runnable
     assert len(loading.diagnostics) == 1
     assert rule in {None, loading.diagnostics[0].rule.name}
 

@@ -33,17 +33,17 @@ def config(
     """
     from composer.assembly.canonical import canonical
     from composer.cli.support.files import system_file
-    from composer.document.writing import write_document
-    from composer.loading import means_the_same
+    from composer.document.writer import write_document
+    from composer.loading import gives_same_model
     from composer.tree import plain
 
     path = system_file(system)
     loading = load_system(path, shown=system)
-    if loading.tree is None or not loading.sound:
+    if loading.tree is None or not loading.is_valid:
         raise typer.Exit(FINDINGS)
     whole = canonical(loading.tree)
     text = write_document(whole)
-    if not means_the_same(loading, text):
+    if not gives_same_model(loading, text):
         say(
             "note: node types, behaviours and parameter files beside the files that were put in"
             " are not found from elsewhere"

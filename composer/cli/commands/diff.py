@@ -116,7 +116,7 @@ def _load(text: str, settings: list[str], namespace: str | None) -> System:
     loading = load_system(path, shown=text, settings=settings, namespace=namespace)
     if loading.system is not None and loading.system.node_type:
         raise Failure(f"'{text}' is a node type, not a system")
-    if loading.system is None or not loading.runnable:
+    if loading.system is None or not loading.is_runnable:
         raise Failure(f"'{text}' has errors, so nothing can run as it says")
     return loading.system
 

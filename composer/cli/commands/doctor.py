@@ -87,10 +87,10 @@ def _findings(timeout: float) -> Iterator[Finding]:
 
 
 def _interface_findings() -> Iterator[Finding]:
-    from composer.catalog import interface_folders
     from composer.doctor.interfaces import look_at_interfaces
     from composer.interfaces import Interfaces
     from composer.interfaces.sources import find_packages
+    from composer.node_types import interface_folders
     from composer.project import Project
 
     folders = interface_folders(Project.at(Path.cwd()))

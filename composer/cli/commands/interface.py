@@ -78,8 +78,8 @@ def show(
 
 
 def _interfaces() -> Interfaces:
-    from composer.catalog import interface_folders
     from composer.interfaces import Interfaces
+    from composer.node_types import interface_folders
     from composer.project import Project
 
     return Interfaces.load(interface_folders(Project.at(Path.cwd())))

@@ -193,7 +193,7 @@ def _load(text: str, settings: list[str], namespace: str | None, *, use_sim_time
             f"'{text}' is a node type, not a system",
             hint="a system names it under 'nodes:'; compose validate checks it alone",
         )
-    if loading.system is None or not loading.runnable:
+    if loading.system is None or not loading.is_runnable:
         raise typer.Exit(FINDINGS)
     return loading.system
 

@@ -115,7 +115,7 @@ class _Checked:
 def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
     from composer.document.limits import MAX_BYTES
     from composer.files import find_files
-    from composer.loading import findings_of, load_bytes, load_files
+    from composer.loading import collect_diagnostics, load_bytes, load_files
 
     for path in paths:
         if path != _STDIN and not is_there(path):
@@ -125,7 +125,7 @@ def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
     if _STDIN in paths:
         content = sys.stdin.buffer.read(MAX_BYTES + 1)
         loadings.insert(0, load_bytes(content, Path.cwd(), shown=stdin_name))
-    findings = [*found.findings, *findings_of(loadings)]
+    findings = [*found.diagnostics, *collect_diagnostics(loadings)]
     if not loadings and not findings:
         raise UsageFailure("there is no system and no node type in " + ", ".join(map(str, paths)))
     return _Checked(

@@ -71,12 +71,12 @@ def load_system(
     from composer.diagnostics import Severity
     from composer.loading import load
     from composer.report.text import render
-    from composer.resolve import CommandLine
+    from composer.resolve import OverrideOptions
 
     loading = load(
         path,
         shown=str(path) if shown is None or not is_there(Path(shown)) else shown,
-        said=CommandLine(tuple(settings), namespace, use_sim_time),
+        overrides=OverrideOptions(tuple(settings), namespace, use_sim_time),
     )
     pressing = [found for found in loading.diagnostics if found.severity is not Severity.INFO]
     if pressing:

@@ -21,7 +21,7 @@ Facts = Mapping[str, Plain]
 
 
 def articles(graphs: Iterable[Graph]) -> Iterator[str]:
-    """Yield an article for everything in the graphs that has facts or findings, each once."""
+    """Yield an article for everything in the graphs that has facts or diagnostics, each once."""
     seen: set[str] = set()
     for graph in graphs:
         for key, details, wrong in _things(graph):
@@ -42,11 +42,11 @@ def _things(graph: Graph) -> Iterator[tuple[str, Details, str]]:
 
 def _article(key: str, details: Details, wrong: str) -> str:
     kind, name = _title(key)
-    finding = f'<p class="finding">{text(wrong)}</p>' if wrong else ""
+    diagnostic = f'<p class="diagnostic">{text(wrong)}</p>' if wrong else ""
     facts = {word: value for word, value in details if value != name}
     return (
         f'<article data-about="{text(key)}"{_role(kind)}><h2>{text(name)}</h2>'
-        f'<p class="kind">{text(kind)}</p>{finding}{_facts(facts)}{_sections(facts)}</article>'
+        f'<p class="kind">{text(kind)}</p>{diagnostic}{_facts(facts)}{_sections(facts)}</article>'
     )
 
 

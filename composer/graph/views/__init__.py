@@ -1,1 +1,1 @@
-"""One file for each way to look at a system: ``build(system, findings) -> Graph``."""
+"""One file for each way to look at a system: ``build(system, diagnostics) -> Graph``."""

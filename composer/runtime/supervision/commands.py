@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from composer.model import PrimaryState, System
-from composer.plan import reach, start_causes, start_goals
+from composer.plan import plan_transitions, start_causes, start_goals
 from composer.runtime.supervision.node_set import CreationFailed, NodeSet
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
@@ -76,7 +76,7 @@ class Commands:
 
     def _bring_up(self, goals: dict[str, PrimaryState], *, forget: bool) -> str | None:
         causes = start_causes(self.system, PrimaryState.ACTIVE)
-        plan = reach(self.system, self.node_set.states(), goals, causes)
+        plan = plan_transitions(self.system, self.node_set.states(), goals, causes)
         problem = self.supervisor.bring_up(plan)
         if problem is not None:
             return f"{problem}; what this had started is where it was before"

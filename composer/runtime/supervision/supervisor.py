@@ -21,10 +21,10 @@ from composer.plan import (
     FaultKind,
     Plan,
     Step,
-    judge,
-    mend,
-    reach,
-    wanted,
+    decide,
+    desired_states,
+    plan_transitions,
+    reconcile,
 )
 from composer.runtime.supervision.events import (
     NodeFailed,
@@ -94,7 +94,7 @@ class Supervisor:
 
     def want(self, goals: Mapping[str, PrimaryState], *, forget: bool = False) -> None:
         """Say where nodes are wanted from now on; with ``forget``, failures are history."""
-        self._upkeep = self._upkeep.want(goals)
+        self._upkeep = self._upkeep.with_goals(goals)
         if forget:
             self._upkeep = DesiredState(self._upkeep.goals)
             self._due.clear()
@@ -131,7 +131,7 @@ class Supervisor:
     def _reach(
         self, upkeep: DesiredState, states: Mapping[str, PrimaryState], why: str
     ) -> tuple[StepFailed, ...]:
-        plan = mend(self._system, upkeep, states, why)
+        plan = reconcile(self._system, upkeep, states, why)
         failures = self._plan_executor.carry_out(plan, _LENIENT)
         for failure in failures:
             if failure.step.node not in self._upkeep.down:
@@ -148,7 +148,7 @@ class Supervisor:
         tell = self._reporter.tell
         tell(RollingBack(self._reporter.elapsed_s, node, reason))
         causes = dict.fromkeys(self._node_set.nodes, f"{node} failed")
-        plan = reach(self._system, self._node_set.states(), before, causes)
+        plan = plan_transitions(self._system, self._node_set.states(), before, causes)
         self._plan_executor.carry_out(plan, _LENIENT)
         undone = tuple(dict.fromkeys(step.full_name for step in plan.steps))
         tell(RolledBack(self._reporter.elapsed_s, undone))
@@ -182,7 +182,7 @@ class Supervisor:
     def take_fault(self, fault: Fault) -> None:
         """Do what is to be done about a failed node."""
         self._node_set.left[fault.node] = self._node_set.nodes[fault.node].state
-        verdict = judge(self._system, self._upkeep, fault)
+        verdict = decide(self._system, self._upkeep, fault)
         if verdict is None or self._is_overtaken(fault):
             return
         node = self._node_set.nodes[fault.node]
@@ -219,10 +219,10 @@ class Supervisor:
         self._node_set.left[moved.node] = moved.state
         states = self._node_set.states()
         state = _PRIMARY.get(moved.state, PrimaryState.UNCONFIGURED)
-        self._upkeep = self._upkeep.release(moved.node).want({moved.node: state})
+        self._upkeep = self._upkeep.release(moved.node).with_goals({moved.node: state})
         needing = dependents(self._system, moved.node)
         still = {name: at for name, at in states.items() if name not in needing}
-        self._reach(self._upkeep.want(still), states, f"{moved.node} was moved by hand")
+        self._reach(self._upkeep.with_goals(still), states, f"{moved.node} was moved by hand")
 
     def take_hanging(self, hanging: Hanging) -> None:
         """Tell of a callback that takes too long, and is being interrupted."""
@@ -301,7 +301,7 @@ class Supervisor:
             )
 
     def _show(self) -> None:
-        goals = wanted(self._system, self._upkeep)
+        goals = desired_states(self._system, self._upkeep)
         states = {name: state.value for name, state in goals.items()}
         self._status.set_wanted(states, self._upkeep.down)
 

@@ -22,11 +22,11 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 
-from composer.catalog import Catalog
 from composer.diagnostics import has_errors
 from composer.document import parse_bytes
 from composer.expand import expand
 from composer.model import PrimaryState, System
+from composer.node_types import NodeTypes
 from composer.plan import bring_up, tear_down
 from composer.resolve import resolve
 from composer.runtime.host import Host, HostOptions
@@ -79,8 +79,8 @@ def system_of(text: str, folder: Path, **modules: str) -> System:
     tree, source, found = parse_bytes(dedent(text).encode(), "system.yaml")
     assert tree is not None, found
     expanded, findings = expand(tree, {})
-    catalog = Catalog.for_file(folder / "system.yaml")
-    system, more = resolve(expanded, source, catalog, folders={source.path: folder})
+    node_types = NodeTypes.for_file(folder / "system.yaml")
+    system, more = resolve(expanded, source, node_types, folders={source.path: folder})
     findings = [*found, *findings, *more]
     assert system is not None, findings
     assert not has_errors(findings), findings

@@ -43,7 +43,7 @@ def topic_hz(name: str, text: str, folder: Path) -> float | None:
     path.write_text(HEAD + text, encoding="utf-8")
     loading = load(path)
     assert loading.system is not None
-    context = Context(loading.system, loading.interfaces, loading.catalog)
+    context = Context(loading.system, loading.interfaces, loading.node_types)
     return rates(context).topic_hz(name)
 
 

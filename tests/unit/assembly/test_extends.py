@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.diagnostics import Diagnostic
-from composer.loading import findings_of, load, load_files
+from composer.loading import collect_diagnostics, load, load_files
 from composer.model import Node
 
 SENSOR = """\
@@ -90,7 +90,7 @@ def test_a_type_alone(project: Path) -> None:
 
 
 def found(*names: str) -> list[str]:
-    findings: list[Diagnostic] = findings_of(load_files([Path(name) for name in names]))
+    findings: list[Diagnostic] = collect_diagnostics(load_files([Path(name) for name in names]))
     return [f"{item.primary} {item.rule.name}" for item in findings]
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.diagnostics import Diagnostic
-from composer.loading import LoadResult, findings_of, load, load_files
+from composer.loading import LoadResult, collect_diagnostics, load, load_files
 from composer.model import System
 
 CAMERA = """\
@@ -220,13 +220,13 @@ connections:
     twice = "for_each: {side: [left, right]}, namespace: '${side}', prefix: '${side}_'"
     project(tmp_path, whole=f"system: whole\ninclude: [{{file: wrong.yaml, {twice}}}]\n")
     project(tmp_path, wrong=wrong)
-    assert told(findings_of(load_files([Path("whole.yaml"), Path("wrong.yaml")]))) == [
+    assert told(collect_diagnostics(load_files([Path("whole.yaml"), Path("wrong.yaml")]))) == [
         "wrong.yaml:3:32 unknown-node",
         "wrong.yaml:5:28 unknown-port",
     ]
     assert len(load(Path("whole.yaml")).diagnostics) == 2
     project(tmp_path, other="system: other\ninclude: [{file: wrong.yaml, prefix: other_}]\n")
-    assert len(findings_of(load_files([Path("whole.yaml"), Path("other.yaml")]))) == 2
+    assert len(collect_diagnostics(load_files([Path("whole.yaml"), Path("other.yaml")]))) == 2
 
 
 def test_a_circle_is_one_finding_from_wherever(
@@ -236,7 +236,7 @@ def test_a_circle_is_one_finding_from_wherever(
     names = ["c", "a", "b"]
     for name, following in zip(names, ["a", "b", "c"], strict=True):
         project(tmp_path, **{name: f"system: {name}\ninclude: [{following}.yaml]\n"})
-    [finding] = findings_of(load_files([Path(f"{name}.yaml") for name in names]))
+    [finding] = collect_diagnostics(load_files([Path(f"{name}.yaml") for name in names]))
     assert finding.message == "this includes itself: a.yaml -> b.yaml -> c.yaml -> a.yaml"
     assert str(finding.primary) == "a.yaml:2:11"
 

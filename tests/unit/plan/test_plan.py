@@ -53,7 +53,7 @@ def test_tear_down_is_the_reverse_in_three_phases() -> None:
         for transition in ("deactivate", "cleanup", "shutdown")
         for node in ("eye", "arm", "base")
     ]
-    assert set(causes(plan).values()) == {"system is going down"}
+    assert set(causes(plan).values()) == {"system is shutting down"}
     assert [step.number for step in plan.steps] == list(range(1, 10))
     assert [(step.node, step.number, step.after) for step in plan.steps if step.after] == [
         ("base", 3, (2,)),

@@ -5,7 +5,15 @@ from __future__ import annotations
 import pytest
 
 from composer.model import OnFailure, PrimaryState, System
-from composer.plan import Decision, DesiredState, Fault, FaultKind, judge, mend, wanted
+from composer.plan import (
+    Decision,
+    DesiredState,
+    Fault,
+    FaultKind,
+    decide,
+    desired_states,
+    reconcile,
+)
 from tests.unit.support.resolving import system_of
 
 ACTIVE = PrimaryState.ACTIVE
@@ -49,13 +57,13 @@ def fault(node: str, at_s: float = 100.0, kind: FaultKind = FaultKind.SILENCE) -
     ],
 )
 def test_where_nodes_are_wanted_while_some_are_held_down(down: tuple[str, ...], goals: str) -> None:
-    upkeep = DesiredState(states("aaaaa"), dict.fromkeys(down, "silent"))
-    assert wanted(robot(), upkeep) == states(goals)
+    desired = DesiredState(states("aaaaa"), dict.fromkeys(down, "silent"))
+    assert desired_states(robot(), desired) == states(goals)
 
 
 def test_nobody_is_wanted_further_up_because_another_one_fails() -> None:
-    upkeep = DesiredState(states("aiuii"), {"sensor": "silent"})
-    assert wanted(robot(), upkeep) == states("uiuii")
+    desired = DesiredState(states("aiuii"), {"sensor": "silent"})
+    assert desired_states(robot(), desired) == states("uiuii")
 
 
 DOWN = [
@@ -74,35 +82,37 @@ UP = [
 
 def test_dependents_pause_before_a_restart_and_resume_behind_it() -> None:
     system = robot()
-    upkeep = DesiredState(states("aaaaa"))
-    verdict = judge(system, upkeep, fault("sensor"))
-    assert verdict == Decision(OnFailure.RESTART, "silent for 300 ms", wait_s=0.5, attempt=1)
+    desired = DesiredState(states("aaaaa"))
+    decision = decide(system, desired, fault("sensor"))
+    assert decision == Decision(OnFailure.RESTART, "silent for 300 ms", wait_s=0.5, attempt=1)
 
-    upkeep = upkeep.fail(fault("sensor"))
-    assert str(mend(system, upkeep, states("aaaaa"), "")).splitlines() == DOWN
+    desired = desired.fail(fault("sensor"))
+    assert str(reconcile(system, desired, states("aaaaa"), "")).splitlines() == DOWN
 
-    upkeep = upkeep.restart("sensor", at_s=100.5)
-    assert upkeep.down == {}
-    assert upkeep.restarts == {"sensor": (100.5,)}
-    assert str(mend(system, upkeep, states("uiiaa"), "restart 1 of 5")).splitlines() == UP
+    desired = desired.restart("sensor", at_s=100.5)
+    assert desired.down == {}
+    assert desired.restarts == {"sensor": (100.5,)}
+    assert str(reconcile(system, desired, states("uiiaa"), "restart 1 of 5")).splitlines() == UP
 
 
 def test_what_somebody_has_paused_by_hand_stays_paused() -> None:
     system = robot()
-    upkeep = (
-        DesiredState(states("aaaaa")).want({"motor": PrimaryState.INACTIVE}).fail(fault("sensor"))
+    desired = (
+        DesiredState(states("aaaaa"))
+        .with_goals({"motor": PrimaryState.INACTIVE})
+        .fail(fault("sensor"))
     )
-    down = mend(system, upkeep, states("aaiaa"), "")
+    down = reconcile(system, desired, states("aaiaa"), "")
     assert [step.node for step in down.steps] == ["planner", "sensor", "sensor"]
-    up = mend(system, upkeep.restart("sensor", 100.5), states("uiiaa"), "restart")
+    up = reconcile(system, desired.restart("sensor", 100.5), states("uiiaa"), "restart")
     assert [step.node for step in up.steps] == ["sensor", "sensor", "planner"]
 
 
 def test_nobody_is_sent_up_before_what_somebody_keeps_low_by_hand() -> None:
     system = robot()
-    upkeep = DesiredState(states("aiaaa"))
-    assert mend(system, upkeep, states("aiaaa"), "").steps == (), "nor is anybody taken down"
-    plan = mend(system, upkeep, states("aiuua"), "")
+    desired = DesiredState(states("aiaaa"))
+    assert reconcile(system, desired, states("aiaaa"), "").steps == (), "nor is anybody taken down"
+    plan = reconcile(system, desired, states("aiuua"), "")
     assert [f"{step.transition} {step.node}" for step in plan.steps] == [
         "configure logger",
         "configure motor",
@@ -111,16 +121,16 @@ def test_nobody_is_sent_up_before_what_somebody_keeps_low_by_hand() -> None:
 
 
 def test_a_second_fault_of_a_node_that_is_held_down_is_none() -> None:
-    upkeep = DesiredState(states("aaaaa")).fail(fault("sensor"))
-    assert judge(robot(), upkeep, fault("sensor")) is None
-    assert judge(robot(), upkeep, fault("camera")) is not None
-    assert judge(robot(), upkeep, fault("nobody")) is None
+    desired = DesiredState(states("aaaaa")).fail(fault("sensor"))
+    assert decide(robot(), desired, fault("sensor")) is None
+    assert decide(robot(), desired, fault("camera")) is not None
+    assert decide(robot(), desired, fault("nobody")) is None
 
 
 def test_two_nodes_that_fail_one_after_the_other_come_back_one_after_the_other() -> None:
     system = robot()
-    upkeep = DesiredState(states("aaaaa")).fail(fault("sensor")).fail(fault("planner"))
-    down = mend(system, upkeep, states("aaaaa"), "")
+    desired = DesiredState(states("aaaaa")).fail(fault("sensor")).fail(fault("planner"))
+    down = reconcile(system, desired, states("aaaaa"), "")
     assert [f"{step.transition} {step.node}" for step in down.steps] == [
         "deactivate motor",
         "deactivate logger",
@@ -129,14 +139,14 @@ def test_two_nodes_that_fail_one_after_the_other_come_back_one_after_the_other()
         "cleanup planner",
         "cleanup sensor",
     ]
-    upkeep = upkeep.restart("planner", 101.0)
-    up = mend(system, upkeep, states("uuiia"), "restart")
+    desired = desired.restart("planner", 101.0)
+    up = reconcile(system, desired, states("uuiia"), "restart")
     assert [f"{step.transition} {step.node}" for step in up.steps] == [
         "configure planner",
         "activate logger",
     ]
-    upkeep = upkeep.restart("sensor", 102.0)
-    up = mend(system, upkeep, states("uiiaa"), "restart")
+    desired = desired.restart("sensor", 102.0)
+    up = reconcile(system, desired, states("uiiaa"), "restart")
     assert [f"{step.transition} {step.node}" for step in up.steps][:2] == [
         "configure sensor",
         "activate sensor",
@@ -160,12 +170,12 @@ BUDGET = "{on_failure: restart, restart: {max_attempts: 3, window_ms: 10000, bac
 def test_the_budget(
     restarts: tuple[float, ...], action: OnFailure, wait_s: float, attempt: int
 ) -> None:
-    upkeep = DesiredState(states("aaaaa"), restarts={"sensor": restarts})
-    verdict = judge(robot(BUDGET), upkeep, fault("sensor"))
-    assert verdict is not None
-    assert (verdict.action, verdict.wait_s, verdict.attempt) == (action, wait_s, attempt)
+    desired = DesiredState(states("aaaaa"), restarts={"sensor": restarts})
+    decision = decide(robot(BUDGET), desired, fault("sensor"))
+    assert decision is not None
+    assert (decision.action, decision.wait_s, decision.attempt) == (action, wait_s, attempt)
     if action is OnFailure.SHUTDOWN:
-        assert verdict.reason == "silent for 300 ms; restarted 3 times within 10 s before"
+        assert decision.reason == "silent for 300 ms; restarted 3 times within 10 s before"
 
 
 @pytest.mark.parametrize(
@@ -182,22 +192,24 @@ def test_the_budget(
 )  # fmt: skip
 def test_policies(policy: str, kind: FaultKind, action: OnFailure, reason: str) -> None:
     system = robot(f"{{on_failure: {policy}}}")
-    verdict = judge(system, DesiredState(states("aaaaa")), fault("sensor", kind=kind))
-    assert verdict is not None
-    assert (verdict.action, verdict.reason) == (action, reason)
+    decision = decide(system, DesiredState(states("aaaaa")), fault("sensor", kind=kind))
+    assert decision is not None
+    assert (decision.action, decision.reason) == (action, reason)
 
 
 def test_an_isolated_node_stays_down_and_the_others_go_on() -> None:
     system = robot("{on_failure: isolate}")
-    upkeep = DesiredState(states("aaaaa")).fail(fault("planner"))
-    plan = mend(system, upkeep, states("auaaa"), "")
+    desired = DesiredState(states("aaaaa")).fail(fault("planner"))
+    plan = reconcile(system, desired, states("auaaa"), "")
     assert str(plan).splitlines() == [
         "#1 deactivate /motor: it needs planner, which is down",
         "#2 deactivate /logger: it needs planner, which is down",
     ]
-    assert mend(system, upkeep, states("auiia"), "").steps == ()
-    released = upkeep.release("planner")
-    assert [step.node for step in mend(system, released, states("auiia"), "by hand").steps] == [
+    assert reconcile(system, desired, states("auiia"), "").steps == ()
+    released = desired.release("planner")
+    assert [
+        step.node for step in reconcile(system, released, states("auiia"), "by hand").steps
+    ] == [
         "planner",
         "planner",
         "logger",

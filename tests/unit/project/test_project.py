@@ -64,7 +64,7 @@ def test_what_is_chosen_goes_before_what_is_usual(tmp_path: Path) -> None:
         (tmp_path / name).mkdir()
     (tmp_path / "composer.yaml").write_text("nodes: [types, nodes]\ninterfaces: [messages]\n")
     project = Project.at(tmp_path)
-    assert project.findings == ()
+    assert project.diagnostics == ()
     assert project.node_folders == (tmp_path / "types", tmp_path / "nodes")
     assert project.interface_folders == (tmp_path / "messages",)
 
@@ -84,7 +84,7 @@ def test_a_table_in_pyproject_says_the_same_with_places(tmp_path: Path) -> None:
     assert [(text.value, severity) for text, severity in settings.severity] == [
         ("unheard-publisher", Severity.WARNING)
     ]
-    ((line, column, message),) = told(project.findings)
+    ((line, column, message),) = told(project.diagnostics)
     assert (line, column) == (15, 9)
     assert message.endswith("for 'RC412', found text 'eror'")
 
@@ -139,7 +139,7 @@ def test_a_table_beside_a_file_is_not_read(tmp_path: Path) -> None:
     (tmp_path / "pyproject.toml").write_text("[tool.composer]\nstrict = true\n")
     project = Project.at(tmp_path)
     assert not project.settings.strict
-    assert [finding.message for finding in project.findings] == [
+    assert [finding.message for finding in project.diagnostics] == [
         "the table [tool.composer] is not read: there is a composer.yaml beside it"
     ]
 
@@ -149,7 +149,7 @@ def test_a_table_beside_a_file_is_not_read(tmp_path: Path) -> None:
 )
 def test_broken_toml_is_a_finding(tmp_path: Path, text: str, line: int) -> None:
     (tmp_path / "pyproject.toml").write_text(text)
-    (finding,) = Project.at(tmp_path).findings
+    (finding,) = Project.at(tmp_path).diagnostics
     assert finding.message.startswith("this is not TOML: ")
     assert finding.primary.line == line
 
@@ -176,8 +176,8 @@ def test_settings_are_not_read_from_elsewhere(
     secret = tmp_path_factory.mktemp("elsewhere") / "secret"
     secret.write_text("password: secret\n")
     (tmp_path / "composer.yaml").symlink_to(secret)
-    (finding,) = Project.at(tmp_path).findings
-    assert finding.message == "this is a link that leads out of the project"
+    (finding,) = Project.at(tmp_path).diagnostics
+    assert finding.message == "this is a symbolic link out of the project"
     assert finding.primary.file.text == ""
 
 

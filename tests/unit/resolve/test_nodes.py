@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from composer.catalog import Catalog
 from composer.document import parse_document
 from composer.model import Dependency, Event, ExecutorKind, PortKind, PrimaryState
+from composer.node_types import NodeTypes
 from composer.resolve import resolve
 from composer.source import Located, SourceFile
 from tests.unit.support.resolving import quoted, resolve_text, system_of
@@ -291,7 +291,7 @@ def test_a_file_that_is_neither_has_a_finding(tmp_path: Path) -> None:
     source = SourceFile("compose.yaml", "nodes: {}\n")
     tree, _ = parse_document(source)
     assert tree is not None
-    system, (finding,) = resolve(tree, source, Catalog.for_file(tmp_path / "compose.yaml"))
+    system, (finding,) = resolve(tree, source, NodeTypes.for_file(tmp_path / "compose.yaml"))
     assert system is None
     assert finding.message == "'compose.yaml' is neither a system nor a node type"
     assert quoted(finding.primary) == "nodes"

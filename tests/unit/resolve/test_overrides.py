@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.resolve import CommandLine, read_overrides
+from composer.resolve import OverrideOptions, read_overrides
 from tests.unit.support.resolving import quoted, resolve_text, system_of
 
 SYSTEM = """\
@@ -39,7 +39,7 @@ def test_of_two_settings_the_last_counts() -> None:
     ("text", "value"), [("true", True), ("'2'", "2"), ("NO", "NO"), ("a=b", "a=b"), ("0x10", 16)]
 )
 def test_values_are_yaml(text: str, value: object) -> None:
-    overrides, findings = read_overrides(CommandLine((f"planner.flag={text}",)))
+    overrides, findings = read_overrides(OverrideOptions((f"planner.flag={text}",)))
     assert findings == []
     scalar = overrides.by_node["planner"]["flag"].value
     assert scalar.value == value

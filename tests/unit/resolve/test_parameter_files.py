@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.loading import load
-from composer.resolve import CommandLine
+from composer.resolve import OverrideOptions
 from composer.tree import Plain
 
 SYSTEM = """\
@@ -24,7 +24,7 @@ def value(name: str, folder: Path, first: str, second: str = "{}", *settings: st
     (folder / "first.yaml").write_text(first, encoding="utf-8")
     (folder / "second.yaml").write_text(second, encoding="utf-8")
     (folder / "system.yaml").write_text(SYSTEM, encoding="utf-8")
-    loading = load(folder / "system.yaml", said=CommandLine(tuple(settings)))
+    loading = load(folder / "system.yaml", overrides=OverrideOptions(tuple(settings)))
     assert [item.message for item in loading.diagnostics if item.rule.code[2] in "01"] == []
     assert loading.system is not None
     parameter = loading.system.nodes[0].parameter(name)

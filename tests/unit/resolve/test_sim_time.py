@@ -8,7 +8,7 @@ import pytest
 
 from composer.loading import load
 from composer.model import USE_SIM_TIME, System, TimerClock
-from composer.resolve import CommandLine
+from composer.resolve import OverrideOptions
 from composer.tree import Plain
 
 TYPE = """\
@@ -18,7 +18,7 @@ parameters: {use_sim_time: {type: bool, default: false}}
 PLAIN_TYPE = "node: plain\n"
 
 
-def loaded(folder: Path, text: str, said: CommandLine, **files: str) -> System:
+def loaded(folder: Path, text: str, overrides: OverrideOptions, **files: str) -> System:
     (folder / "nodes").mkdir(exist_ok=True)
     (folder / "composer.yaml").write_text("{}\n", encoding="utf-8")
     (folder / "nodes" / "typed.yaml").write_text(TYPE, encoding="utf-8")
@@ -27,7 +27,7 @@ def loaded(folder: Path, text: str, said: CommandLine, **files: str) -> System:
         (folder / f"{name}.yaml").write_text(content, encoding="utf-8")
     path = folder / "system.yaml"
     path.write_text(text, encoding="utf-8")
-    loading = load(path, said=said)
+    loading = load(path, overrides=overrides)
     assert [item.message for item in loading.diagnostics] == []
     assert loading.system is not None
     return loading.system
@@ -35,7 +35,7 @@ def loaded(folder: Path, text: str, said: CommandLine, **files: str) -> System:
 
 def values(folder: Path, text: str, *settings: str, option: bool = False, **files: str) -> object:
     """Return what the parameter is for each node; None where it has no value."""
-    system = loaded(folder, text, CommandLine(settings, use_sim_time=option), **files)
+    system = loaded(folder, text, OverrideOptions(settings, use_sim_time=option), **files)
     return {node.name.value: value(system, node.name.value) for node in system.nodes}
 
 
@@ -77,14 +77,14 @@ OF_ALL = {"silent": True, "of_type": True, "own": False, "given": False}
 def test_the_system_says_it_for_all_that_say_nothing(tmp_path: Path) -> None:
     text = f"system: s\nuse_sim_time: true\n{NODES}"
     assert values(tmp_path, text) == OF_ALL
-    assert loaded(tmp_path, text, CommandLine()).use_sim_time
+    assert loaded(tmp_path, text, OverrideOptions()).use_sim_time
 
 
 def test_the_command_line_says_the_same(tmp_path: Path) -> None:
     text = f"system: s\nuse_sim_time: false\n{NODES}"
     assert values(tmp_path, text, option=True) == OF_ALL
-    assert loaded(tmp_path, text, CommandLine(use_sim_time=True)).use_sim_time
-    assert not loaded(tmp_path, text, CommandLine()).use_sim_time
+    assert loaded(tmp_path, text, OverrideOptions(use_sim_time=True)).use_sim_time
+    assert not loaded(tmp_path, text, OverrideOptions()).use_sim_time
 
 
 def test_a_setting_goes_before_everything(tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_what_an_included_file_says_holds_for_its_own_nodes(tmp_path: Path) -> N
     robot = f"system: robot\nuse_sim_time: true\n{NODES}"
     text = "system: s\ninclude: [robot.yaml]\nnodes: {outside: {}}\n"
     assert values(tmp_path, text, robot=robot) == OF_ALL | {"outside": None}
-    assert not loaded(tmp_path, text, CommandLine(), robot=robot).use_sim_time
+    assert not loaded(tmp_path, text, OverrideOptions(), robot=robot).use_sim_time
 
 
 def test_a_variable_may_stand_for_it(tmp_path: Path) -> None:
@@ -119,5 +119,5 @@ system: s
 nodes:
   a: {timers: {usual: {period_ms: 1, log: x}, watchdog: {period_ms: 1, clock: steady, log: x}}}
 """
-    node = loaded(tmp_path, text, CommandLine()).nodes[0]
+    node = loaded(tmp_path, text, OverrideOptions()).nodes[0]
     assert [timer.clock for timer in node.timers] == [TimerClock.ROS, TimerClock.STEADY]

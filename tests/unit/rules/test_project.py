@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.diagnostics import Diagnostic
-from composer.loading import load, project_findings
+from composer.loading import load, project_diagnostics
 
 FILES = {
     "nodes/planner.yaml": "node: planner\non_activate: {log: ready}\n",
@@ -27,7 +27,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def together(*names: str) -> list[Diagnostic]:
-    return project_findings([load(Path(name)) for name in names])
+    return project_diagnostics([load(Path(name)) for name in names])
 
 
 def test_a_node_type_that_no_system_uses_is_told(project: Path) -> None:

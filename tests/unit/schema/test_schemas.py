@@ -15,7 +15,7 @@ from jsonschema import Draft7Validator
 from composer.document import parse_document, read_document
 from composer.resources import nodes_folder, schemas_folder, systems_folder
 from composer.schema import SCHEMAS, check_schema, kind_of, schema
-from composer.schema.findings import KEYWORDS
+from composer.schema.explanations import KEYWORDS
 from composer.source import SourceFile
 from composer.tree import plain
 

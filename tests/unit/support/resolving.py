@@ -6,13 +6,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from textwrap import dedent
 
-from composer.catalog import Catalog
 from composer.diagnostics import Diagnostic
 from composer.document import parse_document
 from composer.expand import expand
 from composer.model import System
+from composer.node_types import NodeTypes
 from composer.project import Project
-from composer.resolve import CommandLine, read_overrides, resolve
+from composer.resolve import OverrideOptions, read_overrides, resolve
 from composer.source import SourceFile, Span
 
 NOWHERE = Path("/nowhere")
@@ -29,11 +29,11 @@ def resolve_text(
     tree, findings = parse_document(source)
     assert tree is not None, [finding.message for finding in findings]
     expanded, _ = expand(tree, {})
-    overrides, found = read_overrides(CommandLine(tuple(settings), namespace))
+    overrides, found = read_overrides(OverrideOptions(tuple(settings), namespace))
     system, more = resolve(
         expanded,
         source,
-        Catalog((folder,), Project(folder, folder)),
+        NodeTypes((folder,), Project(folder, folder)),
         folders={source.path: folder},
         overrides=overrides,
     )

@@ -1,4 +1,4 @@
-"""Findings in what is there more than once, and in other files than the system's own."""
+"""Diagnostics in what is there more than once, and in other files than the system's own."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ from composer.source import Located, Span
 
 _QUOTED = re.compile(r"'([^']*)'")
 _BETWEEN_NAMES = re.compile(r"[./\s]+")
-_MOST_PLACES = 3  # told of a file that is included again and again
+_MAX_PLACES = 3  # told of a file that is included again and again
 
 
-def with_includes(
-    findings: Iterable[Diagnostic], included: Map[str, tuple[Span, ...]]
+def add_include_labels(
+    diagnostics: Iterable[Diagnostic], included: Map[str, tuple[Span, ...]]
 ) -> list[Diagnostic]:
-    """Return the findings, those in included files with the places where these are included."""
+    """Return the diagnostics, those in included files with the places where these are included."""
     return [
         replace(
-            finding, related=(*finding.related, *_includes(finding.primary.file.path, included))
+            diagnostic,
+            related=(*diagnostic.related, *_includes(diagnostic.primary.file.path, included)),
         )
-        for finding in findings
+        for diagnostic in diagnostics
     ]
 
 
@@ -34,20 +35,22 @@ def _includes(path: str, included: Map[str, tuple[Span, ...]]) -> Iterator[Label
         met.add(path)
         spans = included[path]
         places = {str(span): span for span in spans}
-        yield from (Label(span, "included here") for span in [*places.values()][:_MOST_PLACES])
+        yield from (Label(span, "included here") for span in [*places.values()][:_MAX_PLACES])
         path = spans[0].file.path
 
 
-def once(findings: Iterable[Diagnostic], names: Iterable[Located[str]]) -> list[Diagnostic]:
-    """Return the findings without those that say of one copy what was said of another.
+def deduplicate(
+    diagnostics: Iterable[Diagnostic], names: Iterable[Located[str]]
+) -> list[Diagnostic]:
+    """Return the diagnostics without those that say of one copy what was said of another.
 
     ``names`` are those of all nodes; copies are nodes that were made from one and the same entry.
     """
     copies = _Copies.among(names)
     told: dict[tuple[str, str, str], Diagnostic] = {}
-    for finding in findings:
-        said = copies.without_names(finding)
-        told.setdefault((finding.rule.code, str(finding.primary), said), finding)
+    for diagnostic in diagnostics:
+        said = copies.without_names(diagnostic)
+        told.setdefault((diagnostic.rule.code, str(diagnostic.primary), said), diagnostic)
     return list(told.values())
 
 
@@ -70,13 +73,13 @@ class _Copies:
             tuple(prefix for prefix in prefixes if prefix),
         )
 
-    def without_names(self, finding: Diagnostic) -> str:
+    def without_names(self, diagnostic: Diagnostic) -> str:
         """Return the message without what differs from copy to copy."""
         if not self.names:
-            return finding.message
-        if "${" in _written(finding.primary):
-            return _QUOTED.sub("''", finding.message)
-        return _QUOTED.sub(self._without_name, finding.message)
+            return diagnostic.message
+        if "${" in _written(diagnostic.primary):
+            return _QUOTED.sub("''", diagnostic.message)
+        return _QUOTED.sub(self._without_name, diagnostic.message)
 
     def _without_name(self, quoted: re.Match[str]) -> str:
         text = quoted[1]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from composer.model import OnFailure, RestartBudget, Supervision, Watch
-from composer.resolve.reading import entries, integer, key, number, text
+from dataclasses import fields
+
+from composer.model import Introspection, OnFailure, RestartBudget, Supervision, Watch
+from composer.resolve.tree_values import entries, flag, integer, key, number, text
 from composer.source import Located
 from composer.tree import Entry, Mapping, Tree
 
 
-def supervision(lifecycle: Tree | None, default: Supervision) -> Supervision:
+def read_supervision(lifecycle: Tree | None, default: Supervision) -> Supervision:
     """Return what the ``lifecycle`` of a node or a system says, and ``default`` for the rest."""
     if not isinstance(lifecycle, Mapping):
         return default
@@ -64,3 +66,12 @@ def _watch(tree: Tree | None, default: Watch) -> Watch:
         callback_ms=number(tree.get("callback_ms")) or default.callback_ms,
         max_errors=integer(tree.get("max_errors")) or default.max_errors,
     )
+
+
+def read_introspection(*layers: Tree | None) -> Introspection:
+    """Return what the ``introspection`` keys say together; a later layer goes before an earlier."""
+    said = {
+        entry.name: flag(entry.value, default=True) for layer in layers for entry in entries(layer)
+    }
+    known = {field.name for field in fields(Introspection)}
+    return Introspection(**{name: value for name, value in said.items() if name in known})

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
-from composer.assembly.budget import Budget
-from composer.assembly.placing import Position
+from composer.assembly.limits import IncludeLimits
+from composer.assembly.namespacing import Placement
 from composer.assembly.rules import INVALID_INCLUDE
 from composer.diagnostics import Diagnostic, nearest, shown
 from composer.document import read_document
@@ -29,13 +29,13 @@ class Include:
     """What an entry asks for. ``file`` is written relative to the file it stands in."""
 
     file: Located[str]
-    position: Position
+    placement: Placement
     arguments: dict[str, Tree]
     overrides: Mapping | None
 
 
 @dataclass(frozen=True, slots=True)
-class File:
+class SystemFile:
     """A file that was reached: where it really is, and what it is called and says."""
 
     path: Path
@@ -43,38 +43,38 @@ class File:
     tree: Mapping
 
 
-def read_include(tree: Tree, findings: list[Diagnostic]) -> Include | None:
+def read_include(tree: Tree, diagnostics: list[Diagnostic]) -> Include | None:
     """Return what an entry asks for, as far as it has the right shape; None without a file."""
     entry = tree if isinstance(tree, Mapping) else None
     file = _text(entry.get("file") if entry is not None else tree)
     if file is None or _is_opaque(file.value):
         return None
     if entry is None:
-        return Include(file, Position(), {}, None)
+        return Include(file, Placement(), {}, None)
     variables, overrides = entry.get("variables"), entry.get("overrides")
     return Include(
         file,
-        Position(_prefix(entry, findings), _namespace(entry, findings)),
+        Placement(_prefix(entry, diagnostics), _namespace(entry, diagnostics)),
         {item.name: item.value for item in variables} if isinstance(variables, Mapping) else {},
         overrides if isinstance(overrides, Mapping) else None,
     )
 
 
 @dataclass(slots=True)
-class Reader:
+class IncludeReader:
     """Reads the files of one system, each once."""
 
     project: Project
-    budget: Budget
-    findings: list[Diagnostic]
-    _files: dict[Path, File | None] = field(default_factory=dict)
+    limits: IncludeLimits
+    diagnostics: list[Diagnostic]
+    _files: dict[Path, SystemFile | None] = field(default_factory=dict)
 
-    def read(self, name: Located[str], folder: Path, includer: SourceFile) -> File | None:
+    def read(self, name: Located[str], folder: Path, includer: SourceFile) -> SystemFile | None:
         """Return the file that ``name`` means in ``folder``; None when it is out of reach.
 
-        What keeps it out of reach is told where it is included. Raises TooMuch.
+        What keeps it out of reach is told where it is included. Raises LimitExceeded.
         """
-        path = self._reached(name, folder)
+        path = self._path_of(name, folder)
         if path is None:
             return None
         if path not in self._files:
@@ -82,7 +82,7 @@ class Reader:
             self._files[path] = self._read(path, name, shown_path)
         return self._files[path]
 
-    def _reached(self, name: Located[str], folder: Path) -> Path | None:
+    def _path_of(self, name: Located[str], folder: Path) -> Path | None:
         target = folder / name.value
         try:
             if Path(name.value).is_absolute():
@@ -97,28 +97,28 @@ class Reader:
             self._refuse(name, "cannot be read", None)
         return None
 
-    def _read(self, path: Path, name: Located[str], shown_path: str) -> File | None:
+    def _read(self, path: Path, name: Located[str], shown_path: str) -> SystemFile | None:
         tree, source, found = read_document(path, shown_path)
-        self.budget.read(len(source.text), name.span)
-        for finding in found:
-            if finding.rule in (UNREADABLE_FILE, FILE_TOO_LARGE):
-                self._refuse(name, f"cannot be included: {finding.message}", finding.hint)
+        self.limits.read(len(source.text), name.span)
+        for diagnostic in found:
+            if diagnostic.rule in (UNREADABLE_FILE, FILE_TOO_LARGE):
+                self._refuse(name, f"cannot be included: {diagnostic.message}", diagnostic.hint)
             else:
-                self.findings.append(finding)
+                self.diagnostics.append(diagnostic)
         if tree is None:
             return None
         wrong_kind = check_kind(tree, source, (SYSTEM,))
         if wrong_kind is not None:
             self._refuse(name, "is not a system", wrong_kind.hint)
             return None
-        return File(path, source, tree)
+        return SystemFile(path, source, tree)
 
     def _refuse(self, name: Located[str], why: str, hint: str | None) -> None:
         message = f"'{shown(name.value)}' {why}"
-        self.findings.append(Diagnostic(INVALID_INCLUDE, message, name.span, hint=hint))
+        self.diagnostics.append(Diagnostic(INVALID_INCLUDE, message, name.span, hint=hint))
 
 
-def _prefix(entry: Mapping, findings: list[Diagnostic]) -> str:
+def _prefix(entry: Mapping, diagnostics: list[Diagnostic]) -> str:
     prefix = _text(entry.get("prefix"))
     if prefix is None or not prefix.value or _is_opaque(prefix.value):
         return ""
@@ -126,11 +126,11 @@ def _prefix(entry: Mapping, findings: list[Diagnostic]) -> str:
         return prefix.value
     message = f"no name of a node can begin with '{shown(prefix.value)}'"
     hint = "letters, digits and '_', beginning with a letter: 'left_'"
-    findings.append(Diagnostic(INVALID_INCLUDE, message, prefix.span, hint=hint))
+    diagnostics.append(Diagnostic(INVALID_INCLUDE, message, prefix.span, hint=hint))
     return ""
 
 
-def _namespace(entry: Mapping, findings: list[Diagnostic]) -> Located[str] | None:
+def _namespace(entry: Mapping, diagnostics: list[Diagnostic]) -> Located[str] | None:
     namespace = _text(entry.get("namespace"))
     if namespace is None or _is_opaque(namespace.value):
         return None
@@ -139,7 +139,7 @@ def _namespace(entry: Mapping, findings: list[Diagnostic]) -> Located[str] | Non
     if problem is None:
         return namespace
     message = f"namespace '{shown(namespace.value)}' {problem}"
-    findings.append(Diagnostic(INVALID_INCLUDE, message, namespace.span))
+    diagnostics.append(Diagnostic(INVALID_INCLUDE, message, namespace.span))
     return None
 
 

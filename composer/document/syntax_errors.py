@@ -56,11 +56,11 @@ class _Problem:
         return line[self.began.column : self.began.column + 1]
 
     def here(self, message: str, hint: str | None = None, *related: Label) -> Diagnostic:
-        """Return a finding at the place the parser gave up at."""
+        """Return a diagnostic at the place the parser gave up at."""
         return Diagnostic(YAML_SYNTAX, message, span_at(self.source, self.place), related, hint)
 
     def there(self, message: str, hint: str | None = None) -> Diagnostic:
-        """Return a finding where began what the parser was in."""
+        """Return a diagnostic where began what the parser was in."""
         return Diagnostic(YAML_SYNTAX, message, span_at(self.source, self.began), (), hint)
 
     def beginning(self, message: str) -> Label:
@@ -71,7 +71,7 @@ class _Problem:
 def explain(
     error: yaml.YAMLError | ValueError, source: SourceFile, bracket: Span | None
 ) -> Diagnostic:
-    """Return the finding for whatever the parser raised.
+    """Return the diagnostic for whatever the parser raised.
 
     ``bracket`` is the innermost one that was open then.
     """
@@ -88,9 +88,9 @@ def explain(
         bracket,
     )
     for explanation in _EXPLANATIONS:
-        finding = explanation(problem)
-        if finding is not None:
-            return finding
+        diagnostic = explanation(problem)
+        if diagnostic is not None:
+            return diagnostic
     return problem.here(f"this is not YAML: {shown(problem.words)}")
 
 

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from composer.diagnostics import nearest, suggestion
 
-_MEANT: dict[str, tuple[str, ...]] = {
+_INTENDED: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("frequency", "freq", "hz", "rate", "frequency_hz"), ("rate_hz",)),
     **dict.fromkeys(("period", "interval", "interval_ms", "period_s", "every"), ("period_ms",)),
     **dict.fromkeys(("subscriber", "subscribers", "subscribes"), ("subscriptions", "to")),
@@ -64,15 +64,15 @@ _ADVICE: dict[tuple[str, str], str] = {
 }
 
 
-def meant(name: str, valid: Iterable[str]) -> str | None:
+def intended_key(name: str, valid: Iterable[str]) -> str | None:
     """Return the key among ``valid`` that ``name`` stands for, or None."""
-    return _meant(name, frozenset(valid))
+    return _intended_key(name, frozenset(valid))
 
 
 # A mistake is seldom made once.
 @lru_cache(maxsize=1024)
-def _meant(name: str, keys: frozenset[str]) -> str | None:
-    known = next((key for key in _MEANT.get(name.casefold(), ()) if key in keys), None)
+def _intended_key(name: str, keys: frozenset[str]) -> str | None:
+    known = next((key for key in _INTENDED.get(name.casefold(), ()) if key in keys), None)
     return known or nearest(name, keys)
 
 
@@ -81,5 +81,5 @@ def advice(name: str, owner: str, valid: Iterable[str]) -> str | None:
     keys = set(valid)
     if (owner, name) in _ADVICE:
         return _ADVICE[owner, name]
-    key = meant(name, keys)
+    key = intended_key(name, keys)
     return f"did you mean '{key}'?" if key is not None else suggestion(name, keys, limit=12)

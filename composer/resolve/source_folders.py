@@ -6,32 +6,32 @@ from collections.abc import Mapping as Map
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from composer.catalog import Catalog
+from composer.node_types import NodeTypes
 from composer.project import Project
 from composer.source import Span
 
 
 @dataclass(frozen=True, slots=True)
-class Places:
+class SourceFolders:
     """The folders of files, by what the files are called; ``home`` is that of the system's own.
 
-    ``catalog`` is what the system's own file may refer to.
+    ``node_types`` is what the system's own file may refer to.
     """
 
     home: Path
     folders: Map[str, Path]
-    catalog: Catalog
-    _catalogs: dict[Path, Catalog] = field(default_factory=dict, repr=False, compare=False)
+    node_types: NodeTypes
+    _node_types_of: dict[Path, NodeTypes] = field(default_factory=dict, repr=False, compare=False)
 
     def folder(self, span: Span) -> Path:
         """Return the folder of the file that something is written in."""
         return self.folders.get(span.file.path, self.home)
 
-    def catalog_for(self, span: Span) -> Catalog:
+    def node_types_for(self, span: Span) -> NodeTypes:
         """Return the node types that may be used where something is written."""
         folder = self.folder(span)
         if folder == self.home:
-            return self.catalog
-        if folder not in self._catalogs:
-            self._catalogs[folder] = Catalog.of(Project.at(folder))
-        return self._catalogs[folder]
+            return self.node_types
+        if folder not in self._node_types_of:
+            self._node_types_of[folder] = NodeTypes.of(Project.at(folder))
+        return self._node_types_of[folder]

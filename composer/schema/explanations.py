@@ -1,4 +1,4 @@
-"""What jsonschema says, in words of the language and at the place that is meant."""
+"""What jsonschema says, in words of the language and at the place that is intended_key."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Label, nearest, shown
-from composer.document.words import described
 from composer.schema import rules
+from composer.schema.common_mistakes import advice, intended_key
 from composer.schema.expectations import expected, type_hint
-from composer.schema.mistakes import advice, meant
-from composer.schema.places import Place, Places
+from composer.schema.locations import TreeIndex, TreeValue
 from composer.source import Span
+from composer.tree import describe
 
 if TYPE_CHECKING:
     from jsonschema import ValidationError
@@ -42,7 +42,7 @@ _EXAMPLES = {
 
 
 @dataclass(frozen=True, slots=True)
-class _Error:
+class _SchemaError:
     """An error of jsonschema, and where it is."""
 
     path: Path
@@ -50,8 +50,8 @@ class _Error:
     wanted: Any  # what the schema says under the keyword
     instance: Any
     schema: dict[str, Any]
-    place: Place
-    places: Places
+    place: TreeValue
+    index: TreeIndex
 
     @property
     def owner(self) -> str:
@@ -67,7 +67,7 @@ class _Error:
     @property
     def owner_span(self) -> Span:
         """Where the value begins, or its key; for a whole file, the key that says what it is."""
-        first = next(iter(self.places.root), None)
+        first = next(iter(self.index.root), None)
         if not self.path and first is not None:
             return first.key.span
         return self.place.owner_span
@@ -88,27 +88,27 @@ class _Error:
 
 
 @dataclass(frozen=True, slots=True)
-class _Misspelt:
+class _MisspelledKeys:
     """Right names of keys that were written wrong: what is said of those is not said again."""
 
     keys: set[tuple[Path, str]]
     deciding: set[Path]  # where the wrong key would have decided what the others mean
 
     @classmethod
-    def among(cls, errors: Iterable[_Error]) -> _Misspelt:
+    def among(cls, errors: Iterable[_SchemaError]) -> _MisspelledKeys:
         keys = set()
         deciding = set()
         for error in errors:
             if error.validator != "additionalProperties":
                 continue
-            found = {_meant(error, name) for name in error.unknown} - {None}
+            found = {_intended_key(error, name) for name in error.unknown} - {None}
             keys |= {(error.path, str(key)) for key in found}
             if error.schema.get("title") in _DECIDED and found & _DECIDING:
                 deciding.add(error.path)
         return cls(keys, deciding)
 
-    def covers(self, error: _Error) -> bool:
-        """Say whether ``error`` may only be there because of a misspelt key."""
+    def covers(self, error: _SchemaError) -> bool:
+        """Say whether ``error`` may only be there because of a misspelled key."""
         if error.validator == "additionalProperties" and error.path in self.deciding:
             return False
         return bool(self.deciding) and any(
@@ -116,70 +116,70 @@ class _Misspelt:
         )
 
 
-def findings_of(errors: Iterable[ValidationError], places: Places) -> list[Diagnostic]:
-    """Return the findings for ``errors``, without those that only follow from another."""
-    located = [_located(error, places) for error in errors]
-    misspelt = _Misspelt.among(located)
-    findings = (
-        finding
+def explain_errors(errors: Iterable[ValidationError], index: TreeIndex) -> list[Diagnostic]:
+    """Return the diagnostics for ``errors``, without those that only follow from another."""
+    located = [_located(error, index) for error in errors]
+    misspelled = _MisspelledKeys.among(located)
+    diagnostics = (
+        diagnostic
         for error in located
-        if not misspelt.covers(error)
-        for finding in _FINDINGS[error.validator](error, misspelt)
+        if not misspelled.covers(error)
+        for diagnostic in _EXPLAINERS[error.validator](error, misspelled)
     )
-    return list(dict.fromkeys(findings))
+    return list(dict.fromkeys(diagnostics))
 
 
-def _located(error: ValidationError, places: Places) -> _Error:
+def _located(error: ValidationError, index: TreeIndex) -> _SchemaError:
     path = tuple(error.absolute_path)
     schema = error.schema if isinstance(error.schema, dict) else {}
-    return _Error(
+    return _SchemaError(
         path,
         str(error.validator),
         error.validator_value,
         error.instance,
         schema,
-        places.find(path),
-        places,
+        index.find(path),
+        index,
     )
 
 
-def _meant(error: _Error, name: str) -> str | None:
-    key = meant(name, error.schema["properties"])
+def _intended_key(error: _SchemaError, name: str) -> str | None:
+    key = intended_key(name, error.schema["properties"])
     return key if key is not None and key not in error.instance else None
 
 
-def _unknown_keys(error: _Error, misspelt: _Misspelt) -> Iterator[Diagnostic]:
-    entries = error.places.entries(error.place.tree)
+def _unknown_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
+    entries = error.index.entries(error.place.tree)
     valid = error.schema["properties"]
     unsaid = [key for key in valid if key not in error.instance]
     for name in error.unknown:
-        if error.path in misspelt.deciding and _meant(error, name) not in _DECIDING:
+        if error.path in misspelled.deciding and _intended_key(error, name) not in _DECIDING:
             continue
         message = f"'{shown(name)}' is not a key of {error.owner}"
         hint = advice(name, error.schema.get("title", ""), unsaid)
         yield Diagnostic(rules.UNKNOWN_KEY, message, entries[name].key.span, hint=hint)
 
 
-def _missing_keys(error: _Error, misspelt: _Misspelt) -> Iterator[Diagnostic]:
+def _missing_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
     for name in error.wanted:
-        if name not in error.instance and (error.path, name) not in misspelt.keys:
+        if name not in error.instance and (error.path, name) not in misspelled.keys:
             message = f"{error.owner} needs the key '{name}'"
             example = _EXAMPLES.get((error.schema.get("title", ""), name))
             hint = f"for example '{name}: {example}'" if example is not None else None
             yield Diagnostic(rules.MISSING_KEY, message, error.owner_span, hint=hint)
 
 
-def _missing_choice(error: _Error, misspelt: _Misspelt) -> Iterator[Diagnostic]:
+def _missing_choice(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
     names = [name for choice in error.wanted for name in choice["required"]]
-    if not any((error.path, name) in misspelt.keys for name in names):
+    if not any((error.path, name) in misspelled.keys for name in names):
         message = f"{error.owner} needs {_any_of(names)}"
         example = _EXAMPLES.get((error.schema.get("title", ""), names[0]))
         hint = f"for example '{names[0]}: {example}'" if example is not None else None
         yield Diagnostic(rules.MISSING_KEY, message, error.owner_span, hint=hint)
 
 
-def _excluding_keys(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
-    entries = error.places.entries(error.place.tree)
+def _excluding_keys(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+    entries = error.index.entries(error.place.tree)
     first, second = sorted(
         (entries[name].key for name in error.wanted["required"]), key=lambda key: key.span
     )
@@ -189,16 +189,16 @@ def _excluding_keys(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
     yield Diagnostic(rules.KEYS_EXCLUDE_EACH_OTHER, message, second.span, (label,), hint)
 
 
-def _wrong_type(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
+def _wrong_type(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     wanted = expected(error.schema)
-    found = described(error.place.tree)
+    found = describe(error.place.tree)
     message = f"expected {wanted}{error.subject}, found {found}"
     hint = type_hint(error.schema, error.instance)
     yield Diagnostic(rules.WRONG_TYPE, message, error.place.value_span, hint=hint)
 
 
-def _unknown_word(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
-    found = described(error.place.tree)
+def _unknown_word(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+    found = describe(error.place.tree)
     message = f"expected {_any_of(error.wanted)}{error.subject}, found {found}"
     close = nearest(error.instance, error.wanted) if isinstance(error.instance, str) else None
     hint = f"did you mean '{close}'?" if close is not None else None
@@ -208,13 +208,13 @@ def _unknown_word(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
 _LIMITS = {"minimum": "at least", "maximum": "at most", "exclusiveMinimum": "a number above"}
 
 
-def _out_of_range(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
+def _out_of_range(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     limit = f"{_LIMITS[error.validator]} {error.wanted}"
     message = f"expected {limit}{error.subject}, found {shown(error.instance)}"
     yield Diagnostic(rules.OUT_OF_RANGE, message, error.place.value_span)
 
 
-def _nothing_there(error: _Error, _: _Misspelt) -> Iterator[Diagnostic]:
+def _nothing_there(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     name = error.path[-1] if error.path else "this"
     message = f"'{shown(name)}' is empty"
     yield Diagnostic(rules.NOTHING_THERE, message, error.owner_span, hint="name at least one")
@@ -225,7 +225,7 @@ def _any_of(names: Iterable[str]) -> str:
     return f"{', '.join(most)} or {last}" if most else last
 
 
-_FINDINGS: dict[str, Callable[[_Error, _Misspelt], Iterator[Diagnostic]]] = {
+_EXPLAINERS: dict[str, Callable[[_SchemaError, _MisspelledKeys], Iterator[Diagnostic]]] = {
     "additionalProperties": _unknown_keys,
     "required": _missing_keys,
     "anyOf": _missing_choice,
@@ -239,4 +239,4 @@ _FINDINGS: dict[str, Callable[[_Error, _Misspelt], Iterator[Diagnostic]]] = {
 }
 
 #: Every keyword of the schemas that can fail has its words here; a test holds them together.
-KEYWORDS = frozenset(_FINDINGS)
+KEYWORDS = frozenset(_EXPLAINERS)

@@ -13,24 +13,24 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 #: Says whether a value is right.
-Test: TypeAlias = Callable[[Any], bool]
+Check: TypeAlias = Callable[[Any], bool]
 
 _DEFINITIONS = "#/definitions/"
 
 
-def shape(whole: dict[str, Any]) -> Test:
+def compile_check(whole: dict[str, Any]) -> Check:
     """Return the test for a schema (draft-07). Raises KeyError for a keyword not known here."""
-    return _Shapes(whole.get("definitions", {})).test(whole)
+    return _Compiler(whole.get("definitions", {})).test(whole)
 
 
 @dataclass(slots=True)
-class _Shapes:
+class _Compiler:
     """Makes tests; that of a definition once, however often it is referred to."""
 
     definitions: dict[str, Any]
-    _made: dict[str, Test] = field(default_factory=dict)
+    _made: dict[str, Check] = field(default_factory=dict)
 
-    def test(self, schema: dict[str, Any]) -> Test:
+    def test(self, schema: dict[str, Any]) -> Check:
         if "$ref" in schema:
             name = schema["$ref"].removeprefix(_DEFINITIONS)
             if name not in self._made:
@@ -40,11 +40,11 @@ class _Shapes:
         return _all(made for maker in dict.fromkeys(makers) for made in maker(self, schema))
 
 
-def _nothing(_: _Shapes, __: dict[str, Any]) -> Iterable[Test]:
+def _nothing(_: _Compiler, __: dict[str, Any]) -> Iterable[Check]:
     return ()
 
 
-def _type(_: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
+def _type(_: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
     wanted = schema["type"]
     kinds = frozenset(
         python
@@ -54,17 +54,17 @@ def _type(_: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
     yield lambda value: type(value) in kinds
 
 
-def _enum(_: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
+def _enum(_: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
     words = tuple((type(word), word) for word in schema["enum"])
     yield lambda value: (type(value), value) in words
 
 
-def _pattern(_: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
+def _pattern(_: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
     search = re.compile(schema["pattern"]).search
     yield lambda value: type(value) is not str or search(value) is not None
 
 
-def _limits(_: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
+def _limits(_: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
     if "minimum" in schema:
         least = schema["minimum"]
         yield lambda value: type(value) not in _NUMBERS or value >= least
@@ -76,7 +76,7 @@ def _limits(_: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
         yield lambda value: type(value) not in _NUMBERS or value > below
 
 
-def _sizes(_: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
+def _sizes(_: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
     if "minItems" in schema:
         items = schema["minItems"]
         yield lambda value: type(value) is not list or len(value) >= items
@@ -85,15 +85,15 @@ def _sizes(_: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
         yield lambda value: type(value) is not dict or len(value) >= entries
 
 
-def _required(_: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
+def _required(_: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
     names = frozenset(schema["required"])
     yield lambda value: type(value) is not dict or names <= value.keys()
 
 
-def _keys(shapes: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
-    known = {name: shapes.test(part) for name, part in schema.get("properties", {}).items()}
+def _keys(compiler: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
+    known = {name: compiler.test(part) for name, part in schema.get("properties", {}).items()}
     others = schema.get("additionalProperties", True)
-    other = shapes.test(others) if isinstance(others, dict) else lambda _: bool(others)
+    other = compiler.test(others) if isinstance(others, dict) else lambda _: bool(others)
 
     def test(value: Any) -> bool:
         if type(value) is not dict:
@@ -103,32 +103,32 @@ def _keys(shapes: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
     yield test
 
 
-def _items(shapes: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
-    item = shapes.test(schema["items"])
+def _items(compiler: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
+    item = compiler.test(schema["items"])
     yield lambda value: type(value) is not list or all(map(item, value))
 
 
-def _every(shapes: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
-    return [shapes.test(part) for part in schema["allOf"]]
+def _every(compiler: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
+    return [compiler.test(part) for part in schema["allOf"]]
 
 
-def _some(shapes: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
-    parts = [shapes.test(part) for part in schema["anyOf"]]
+def _some(compiler: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
+    parts = [compiler.test(part) for part in schema["anyOf"]]
     yield lambda value: any(part(value) for part in parts)
 
 
-def _not(shapes: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
-    part = shapes.test(schema["not"])
+def _not(compiler: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
+    part = compiler.test(schema["not"])
     yield lambda value: not part(value)
 
 
-def _if(shapes: _Shapes, schema: dict[str, Any]) -> Iterable[Test]:
-    condition = shapes.test(schema["if"])
-    then, otherwise = shapes.test(schema.get("then", {})), shapes.test(schema.get("else", {}))
+def _if(compiler: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
+    condition = compiler.test(schema["if"])
+    then, otherwise = compiler.test(schema.get("then", {})), compiler.test(schema.get("else", {}))
     yield lambda value: then(value) if condition(value) else otherwise(value)
 
 
-def _all(made: Iterable[Test]) -> Test:
+def _all(made: Iterable[Check]) -> Check:
     tests = tuple(made)
     return tests[0] if len(tests) == 1 else lambda value: all(test(value) for test in tests)
 
@@ -144,7 +144,7 @@ _PYTHON_TYPES: dict[str, tuple[type, ...]] = {
     "null": (type(None),),
 }
 
-_MAKERS: dict[str, Callable[[_Shapes, dict[str, Any]], Iterable[Test]]] = {
+_MAKERS: dict[str, Callable[[_Compiler, dict[str, Any]], Iterable[Check]]] = {
     **dict.fromkeys(("$schema", "title", "description", "default", "examples"), _nothing),
     **dict.fromkeys(("definitions", "then", "else"), _nothing),
     **dict.fromkeys(("minimum", "maximum", "exclusiveMinimum"), _limits),

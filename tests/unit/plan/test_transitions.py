@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from composer.model import PrimaryState
-from composer.plan import reach
+from composer.plan import plan_transitions
 from tests.unit.support.resolving import system_of
 
 SYSTEM = system_of(
@@ -65,7 +65,7 @@ def states(letters: str) -> dict[str, PrimaryState]:
     ],
 )  # fmt: skip
 def test_plans(here: str, goal: str, plan: str) -> None:
-    printed = str(reach(SYSTEM, states(here), states(goal), CAUSES))
+    printed = str(plan_transitions(SYSTEM, states(here), states(goal), CAUSES))
     assert printed.replace(": asked for", "").replace("\n", "; ") == plan
 
 
@@ -77,7 +77,7 @@ def test_every_goal_is_reached_from_everywhere_by_legal_steps() -> None:
     ends = {"configure": "i", "activate": "a", "deactivate": "i", "cleanup": "u"}
     for here, goal in itertools.product(ALL, ALL):
         at = dict(zip(NAMES, here, strict=True))
-        plan = reach(SYSTEM, states(here), states(goal), CAUSES)
+        plan = plan_transitions(SYSTEM, states(here), states(goal), CAUSES)
         for number, step in enumerate(plan.steps, start=1):
             assert step.number == number
             assert at[step.node] == starts[step.transition]

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from composer.assembly import Inherited, NodeTypeFile, inherited
+from composer.assembly import Inherited, NodeTypeFile, inherit
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, has_errors, register, shown
 from composer.document import read_document
 from composer.expand import expand, missing_variables
 from composer.resolve.declaration import Declaration, declare
-from composer.resolve.files import Places
 from composer.resolve.qos import QosTable
-from composer.resolve.reading import entries
+from composer.resolve.source_folders import SourceFolders
+from composer.resolve.tree_values import entries
 from composer.schema import check_schema
 from composer.schema.kinds import NODE, check_kind
 from composer.source import Located, Span, shown_path
@@ -46,7 +46,7 @@ nodes:
 
 
 @dataclass(frozen=True, slots=True)
-class NodeType:
+class InstantiatedNodeType:
     """A node type made with the variables of an instance.
 
     ``complete`` is false when its file has errors, so that what it declares may not be all.
@@ -54,35 +54,37 @@ class NodeType:
     """
 
     tree: Mapping
-    places: Places
+    folders: SourceFolders
     declaration: Declaration
     complete: bool
     files: tuple[Path, ...]
 
 
 @dataclass(slots=True)
-class NodeTypes:
-    """The node types a system uses. Findings in their files are added to ``findings``."""
+class NodeTypeLoader:
+    """The node types a system uses. Diagnostics in their files are added to ``diagnostics``."""
 
-    places: Places
+    folders: SourceFolders
     qos: QosTable
-    findings: list[Diagnostic]
+    diagnostics: list[Diagnostic]
     _found: dict[tuple[Path, str], Path | None] = field(default_factory=dict)
     _read: dict[Path, Inherited | None] = field(default_factory=dict)
-    _without_variables: dict[Path, NodeType | None] = field(default_factory=dict)
+    _without_variables: dict[Path, InstantiatedNodeType | None] = field(default_factory=dict)
     _shapes: set[tuple[Path, str]] = field(default_factory=set)
 
     def find(self, name: Located[str]) -> Path | None:
         """Return the file of the node type called ``name`` where that is written, or None."""
-        known = (self.places.folder(name.span), name.value)
+        known = (self.folders.folder(name.span), name.value)
         if known not in self._found:
-            self._found[known] = self.places.catalog_for(name.span).find(name.value)
+            self._found[known] = self.folders.node_types_for(name.span).find(name.value)
         return self._found[known]
 
-    def make(self, path: Path, variables: Tree | None, span: Span) -> NodeType | None:
+    def instantiate(
+        self, path: Path, variables: Tree | None, span: Span
+    ) -> InstantiatedNodeType | None:
         """Return the type in the file ``path`` made with ``variables``, or None.
 
-        None stands for a file that cannot be read as a node type; the findings say why. ``span``
+        None stands for a file that cannot be read as a node type; the diagnostics say why. ``span``
         is where the type is asked for.
         """
         written = self._document(path)
@@ -90,26 +92,28 @@ class NodeTypes:
             return None
         given = {entry.name: entry.value for entry in entries(variables)}
         if variables is None or isinstance(variables, Mapping):
-            self.findings.extend(_missing(written.tree, given, span))
+            self.diagnostics.extend(_missing(written.tree, given, span))
         if given:
-            # Not shared: what an argument stands for is placed where that argument is written.
-            return self._make(path, written, written.tree, given)
+            # Not shared: what an argument stands for is place_ports where that argument is written.
+            return self._instantiate(path, written, written.tree, given)
         if path not in self._without_variables:
-            self._without_variables[path] = self._make(path, written, written.tree, {})
+            self._without_variables[path] = self._instantiate(path, written, written.tree, {})
         return self._without_variables[path]
 
-    def _make(
+    def _instantiate(
         self, path: Path, written: Inherited, tree: Mapping, given: dict[str, Tree]
-    ) -> NodeType:
+    ) -> InstantiatedNodeType:
         expanded, found = expand(tree, given)
-        found = [*found, *self._misshapen(path, expanded, given)]
-        places = Places(path.parent, written.folders, self.places.catalog)
-        declaration = declare(expanded, places, self.qos, found)
-        self.findings.extend(found)
+        found = [*found, *self._schema_diagnostics(path, expanded, given)]
+        folders = SourceFolders(path.parent, written.folders, self.folders.node_types)
+        declaration = declare(expanded, folders, self.qos, found)
+        self.diagnostics.extend(found)
         files = tuple(file.path for file in written.files)
-        return NodeType(expanded, places, declaration, not has_errors(found), files)
+        return InstantiatedNodeType(expanded, folders, declaration, not has_errors(found), files)
 
-    def _misshapen(self, path: Path, expanded: Mapping, given: dict[str, Tree]) -> list[Diagnostic]:
+    def _schema_diagnostics(
+        self, path: Path, expanded: Mapping, given: dict[str, Tree]
+    ) -> list[Diagnostic]:
         """Hold a type against its schema, unless it passed with the very same values before."""
         values: dict[str, Plain] = {name: plain(value) for name, value in given.items()}
         shape = (path, repr(values))
@@ -127,15 +131,15 @@ class NodeTypes:
 
     def _read_file(self, path: Path) -> Inherited | None:
         tree, source, found = read_document(path, shown_path(path))
-        self.findings.extend(found)
+        self.diagnostics.extend(found)
         if tree is None:
             return None
         wrong_kind = check_kind(tree, source, (NODE,))
         if wrong_kind is not None:
-            self.findings.append(wrong_kind)
+            self.diagnostics.append(wrong_kind)
             return None
-        whole = inherited(NodeTypeFile(path, source, tree))
-        self.findings.extend(whole.findings)
+        whole = inherit(NodeTypeFile(path, source, tree))
+        self.diagnostics.extend(whole.diagnostics)
         return whole
 
 

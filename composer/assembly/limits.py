@@ -13,17 +13,17 @@ from composer.source import Span
 _MAX_COMPARISONS = 500_000
 
 
-class TooMuch(Exception):
-    """A system says too much; the finding says where that was noticed."""
+class LimitExceeded(Exception):
+    """A system says too much; the diagnostic says where that was noticed."""
 
     def __init__(self, message: str, span: Span) -> None:
         super().__init__(message)
-        self.finding = Diagnostic(TOO_MUCH_INCLUDED, message, span)
+        self.diagnostic = Diagnostic(TOO_MUCH_INCLUDED, message, span)
 
 
 @dataclass(slots=True)
-class Budget:
-    """What was used of all limits so far. Each method raises TooMuch beyond its own."""
+class IncludeLimits:
+    """What was used of all limits so far. Each method raises LimitExceeded beyond its own."""
 
     _includes: int = 0
     _characters: int = 0
@@ -34,24 +34,26 @@ class Budget:
         """Count a file that is included, once more or for the first time."""
         self._includes += 1
         if self._includes > MAX_INCLUDES:
-            raise TooMuch(f"with this, the system includes more than {MAX_INCLUDES} files", span)
+            raise LimitExceeded(
+                f"with this, the system includes more than {MAX_INCLUDES} files", span
+            )
 
     def read(self, characters: int, span: Span) -> None:
         """Count what is in a file that is read for the first time."""
         self._characters += characters
         if self._characters > MAX_BYTES:
             message = f"with this, the files of the system are larger than {MAX_BYTES:,} bytes"
-            raise TooMuch(message, span)
+            raise LimitExceeded(message, span)
 
     def add(self, values: int, span: Span) -> None:
         """Count what an included file says with its variables put in, or a pattern stands for."""
         self._values += values
         if self._values > MAX_INCLUDED_VALUES:
             message = f"with this, the system includes more than {MAX_INCLUDED_VALUES:,} things"
-            raise TooMuch(message, span)
+            raise LimitExceeded(message, span)
 
     def compare(self, names: int, span: Span) -> None:
         """Count names that are held against a pattern."""
         self._comparisons += names
         if self._comparisons > _MAX_COMPARISONS:
-            raise TooMuch("with this, there are too many patterns for so many nodes", span)
+            raise LimitExceeded("with this, there are too many patterns for so many nodes", span)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.catalog import Catalog, interface_folders
+from composer.node_types import NodeTypes, interface_folders
 from composer.project import Project
 from composer.resources import interfaces_folder, nodes_folder
 
@@ -18,24 +18,24 @@ def project(tmp_path: Path) -> Path:
 
 
 def test_types_come_from_the_project_and_from_the_composer(project: Path) -> None:
-    catalog = Catalog.for_file(project / "systems" / "deep" / "robot.yaml")
-    assert catalog.find("camera") == project / "nodes" / "camera.yaml"
-    assert catalog.find("relay") == nodes_folder() / "relay.yaml"
-    assert {"camera", "relay"} <= set(catalog.names())
+    node_types = NodeTypes.for_file(project / "systems" / "deep" / "robot.yaml")
+    assert node_types.find("camera") == project / "nodes" / "camera.yaml"
+    assert node_types.find("relay") == nodes_folder() / "relay.yaml"
+    assert {"camera", "relay"} <= set(node_types.names())
 
 
 def test_the_projects_own_type_wins(project: Path) -> None:
     (project / "nodes" / "relay.yaml").write_text("node: relay\n")
-    found = Catalog.for_file(project / "robot.yaml").find("relay")
+    found = NodeTypes.for_file(project / "robot.yaml").find("relay")
     assert found == project / "nodes" / "relay.yaml"
 
 
 def test_the_nearest_nodes_folder_is_the_projects(project: Path) -> None:
     nearer = project / "systems" / "nodes"
     nearer.mkdir()
-    catalog = Catalog.for_file(project / "systems" / "robot.yaml")
-    assert catalog.folders == (nearer, nodes_folder())
-    assert catalog.find("camera") is None
+    node_types = NodeTypes.for_file(project / "systems" / "robot.yaml")
+    assert node_types.folders == (nearer, nodes_folder())
+    assert node_types.find("camera") is None
 
 
 @pytest.mark.parametrize(
@@ -43,16 +43,16 @@ def test_the_nearest_nodes_folder_is_the_projects(project: Path) -> None:
 )
 def test_a_type_name_never_leads_out_of_the_folder(project: Path, name: str) -> None:
     (project / "secret.yaml").write_text("node: secret\n")
-    assert Catalog.for_file(project / "robot.yaml").find(name) is None
+    assert NodeTypes.for_file(project / "robot.yaml").find(name) is None
 
 
 def test_a_link_may_lead_about_in_the_project(project: Path) -> None:
     (project / "shared.yaml").write_text("node: shared\n")
     link = project / "nodes" / "shared.yaml"
     link.symlink_to(project / "shared.yaml")
-    catalog = Catalog.for_file(project / "robot.yaml")
-    assert catalog.find("shared") == link
-    assert catalog.stray("shared") is None
+    node_types = NodeTypes.for_file(project / "robot.yaml")
+    assert node_types.find("shared") == link
+    assert node_types.find_outside_project("shared") is None
 
 
 def test_a_link_does_not_lead_out_of_the_project(
@@ -63,9 +63,9 @@ def test_a_link_does_not_lead_out_of_the_project(
     # Not the composer's own of that name either: it is not what is meant.
     link = project / "nodes" / "relay.yaml"
     link.symlink_to(secret)
-    catalog = Catalog.for_file(project / "robot.yaml")
-    assert catalog.find("relay") is None
-    assert catalog.stray("relay") == link
+    node_types = NodeTypes.for_file(project / "robot.yaml")
+    assert node_types.find("relay") is None
+    assert node_types.find_outside_project("relay") == link
 
 
 def test_a_folder_of_node_types_is_no_way_out_either(
@@ -74,11 +74,11 @@ def test_a_folder_of_node_types_is_no_way_out_either(
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     (elsewhere / "secret.yaml").write_text("node: secret\n")
     (tmp_path / "nodes").symlink_to(elsewhere)
-    assert Catalog.for_file(tmp_path / "robot.yaml").find("secret") is None
+    assert NodeTypes.for_file(tmp_path / "robot.yaml").find("secret") is None
 
 
 def test_a_file_without_project_sees_the_composers_types(tmp_path: Path) -> None:
-    assert Catalog.for_file(tmp_path / "robot.yaml").folders == (nodes_folder(),)
+    assert NodeTypes.for_file(tmp_path / "robot.yaml").folders == (nodes_folder(),)
 
 
 def test_interfaces_of_the_project_come_first(project: Path) -> None:

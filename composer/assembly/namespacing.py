@@ -11,38 +11,38 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from composer.assembly.merging import merged
+from composer.assembly.merging import merge_maps
 from composer.model import USE_SIM_TIME
 from composer.source import Located, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
-_CHANNELS = frozenset({"topic", "service", "action"})
-_ENDS = frozenset({"from", "to", "server", "clients"})
+_CHANNEL_KEYS = frozenset({"topic", "service", "action"})
+_ENDPOINT_KEYS = frozenset({"from", "to", "server", "clients"})
 #: What stands in a file for all nodes, and in a node for that one.
-_OF_ALL_NODES = ("lifecycle", "introspection")
+_NODE_DEFAULTS = ("lifecycle", "introspection")
 #: What ``lifecycle`` says of the system as a whole, and not for each of its nodes.
-_OF_THE_SYSTEM = frozenset({"implied_dependencies"})
+_NOT_INHERITED = frozenset({"implied_dependencies"})
 
 _Change = Callable[[Tree], Tree]
 
 
 @dataclass(frozen=True, slots=True)
-class Position:
+class Placement:
     """Where a file is included: what is put before the names of its nodes, and of everything."""
 
     prefix: str = ""
     namespace: Located[str] | None = None
 
 
-def placed(tree: Mapping, position: Position, includer: Path, folder: Path) -> Mapping:
+def add_namespace(tree: Mapping, placement: Placement, includer: Path, folder: Path) -> Mapping:
     """Return an assembled system, whose file is in ``folder``, as a part of one in ``includer``."""
-    names = _Names(position.prefix, _below(position.namespace, tree.get("namespace")))
+    names = _NameChanges(placement.prefix, _below(placement.namespace, tree.get("namespace")))
     defaults = _defaults(tree)
     changes: dict[str, _Change] = {
         "nodes": lambda part: names.of_nodes(part, defaults),
         "connections": names.of_connections,
         "chains": names.of_chains,
-        "parameter_files": lambda part: _seen_from(includer, folder, part),
+        "parameter_files": lambda part: _relative_to(includer, folder, part),
     }
     return Mapping(
         tuple(
@@ -62,11 +62,11 @@ def _below(outer: Located[str] | None, inner: Tree | None) -> Located[str] | Non
     return Located(f"{outer.value.rstrip('/')}/{inner.value}", inner.span)
 
 
-def _seen_from(includer: Path, folder: Path, tree: Tree) -> Tree:
+def _relative_to(includer: Path, folder: Path, tree: Tree) -> Tree:
     """Return paths relative to ``folder`` as paths relative to ``includer``."""
     match tree:
         case Sequence():
-            items = tuple(_seen_from(includer, folder, item) for item in tree.items)
+            items = tuple(_relative_to(includer, folder, item) for item in tree.items)
             return Sequence(items, tree.span)
         case Scalar(value=str() as text) if includer != folder and not _is_opaque(text):
             path = os.path.relpath(folder / text, includer)
@@ -78,9 +78,9 @@ def _seen_from(includer: Path, folder: Path, tree: Tree) -> Tree:
 def _defaults(tree: Mapping) -> dict[str, Mapping]:
     """Return what a file says of all its nodes, by the key that it has in a node."""
     found = {}
-    for name in _OF_ALL_NODES:
+    for name in _NODE_DEFAULTS:
         said = tree.get(name)
-        entries = tuple(entry for entry in _entries(said) if entry.name not in _OF_THE_SYSTEM)
+        entries = tuple(entry for entry in _entries(said) if entry.name not in _NOT_INHERITED)
         if said is not None and entries:
             found[name] = Mapping(entries, said.span)
     clock = tree.entry(USE_SIM_TIME)
@@ -94,7 +94,7 @@ def _entries(tree: Tree | None) -> tuple[Entry, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Names:
+class _NameChanges:
     prefix: str
     namespace: Located[str] | None
 
@@ -127,7 +127,9 @@ class _Names:
         if not isinstance(entry.value, Mapping):
             return Entry(key, entry.value)
         tree = _changed_map(entry.value, self._in_node)
-        said = [_over(tree.entry(name), name, defaults[name], key.span) for name in defaults]
+        said = [
+            _with_defaults(tree.entry(name), name, defaults[name], key.span) for name in defaults
+        ]
         said.append(self._namespace_entry(entry.value, key.span))
         changes = {change.name: change for change in said if change is not None}
         kept = tuple(changes.pop(inner.name, inner) for inner in tree)
@@ -147,9 +149,9 @@ class _Names:
         return self._each(entry.value)
 
     def _in_connection(self, entry: Entry) -> Tree:
-        if entry.name in _ENDS:
+        if entry.name in _ENDPOINT_KEYS:
             return self._each(entry.value)
-        if entry.name in _CHANNELS and self.namespace is not None:
+        if entry.name in _CHANNEL_KEYS and self.namespace is not None:
             return self._channel(entry.value, self.namespace)
         return entry.value
 
@@ -186,13 +188,13 @@ class _Names:
         return renamed if isinstance(renamed, Scalar) else key
 
 
-def _over(own: Entry | None, name: str, defaults: Mapping, span: Span) -> Entry | None:
+def _with_defaults(own: Entry | None, name: str, defaults: Mapping, span: Span) -> Entry | None:
     """Return what a node says under ``name`` laid over what its file says for all nodes."""
     if own is None:
         return Entry(Scalar(name, span, verbatim=False), defaults)
     if not isinstance(own.value, Mapping):
         return None
-    return Entry(own.key, merged(defaults, own.value))
+    return Entry(own.key, merge_maps(defaults, own.value))
 
 
 def _changed(tree: Tree, change: Callable[[Entry], Tree]) -> Tree:

@@ -12,7 +12,7 @@ _WORDS_FOR_NOTHING = ("null", "~")
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class TreeValue:
     """A value in a tree. ``key`` is what it stands under; None for the root and items of lists."""
 
     tree: Tree
@@ -34,22 +34,22 @@ class Place:
 
 
 @dataclass(slots=True)
-class Places:
+class TreeIndex:
     """Finds values by path, each map's keys being looked through once."""
 
     root: Mapping
     _entries: dict[int, dict[str, Entry]] = field(default_factory=dict)
 
-    def find(self, path: Iterable[str | int]) -> Place:
+    def find(self, path: Iterable[str | int]) -> TreeValue:
         """Return the value at ``path``, which must exist."""
-        place = Place(self.root, None)
+        place = TreeValue(self.root, None)
         for step in path:
             match place.tree, step:
                 case Mapping(), str():
                     entry = self.entries(place.tree)[step]
-                    place = Place(entry.value, entry.key)
+                    place = TreeValue(entry.value, entry.key)
                 case Sequence(), int():
-                    place = Place(place.tree.items[step], None)
+                    place = TreeValue(place.tree.items[step], None)
                 case _:
                     raise KeyError(step)
         return place

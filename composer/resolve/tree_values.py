@@ -14,7 +14,7 @@ from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 E = TypeVar("E", bound=StrEnum)
 
 #: Stands for a text that must be there and is not. Like every text with a load-time variable left
-#: in it, it is judged by nobody, so that one mistake makes one finding.
+#: in it, it is judged by nobody, so that one mistake makes one diagnostic.
 OPAQUE = "${}"
 
 

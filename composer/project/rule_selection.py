@@ -1,4 +1,4 @@
-"""The findings that a project wants to hear of, and how much they weigh there."""
+"""The diagnostics that a project wants to hear of, and how much they weigh there."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from composer.project.settings import Settings
 from composer.source import Located
 
 
-def told(findings: Iterable[Diagnostic], settings: Settings) -> list[Diagnostic]:
-    """Return what is left of ``findings``, each with the severity that it has in the project.
+def apply_rule_settings(diagnostics: Iterable[Diagnostic], settings: Settings) -> list[Diagnostic]:
+    """Return what is left of ``diagnostics``, each with the severity that it has in the project.
 
     Errors stay as they are: no system runs that has one.
     """
     if settings.source is None:
-        return list(findings)
-    kept = (finding for finding in findings if _is_told(finding.rule, settings))
-    return [_weighed(finding, settings) for finding in kept]
+        return list(diagnostics)
+    kept = (diagnostic for diagnostic in diagnostics if _is_selected(diagnostic.rule, settings))
+    return [_with_severity(diagnostic, settings) for diagnostic in kept]
 
 
-def wrong_choices(settings: Settings, rules: Collection[Rule]) -> Iterator[Diagnostic]:
+def check_rule_settings(settings: Settings, rules: Collection[Rule]) -> Iterator[Diagnostic]:
     """Yield what is wrong with the names of rules in ``settings``."""
     for text in (*settings.select, *settings.ignore):
-        if not any(rule.is_meant_by(text.value) for rule in rules):
+        if not any(rule.matches(text.value) for rule in rules):
             yield _unknown(text, rules)
     for text in settings.ignore:
         if any(_is_exactly(rule, text) and rule.severity is Severity.ERROR for rule in rules):
@@ -41,22 +41,22 @@ def wrong_choices(settings: Settings, rules: Collection[Rule]) -> Iterator[Diagn
 _WORDS = {Severity.WARNING: "a warning", Severity.INFO: "an info"}
 
 
-def _is_told(rule: Rule, settings: Settings) -> bool:
+def _is_selected(rule: Rule, settings: Settings) -> bool:
     if rule.severity is Severity.ERROR:
         return True
-    if any(rule.is_meant_by(text.value) for text in settings.ignore):
+    if any(rule.matches(text.value) for text in settings.ignore):
         return False
-    return not settings.select or any(rule.is_meant_by(text.value) for text in settings.select)
+    return not settings.select or any(rule.matches(text.value) for text in settings.select)
 
 
-def _weighed(finding: Diagnostic, settings: Settings) -> Diagnostic:
-    rule = finding.rule
+def _with_severity(diagnostic: Diagnostic, settings: Settings) -> Diagnostic:
+    rule = diagnostic.rule
     if rule.severity is Severity.ERROR:
-        return finding
+        return diagnostic
     for text, severity in settings.severity:
         if _is_exactly(rule, text) and severity is not rule.severity:
-            return replace(finding, rule=replace(rule, severity=severity))
-    return finding
+            return replace(diagnostic, rule=replace(rule, severity=severity))
+    return diagnostic
 
 
 def _is_exactly(rule: Rule, text: Located[str]) -> bool:

@@ -1,4 +1,4 @@
-"""Which part of a diagram a finding is about: the part that was written where it points."""
+"""Which part of a diagram a diagnostic is about: the part that was written where it points."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from composer.source import Span
 _Place = tuple[str, int, int]
 
 
-class Findings:
+class DiagnosticIndex:
     """Errors and warnings by the places they point at."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic] = ()) -> None:
@@ -24,11 +24,11 @@ class Findings:
                 self._by_place.setdefault(_place(span), text)
 
     def about_port(self, port: Port) -> str:
-        """Return the finding that points at a port's declaration; empty for none."""
+        """Return the diagnostic that points at a port's declaration; empty for none."""
         return self._first(_port_spans(port))
 
     def about_node(self, node: Node) -> str:
-        """Return the finding that points at a node itself; empty for none."""
+        """Return the diagnostic that points at a node itself; empty for none."""
         return self._first(_node_spans(node))
 
     def _first(self, spans: Iterable[Span]) -> str:
