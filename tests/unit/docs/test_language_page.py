@@ -20,7 +20,7 @@ GUIDES = sorted((ROOT / "docs").rglob("*.md"))
 
 def test_the_page_is_up_to_date() -> None:
     page = runpy.run_path(str(ROOT / "tools" / "write_language.py"))["page"]()
-    assert page == PAGE, "run: python tools/write_language.py"
+    assert page == PAGE, "run: make generate"
 
 
 @pytest.mark.parametrize("name", SCHEMAS)

@@ -16,7 +16,7 @@ DRAWN: dict[str, bytes] = TOOL["pictures"]()
 @pytest.mark.parametrize("name", sorted(DRAWN))
 def test_a_picture_is_up_to_date(name: str) -> None:
     current = (ROOT / "docs" / "pictures" / name).read_bytes()
-    assert current == DRAWN[name], "run: make pictures"
+    assert current == DRAWN[name], "run: make generate"
 
 
 def test_all_pictures_are_generated_and_used() -> None:
