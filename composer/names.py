@@ -97,7 +97,7 @@ def is_hidden(name: str) -> bool:
     return any(token.startswith("_") for token in name.split("/"))
 
 
-def fits(pattern: str, part: str) -> bool:
+def matches_wildcard(pattern: str, part: str) -> bool:
     """Say whether ``part`` of a name fits ``pattern``, in which ``*`` is any text."""
     pieces = pattern.split("*")
     if len(pieces) == 1:

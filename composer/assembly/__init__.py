@@ -1,6 +1,6 @@
-"""What is written in several files made one tree: ``include`` and, of node types, ``extends``.
+"""Merge several files into one tree: ``include`` of systems and ``extends`` of node types.
 
-Every key and value keeps the place, and the file, where it was written.
+Every key and value keeps the file and location where it was written.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from composer.project import Project
 from composer.source import SourceFile, Span
 from composer.tree import Mapping
 
-__all__ = ["Assembly", "Inherited", "NodeTypeFile", "assemble", "inherit"]
+__all__ = ["AssembledSystem", "Inherited", "NodeTypeFile", "assemble", "inherit"]
 
 
-#: What leaves nodes out, or gives them other names.
-_LEAVING_OUT = (INVALID_INCLUDE, INCLUDE_CYCLE, DUPLICATE_NODE_NAME, TOO_LARGE)
+#: Rules about nodes that are missing or have the wrong names.
+_PARTIAL_RULES = (INVALID_INCLUDE, INCLUDE_CYCLE, DUPLICATE_NODE_NAME, TOO_LARGE)
 
 
 @dataclass(frozen=True, slots=True)
-class Assembly:
-    """A system put together. ``tree`` is None when it says more than can be gone through.
+class AssembledSystem:
+    """A merged system. ``tree`` is None if the system exceeds a limit.
 
-    By what the files are called, ``folders`` are where they are, ``included`` where each was
-    included. ``is_partial`` is true when nodes may be missing, or have other names than are meant,
-    for reasons that are told.
+    ``folders`` are the folders of all files and ``included`` the places that include them, by file
+    name. ``is_partial`` is true if nodes may be missing or misnamed because of errors in
+    ``diagnostics``.
     """
 
     tree: Mapping | None
@@ -43,27 +43,27 @@ class Assembly:
     included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
 
 
-def assemble(tree: Mapping, source: SourceFile, folder: Path, project: Project) -> Assembly:
-    """Return the system ``tree`` with its variables put in, its copies made, and all it includes.
+def assemble(tree: Mapping, source: SourceFile, folder: Path, project: Project) -> AssembledSystem:
+    """Return the system ``tree`` with its variables and copies expanded, merged with its includes.
 
-    ``folder`` is where its file is; everything that is included is in ``project``. What is found
-    wrong includes what the schema says of every file.
+    ``folder`` is the folder of its file; all included files must be in ``project``. Each file is
+    checked against the schema.
     """
     diagnostics: list[Diagnostic] = []
     limits = IncludeLimits()
     resolver = IncludeResolver(IncludeReader(project, limits, diagnostics), limits, diagnostics)
     try:
-        whole = resolver.merge(system_file(tree, source, folder), {})
+        merged = resolver.merge(system_file(tree, source, folder), {})
     except LimitExceeded as stopped:
-        return Assembly(None, [stopped.diagnostic])
+        return AssembledSystem(None, [stopped.diagnostic])
     is_partial = (
         resolver.is_partial
-        or any(item.rule in _LEAVING_OUT for item in diagnostics)
-        or _has_unmade_copies(whole)
+        or any(item.rule in _PARTIAL_RULES for item in diagnostics)
+        or _has_unexpanded_names(merged)
     )
-    return Assembly(whole, diagnostics, is_partial, resolver.folders, resolver.included)
+    return AssembledSystem(merged, diagnostics, is_partial, resolver.folders, resolver.included)
 
 
-def _has_unmade_copies(tree: Mapping) -> bool:
+def _has_unexpanded_names(tree: Mapping) -> bool:
     nodes = tree.get("nodes")
     return isinstance(nodes, Mapping) and any("${" in entry.name for entry in nodes)

@@ -1,4 +1,4 @@
-"""A file as it is after everything was put into it: what ``compose config`` shows."""
+"""The canonical form of a merged file, as ``compose config`` shows it."""
 
 from __future__ import annotations
 
@@ -16,60 +16,60 @@ _NODES = "nodes"
 
 
 def canonical(tree: Mapping) -> Mapping:
-    """Return an assembled tree as a file that says the same by itself, keys in the usual order.
+    """Return an assembled tree as one equivalent file, with its keys in the usual order.
 
-    A system has its variables put in and needs them no more. What looks like one is a text, and
-    is written as such.
+    The variables of a system have been expanded, so the section is left out. Any text that still
+    looks like a variable is escaped.
     """
     if tree.entry(SYSTEM) is None:
-        return _ordered(tree, schema(NODE)["properties"])
-    whole = schema(SYSTEM)
-    definitions = whole["definitions"]
-    of_node = {
+        return _sort_keys(tree, schema(NODE)["properties"])
+    system = schema(SYSTEM)
+    definitions = system["definitions"]
+    node_keys = {
         **definitions["node_with_type"]["properties"],
         **definitions["inline_node"]["properties"],
     }
     entries = [
         Entry(
             entry.key,
-            _nodes(entry.value, of_node) if entry.name == _NODES else _literal(entry.value),
+            _nodes(entry.value, node_keys) if entry.name == _NODES else _escape(entry.value),
         )
         for entry in tree
         if entry.name != _VARIABLES
     ]
-    return _ordered(Mapping(tuple(entries), tree.span), whole["properties"])
+    return _sort_keys(Mapping(tuple(entries), tree.span), system["properties"])
 
 
 def _nodes(tree: Tree, keys: Iterable[str]) -> Tree:
     if not isinstance(tree, Mapping):
         return tree
     entries = (
-        Entry(_literal_text(entry.key), _ordered(_literal(entry.value), keys)) for entry in tree
+        Entry(_escape_text(entry.key), _sort_keys(_escape(entry.value), keys)) for entry in tree
     )
     return Mapping(tuple(entries), tree.span)
 
 
-def _ordered(tree: T, keys: Iterable[str]) -> T | Mapping:
-    """Return a map with its keys in the order of ``keys``; anything else as it is."""
+def _sort_keys(tree: T, keys: Iterable[str]) -> T | Mapping:
+    """Return a map with its keys in the order of ``keys``, and any other value unchanged."""
     if not isinstance(tree, Mapping):
         return tree
-    places = {name: place for place, name in enumerate(keys)}
-    entries = sorted(tree, key=lambda entry: places.get(entry.name, len(places)))
+    positions = {name: position for position, name in enumerate(keys)}
+    entries = sorted(tree, key=lambda entry: positions.get(entry.name, len(positions)))
     return Mapping(tuple(entries), tree.span)
 
 
-def _literal(tree: Tree) -> Tree:
+def _escape(tree: Tree) -> Tree:
     match tree:
         case Mapping():
-            entries = tuple(Entry(entry.key, _literal(entry.value)) for entry in tree)
+            entries = tuple(Entry(entry.key, _escape(entry.value)) for entry in tree)
             return Mapping(entries, tree.span)
         case Sequence():
-            return Sequence(tuple(map(_literal, tree.items)), tree.span)
+            return Sequence(tuple(map(_escape, tree.items)), tree.span)
         case Scalar():
-            return _literal_text(tree)
+            return _escape_text(tree)
 
 
-def _literal_text(scalar: Scalar) -> Scalar:
+def _escape_text(scalar: Scalar) -> Scalar:
     if not isinstance(scalar.value, str) or "${" not in scalar.value:
         return scalar
     return Scalar(scalar.value.replace("${", "$${"), scalar.span, verbatim=False)

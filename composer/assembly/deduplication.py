@@ -1,4 +1,4 @@
-"""Diagnostics in what is there more than once, and in other files than the system's own."""
+"""Deduplicate diagnostics of copies, and label those in included files."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from composer.source import Located, Span
 
 _QUOTED = re.compile(r"'([^']*)'")
 _BETWEEN_NAMES = re.compile(r"[./\s]+")
-_MAX_PLACES = 3  # told of a file that is included again and again
+_MAX_PLACES = 3  # for a file that is included many times
 
 
 def add_include_labels(
     diagnostics: Iterable[Diagnostic], included: Map[str, tuple[Span, ...]]
 ) -> list[Diagnostic]:
-    """Return the diagnostics, those in included files with the places where these are included."""
+    """Return the diagnostics; those in included files get labels where these are included."""
     return [
         replace(
             diagnostic,
@@ -29,10 +29,10 @@ def add_include_labels(
 
 
 def _includes(path: str, included: Map[str, tuple[Span, ...]]) -> Iterator[Label]:
-    """Yield where a file is included, and where the file is that does so, and so on."""
-    met: set[str] = set()
-    while path in included and path not in met:
-        met.add(path)
+    """Yield the places that include a file, then those that include that file's includer."""
+    visited: set[str] = set()
+    while path in included and path not in visited:
+        visited.add(path)
         spans = included[path]
         places = {str(span): span for span in spans}
         yield from (Label(span, "included here") for span in [*places.values()][:_MAX_PLACES])
@@ -42,21 +42,21 @@ def _includes(path: str, included: Map[str, tuple[Span, ...]]) -> Iterator[Label
 def deduplicate(
     diagnostics: Iterable[Diagnostic], names: Iterable[Located[str]]
 ) -> list[Diagnostic]:
-    """Return the diagnostics without those that say of one copy what was said of another.
+    """Return the diagnostics without repetitions for copies of a node.
 
-    ``names`` are those of all nodes; copies are nodes that were made from one and the same entry.
+    ``names`` are those of all nodes; copies are nodes that were made from the same entry.
     """
     copies = _Copies.among(names)
-    told: dict[tuple[str, str, str], Diagnostic] = {}
+    unique: dict[tuple[str, str, str], Diagnostic] = {}
     for diagnostic in diagnostics:
-        said = copies.without_names(diagnostic)
-        told.setdefault((diagnostic.rule.code, str(diagnostic.primary), said), diagnostic)
-    return list(told.values())
+        message = copies.without_names(diagnostic)
+        unique.setdefault((diagnostic.rule.code, str(diagnostic.primary), message), diagnostic)
+    return list(unique.values())
 
 
 @dataclass(frozen=True, slots=True)
 class _Copies:
-    """What copies are called, and what was put before names that were written without it."""
+    """The names of copies, and the prefixes that includes added to names."""
 
     names: frozenset[str]
     prefixes: tuple[str, ...]
@@ -74,7 +74,7 @@ class _Copies:
         )
 
     def without_names(self, diagnostic: Diagnostic) -> str:
-        """Return the message without what differs from copy to copy."""
+        """Return the message without the names that differ between copies."""
         if not self.names:
             return diagnostic.message
         if "${" in _written(diagnostic.primary):
@@ -90,7 +90,7 @@ class _Copies:
 
 
 def _prefix(name: Located[str]) -> str:
-    """Return what stands before the name that was written; empty where another one was."""
+    """Return the prefix that was added to a name; empty if the written name is another."""
     written = _written(name.span).strip("'\"")
     return name.value[: -len(written)] if written and name.value.endswith(written) else ""
 

@@ -1,4 +1,4 @@
-"""An entry of ``include``: what it asks for, and the file that it means."""
+"""Entries of ``include``, and the files that they name."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _NAMES_FOR_HINT = 1000
 
 @dataclass(frozen=True, slots=True)
 class Include:
-    """What an entry asks for. ``file`` is written relative to the file it stands in."""
+    """An entry of ``include``. ``file`` is relative to the including file."""
 
     file: Located[str]
     placement: Placement
@@ -36,7 +36,7 @@ class Include:
 
 @dataclass(frozen=True, slots=True)
 class SystemFile:
-    """A file that was reached: where it really is, and what it is called and says."""
+    """A system file that was read; ``path`` has its symbolic links resolved."""
 
     path: Path
     source: SourceFile
@@ -44,7 +44,7 @@ class SystemFile:
 
 
 def read_include(tree: Tree, diagnostics: list[Diagnostic]) -> Include | None:
-    """Return what an entry asks for, as far as it has the right shape; None without a file."""
+    """Return an entry, without the parts that have the wrong type; None without a file."""
     entry = tree if isinstance(tree, Mapping) else None
     file = _text(entry.get("file") if entry is not None else tree)
     if file is None or _is_opaque(file.value):
@@ -70,9 +70,9 @@ class IncludeReader:
     _files: dict[Path, SystemFile | None] = field(default_factory=dict)
 
     def read(self, name: Located[str], folder: Path, includer: SourceFile) -> SystemFile | None:
-        """Return the file that ``name`` means in ``folder``; None when it is out of reach.
+        """Return the file ``name`` in ``folder``; None if it cannot be included.
 
-        What keeps it out of reach is told where it is included. Raises LimitExceeded.
+        The reason is reported where it is included. Raises LimitExceeded.
         """
         path = self._path_of(name, folder)
         if path is None:
@@ -86,7 +86,9 @@ class IncludeReader:
         target = folder / name.value
         try:
             if Path(name.value).is_absolute():
-                self._refuse(name, "is not relative to this file", "name it from here: 'a.yaml'")
+                self._refuse(
+                    name, "is an absolute path", "use a path relative to this file: 'a.yaml'"
+                )
             elif not self.project.holds(target):
                 self._refuse(name, "is outside the project", None)
             elif not target.exists():
@@ -124,8 +126,8 @@ def _prefix(entry: Mapping, diagnostics: list[Diagnostic]) -> str:
         return ""
     if _PREFIX.fullmatch(prefix.value):
         return prefix.value
-    message = f"no name of a node can begin with '{shown(prefix.value)}'"
-    hint = "letters, digits and '_', beginning with a letter: 'left_'"
+    message = f"a node name cannot begin with '{shown(prefix.value)}'"
+    hint = "use letters, digits and '_', starting with a letter: 'left_'"
     diagnostics.append(Diagnostic(INVALID_INCLUDE, message, prefix.span, hint=hint))
     return ""
 
@@ -144,14 +146,14 @@ def _namespace(entry: Mapping, diagnostics: list[Diagnostic]) -> Located[str] | 
 
 
 def _similar(name: str, folder: Path) -> str | None:
-    """Return a hint at a file of nearly that name."""
+    """Return a hint with a file of a similar name."""
     path = Path(name)
     try:
         with os.scandir(folder / path.parent) as entries:
-            beside = [entry.name for entry in islice(entries, _NAMES_FOR_HINT)]
+            names = [entry.name for entry in islice(entries, _NAMES_FOR_HINT)]
     except OSError:
         return None
-    close = nearest(path.name, [other for other in beside if other.endswith((".yaml", ".yml"))])
+    close = nearest(path.name, [other for other in names if other.endswith((".yaml", ".yml"))])
     return f"did you mean '{shown(path.with_name(close))}'?" if close is not None else None
 
 

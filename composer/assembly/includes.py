@@ -1,4 +1,4 @@
-"""A system with everything that it includes."""
+"""Merge a system with everything that it includes."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from composer.tree import Entry, Mapping, Sequence, Tree
 
 
 @dataclass(frozen=True, slots=True)
-class _Link:
-    """A file on the way from the system to what it includes, and where it includes the next."""
+class _Frame:
+    """A file that is being merged, and the place where it includes the next one."""
 
     file: SystemFile
     span: Span
@@ -32,10 +32,10 @@ class _Link:
 
 @dataclass(slots=True)
 class IncludeResolver:
-    """Puts systems together. What was met on the way is kept.
+    """Merges systems with the files that they include.
 
-    ``is_partial`` is true when something that is included could not be had. By what the files are
-    called, ``folders`` are where they are, ``included`` where each was included.
+    ``is_partial`` is true if an included file is unavailable. ``folders`` are the folders of all
+    files and ``included`` the places that include them, by file name.
     """
 
     reader: IncludeReader
@@ -44,20 +44,23 @@ class IncludeResolver:
     is_partial: bool = False
     folders: dict[str, Path] = field(default_factory=dict)
     included: dict[str, tuple[Span, ...]] = field(default_factory=dict)
-    _stack: list[_Link] = field(default_factory=list)
+    _stack: list[_Frame] = field(default_factory=list)
 
     def merge(self, file: SystemFile, arguments: dict[str, Tree]) -> Mapping:
-        """Return what ``file`` says with ``arguments`` for its variables. Raises LimitExceeded."""
+        """Return ``file`` with ``arguments`` for its variables, merged with its includes.
+
+        Raises LimitExceeded.
+        """
         self.folders[file.source.path] = file.path.parent
         expanded, found = expand(file.tree, arguments)
         if self._stack:
             self.limits.add(measure(expanded).values, self._stack[-1].span)
         self.diagnostics += found
         self.diagnostics += check_schema(expanded, SYSTEM)
-        asked = expanded.get(INCLUDE)
+        includes = expanded.get(INCLUDE)
         parts = [
             part
-            for item in (asked.items if isinstance(asked, Sequence) else ())
+            for item in (includes.items if isinstance(includes, Sequence) else ())
             if (part := self._part(item, file)) is not None
         ]
         return self._expand_wildcards(join_parts(expanded, parts, self.diagnostics))
@@ -72,7 +75,7 @@ class IncludeResolver:
         if file is None:
             self.is_partial = True
             return None
-        self._stack.append(_Link(includer, include.file.span))
+        self._stack.append(_Frame(includer, include.file.span))
         try:
             return None if self._is_cycle(file) else self._merge_included(file, include)
         finally:
@@ -88,16 +91,18 @@ class IncludeResolver:
         self.included[file.source.path] = (*known, span)
         tree = self.merge(file, include.arguments)
         if include.overrides is not None:
-            # What is not there cannot be missed.
+            # In a partial tree, an unknown name is not known to be an error.
             diagnostics: list[Diagnostic] = [] if self.is_partial else self.diagnostics
             tree = apply_overrides(tree, include.overrides, file.source, diagnostics)
             diagnostics += check_schema(tree, SYSTEM)
-        whole = add_namespace(tree, include.placement, self._folder(), file.path.parent)
-        return Part(whole, span)
+        merged = add_namespace(tree, include.placement, self._folder(), file.path.parent)
+        return Part(merged, span)
 
     def _is_cycle(self, file: SystemFile) -> bool:
-        """Say whether ``file`` includes itself by way of the last files, and tell it."""
-        numbers = [number for number, link in enumerate(self._stack) if link.file.path == file.path]
+        """Return whether ``file`` is being merged already, and report the cycle."""
+        numbers = [
+            number for number, frame in enumerate(self._stack) if frame.file.path == file.path
+        ]
         if not numbers:
             return False
         self.is_partial = True
@@ -108,7 +113,7 @@ class IncludeResolver:
         return self._stack[-1].file.path.parent
 
     def _expand_wildcards(self, tree: Mapping) -> Mapping:
-        """Return the system with names in the place of patterns."""
+        """Return the system with node names in place of patterns."""
         nodes = tree.get("nodes")
         names = tuple(entry.name for entry in nodes) if isinstance(nodes, Mapping) else ()
         wildcards = Wildcards(names, self.limits)
@@ -124,18 +129,18 @@ class IncludeResolver:
         )
 
 
-def _cycle(links: list[_Link]) -> Diagnostic:
-    """Tell a circle, from the first of its files by name, so that it is one from wherever."""
-    paths = [link.file.source.path for link in links]
+def _cycle(frames: list[_Frame]) -> Diagnostic:
+    """Report a cycle, starting at its first file by name: one diagnostic for all entry points."""
+    paths = [frame.file.source.path for frame in frames]
     first = paths.index(min(paths))
-    links = links[first:] + links[:first]
+    frames = frames[first:] + frames[:first]
     paths = paths[first:] + paths[:first]
-    circle = " -> ".join(map(shown, [*paths, paths[0]]))
-    spans = [link.span for link in links]
-    labels = tuple(Label(span, "by way of this") for span in spans[1:])
-    return Diagnostic(INCLUDE_CYCLE, f"this includes itself: {circle}", spans[0], labels)
+    cycle = " -> ".join(map(shown, [*paths, paths[0]]))
+    spans = [frame.span for frame in frames]
+    labels = tuple(Label(span, "through this") for span in spans[1:])
+    return Diagnostic(INCLUDE_CYCLE, f"this includes itself: {cycle}", spans[0], labels)
 
 
 def system_file(tree: Mapping, source: SourceFile, folder: Path) -> SystemFile:
-    """Return the file that everything begins with."""
+    """Return the file of the including system."""
     return SystemFile(folder / Path(source.path).name, source, tree)

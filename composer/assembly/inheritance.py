@@ -1,4 +1,4 @@
-"""A node type with everything that it inherits by ``extends``."""
+"""Merge a node type with the types that it extends."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class NodeTypeFile:
 
     @property
     def base(self) -> Located[str] | None:
-        """The type that it extends; None where that is not said, or not by a text."""
+        """The type that it extends; None if there is none, or if it is not a text."""
         written = self.tree.get(EXTENDS)
         if isinstance(written, Scalar) and isinstance(written.value, str):
             return Located(written.value, written.span)
@@ -41,9 +41,9 @@ class NodeTypeFile:
 
 @dataclass(frozen=True, slots=True)
 class Inherited:
-    """A node type with what it inherits, and the files that this was written in, its own first.
+    """A node type merged with its base types, and their files, its own first.
 
-    ``tree`` is None when something that it inherits cannot be found or read.
+    ``tree`` is None if a base type cannot be found or read.
     """
 
     tree: Mapping | None
@@ -52,15 +52,14 @@ class Inherited:
 
     @property
     def folders(self) -> Map[str, Path]:
-        """Where the files are, by what they are called."""
+        """The folders of the files, by file name."""
         return {file.source.path: file.path.parent for file in self.files}
 
 
 def inherit(file: NodeTypeFile) -> Inherited:
-    """Return the node type in ``file`` laid over the ones that it extends.
+    """Return the node type in ``file`` merged with the types that it extends.
 
-    Every key and value keeps its place. Variables are not put in yet: a type may give other values
-    to those of its base.
+    Variables are not expanded yet: a type may override the variables of its base.
     """
     files = [file]
     diagnostics: list[Diagnostic] = []
@@ -85,7 +84,7 @@ def _base(
     limits: IncludeLimits,
     diagnostics: list[Diagnostic],
 ) -> NodeTypeFile | None:
-    """Return the file of the type called ``name``, which the last of ``files`` extends."""
+    """Return the file of the type ``name`` that the last of ``files`` extends."""
     node_types = NodeTypes.of(Project.at(files[-1].path.parent))
     path = node_types.find(name.value)
     if path is None:
@@ -114,15 +113,15 @@ def _base(
 
 
 def _cycle(files: list[NodeTypeFile]) -> Diagnostic:
-    """Tell a circle, from the first of its files by name, so that it is one from wherever."""
+    """Report a cycle, starting at its first file by name: one diagnostic for all entry points."""
     paths = [file.source.path for file in files]
     first = paths.index(min(paths))
     files = files[first:] + files[:first]
     names = [shown(file.path.stem) for file in files]
-    circle = " -> ".join([*names, names[0]])
+    cycle = " -> ".join([*names, names[0]])
     spans = [file.base.span for file in files if file.base is not None]
-    labels = tuple(Label(span, "by way of this") for span in spans[1:])
-    message = f"node type '{names[0]}' extends itself: {circle}"
+    labels = tuple(Label(span, "through this") for span in spans[1:])
+    message = f"node type '{names[0]}' extends itself: {cycle}"
     return Diagnostic(EXTENDS_CYCLE, message, spans[0], labels)
 
 

@@ -1,4 +1,4 @@
-"""Several parts of a system made one."""
+"""Join the parts of a system into one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from composer.source import Span
 from composer.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, plain
 
 INCLUDE = "include"
-#: Sections of parts that become one, each with what its entries are called.
+#: Sections that are joined, with the term for their entries.
 _MAPS = {
     "qos_profiles": "QoS profile",
     "executors": "executor",
@@ -21,7 +21,7 @@ _MAPS = {
 }
 _LISTS = ("parameter_files", "connections")
 _SEVERAL = 2
-#: What holds for a system as a whole, and what that is where nothing is said.
+#: Settings of a whole system, with their defaults.
 _SYSTEM_SETTINGS: dict[tuple[str, ...], ScalarValue] = {
     ("lifecycle", "implied_dependencies"): True,
     ("delivery",): "auto",
@@ -30,16 +30,16 @@ _SYSTEM_SETTINGS: dict[tuple[str, ...], ScalarValue] = {
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What came of a file, and where it is included."""
+    """A merged file, and the place that includes it."""
 
     tree: Mapping
     span: Span
 
 
 def join_parts(own: Mapping, parts: Iterable[Part], diagnostics: list[Diagnostic]) -> Mapping:
-    """Return ``own`` with everything that is in ``parts`` as well, before what it says itself.
+    """Return ``own`` with the entries of ``parts`` before its own.
 
-    Of two things of one name the first stays, and what is told of them is added to ``diagnostics``.
+    Of two entries with one name the first is kept, and a diagnostic is added.
     """
     whole = [*_without_repeats(parts, diagnostics), Part(own, own.span)]
     if len(whole) == 1 and own.entry(INCLUDE) is None:
@@ -55,7 +55,7 @@ def join_parts(own: Mapping, parts: Iterable[Part], diagnostics: list[Diagnostic
 
 
 def _without_repeats(parts: Iterable[Part], diagnostics: list[Diagnostic]) -> Iterator[Part]:
-    """Yield the parts but for those from a file whose nodes are there under these names already."""
+    """Yield the parts, without repeated files whose nodes have the same names."""
     known: dict[tuple[str, str], Part] = {}
     for part in parts:
         nodes = part.tree.get("nodes")
@@ -66,9 +66,9 @@ def _without_repeats(parts: Iterable[Part], diagnostics: list[Diagnostic]) -> It
             known.update(dict.fromkeys(names, part))
             yield part
             continue
-        label = Label(earlier.span, "here as well")
-        message = "this file is included twice, with the same names for its nodes"
-        hint = "give each include a 'prefix' of its own"
+        label = Label(earlier.span, "included here too")
+        message = "this file is included twice with the same node names"
+        hint = "give each include its own 'prefix'"
         related = (label,) if str(earlier.span) != str(part.span) else ()
         diagnostics.append(Diagnostic(DUPLICATE_NODE_NAME, message, part.span, related, hint))
 
@@ -115,20 +115,20 @@ def _conflict(section: str, entry: Entry, earlier: Entry) -> Iterator[Diagnostic
         yield Diagnostic(DUPLICATE_NODE_NAME, message, entry.key.span, (label,), hint)
     elif section == "chains" or plain(entry.value) != plain(earlier.value):
         message = f"there are two different {_MAPS[section]}s '{name}'"
-        hint = "make them the same with 'overrides' of the include, or rename one"
+        hint = "make them equal with the 'overrides' of the include, or rename one"
         yield Diagnostic(INCLUDE_CONFLICT, message, entry.key.span, (label,), hint)
 
 
 def _system_conflicts(own: Mapping, parts: list[Part]) -> Iterator[Diagnostic]:
-    """Yield what parts say of the system as a whole, where the system says something else."""
+    """Yield a diagnostic for each setting of a part that differs from the system's."""
     for part in parts:
         for path, usual in _SYSTEM_SETTINGS.items():
             theirs, ours = _setting(part.tree, path), _setting(own, path)
             if theirs is None or theirs.value == (usual if ours is None else ours.value):
                 continue
-            message = f"an included file has another '{path[-1]}' than the system"
+            message = f"'{path[-1]}' of an included file differs from that of the system"
             labels = (Label(ours.span, "the system's"),) if ours is not None else ()
-            hint = f"say '{'.'.join(path)}' in the including file, or nowhere"
+            hint = f"set '{'.'.join(path)}' only in the including file"
             yield Diagnostic(INCLUDE_CONFLICT, message, theirs.span, labels, hint)
 
 

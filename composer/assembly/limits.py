@@ -1,4 +1,4 @@
-"""How much a system may say with all that it includes."""
+"""Limits for a system together with everything that it includes."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from composer.diagnostics import Diagnostic
 from composer.document.limits import MAX_BYTES, MAX_INCLUDED_VALUES, MAX_INCLUDES
 from composer.source import Span
 
-#: Names held against patterns.
+#: Comparisons of names with patterns.
 _MAX_COMPARISONS = 500_000
 
 
 class LimitExceeded(Exception):
-    """A system says too much; the diagnostic says where that was noticed."""
+    """A system exceeds a limit; ``diagnostic`` says where."""
 
     def __init__(self, message: str, span: Span) -> None:
         super().__init__(message)
@@ -23,7 +23,7 @@ class LimitExceeded(Exception):
 
 @dataclass(slots=True)
 class IncludeLimits:
-    """What was used of all limits so far. Each method raises LimitExceeded beyond its own."""
+    """Counts what a system includes. Each method raises LimitExceeded beyond its limit."""
 
     _includes: int = 0
     _characters: int = 0
@@ -31,7 +31,7 @@ class IncludeLimits:
     _comparisons: int = 0
 
     def include(self, span: Span) -> None:
-        """Count a file that is included, once more or for the first time."""
+        """Count an included file, again if it is included again."""
         self._includes += 1
         if self._includes > MAX_INCLUDES:
             raise LimitExceeded(
@@ -39,21 +39,23 @@ class IncludeLimits:
             )
 
     def read(self, characters: int, span: Span) -> None:
-        """Count what is in a file that is read for the first time."""
+        """Count the characters of a file that is read for the first time."""
         self._characters += characters
         if self._characters > MAX_BYTES:
             message = f"with this, the files of the system are larger than {MAX_BYTES:,} bytes"
             raise LimitExceeded(message, span)
 
     def add(self, values: int, span: Span) -> None:
-        """Count what an included file says with its variables put in, or a pattern stands for."""
+        """Count the values of an expanded file, or the matches of a pattern."""
         self._values += values
         if self._values > MAX_INCLUDED_VALUES:
-            message = f"with this, the system includes more than {MAX_INCLUDED_VALUES:,} things"
+            message = f"with this, the system includes more than {MAX_INCLUDED_VALUES:,} values"
             raise LimitExceeded(message, span)
 
     def compare(self, names: int, span: Span) -> None:
-        """Count names that are held against a pattern."""
+        """Count names that are compared with a pattern."""
         self._comparisons += names
         if self._comparisons > _MAX_COMPARISONS:
-            raise LimitExceeded("with this, there are too many patterns for so many nodes", span)
+            raise LimitExceeded(
+                "with this, the system compares too many node names with patterns", span
+            )

@@ -1,4 +1,4 @@
-"""One map laid over another: what both say is said by the upper one, deep down."""
+"""Merge one map over another, and apply the ``overrides`` of an include."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from composer.source import SourceFile
 from composer.tree import Entry, Mapping, Scalar, Tree
 
 PARAMETERS = "parameters"
-#: Keys that say the same in two ways: one takes the place of the other.
+#: Keys that exclude each other: one replaces the other.
 _ALTERNATIVES = frozenset({"period_ms", "rate_hz"})
 
 
 def merge_maps(base: Mapping, upper: Mapping) -> Mapping:
-    """Return ``base`` with what ``upper`` says in it.
+    """Return ``base`` with the entries of ``upper`` merged into it.
 
-    Maps are merged key by key, everything else is replaced. A plain value for a declared parameter
-    is its default. Every key and value keeps its place.
+    Maps are merged key by key, all other values are replaced. A plain value for a declared
+    parameter replaces its default. Every key and value keeps its location.
     """
     changes = {entry.name: entry for entry in upper}
     replaced = _ALTERNATIVES if changes.keys() & _ALTERNATIVES else frozenset()
@@ -41,7 +41,7 @@ def _merged_entry(base: Entry, upper: Entry) -> Entry:
 
 
 def _as_declared(base: Mapping, upper: Mapping) -> Mapping:
-    """Return parameters with plain values as defaults of those that ``base`` declares."""
+    """Return ``upper`` with plain values as defaults of the parameters that ``base`` declares."""
     declared = {entry.name for entry in base if isinstance(entry.value, Mapping)}
     return Mapping(
         tuple(
@@ -69,9 +69,9 @@ _SECTIONS = {
 def apply_overrides(
     tree: Mapping, overrides: Mapping, source: SourceFile, diagnostics: list[Diagnostic]
 ) -> Mapping:
-    """Return a system with what ``overrides`` say of the things that it has.
+    """Return a system with ``overrides`` merged into its entries.
 
-    Names are those of the included file ``source``. What it does not have is told and left out.
+    Names are those of the included file ``source``; unknown names are reported and skipped.
     """
     known: list[Entry] = []
     for section in overrides:

@@ -1,7 +1,7 @@
-"""An included system put in its place: below a namespace, its nodes with a prefix.
+"""Place an included system below a namespace, and prefix the names of its nodes.
 
-What a file says about all of its nodes (namespace, lifecycle, introspection, use_sim_time) is said
-of each of them, so that it does not become what the including system says.
+Settings of the file for all of its nodes (namespace, lifecycle, introspection, use_sim_time) move
+into each node, so that they do not affect the including system.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 _CHANNEL_KEYS = frozenset({"topic", "service", "action"})
 _ENDPOINT_KEYS = frozenset({"from", "to", "server", "clients"})
-#: What stands in a file for all nodes, and in a node for that one.
+#: Keys that a file has for all nodes, and a node for itself.
 _NODE_DEFAULTS = ("lifecycle", "introspection")
-#: What ``lifecycle`` says of the system as a whole, and not for each of its nodes.
+#: Keys of ``lifecycle`` that apply to the whole system, not to each node.
 _NOT_INHERITED = frozenset({"implied_dependencies"})
 
 _Change = Callable[[Tree], Tree]
@@ -28,20 +28,22 @@ _Change = Callable[[Tree], Tree]
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Where a file is included: what is put before the names of its nodes, and of everything."""
+    """The prefix for node names and the namespace that an include gives to a file."""
 
     prefix: str = ""
     namespace: Located[str] | None = None
 
 
 def add_namespace(tree: Mapping, placement: Placement, includer: Path, folder: Path) -> Mapping:
-    """Return an assembled system, whose file is in ``folder``, as a part of one in ``includer``."""
-    names = _NameChanges(placement.prefix, _below(placement.namespace, tree.get("namespace")))
+    """Return a system from ``folder`` as a part of the system in the folder ``includer``."""
+    names = _NameChanges(
+        placement.prefix, _join_namespaces(placement.namespace, tree.get("namespace"))
+    )
     defaults = _defaults(tree)
     changes: dict[str, _Change] = {
-        "nodes": lambda part: names.of_nodes(part, defaults),
-        "connections": names.of_connections,
-        "chains": names.of_chains,
+        "nodes": lambda part: names.change_nodes(part, defaults),
+        "connections": names.change_connections,
+        "chains": names.change_chains,
         "parameter_files": lambda part: _relative_to(includer, folder, part),
     }
     return Mapping(
@@ -53,8 +55,8 @@ def add_namespace(tree: Mapping, placement: Placement, includer: Path, folder: P
     )
 
 
-def _below(outer: Located[str] | None, inner: Tree | None) -> Located[str] | None:
-    """Return one namespace below another; an absolute one is below none."""
+def _join_namespaces(outer: Located[str] | None, inner: Tree | None) -> Located[str] | None:
+    """Return the namespace ``inner`` below ``outer``; an absolute one is not changed."""
     if not isinstance(inner, Scalar) or not isinstance(inner.value, str):
         return outer
     if outer is None or inner.value.startswith("/") or _is_opaque(inner.value):
@@ -76,13 +78,13 @@ def _relative_to(includer: Path, folder: Path, tree: Tree) -> Tree:
 
 
 def _defaults(tree: Mapping) -> dict[str, Mapping]:
-    """Return what a file says of all its nodes, by the key that it has in a node."""
+    """Return the settings of a file for all of its nodes, by their key in a node."""
     found = {}
     for name in _NODE_DEFAULTS:
-        said = tree.get(name)
-        entries = tuple(entry for entry in _entries(said) if entry.name not in _NOT_INHERITED)
-        if said is not None and entries:
-            found[name] = Mapping(entries, said.span)
+        section = tree.get(name)
+        entries = tuple(entry for entry in _entries(section) if entry.name not in _NOT_INHERITED)
+        if section is not None and entries:
+            found[name] = Mapping(entries, section.span)
     clock = tree.entry(USE_SIM_TIME)
     if clock is not None and isinstance(clock.value, Scalar):
         found["parameters"] = Mapping((clock,), clock.key.span)
@@ -98,40 +100,40 @@ class _NameChanges:
     prefix: str
     namespace: Located[str] | None
 
-    def of_nodes(self, tree: Tree, defaults: dict[str, Mapping]) -> Tree:
+    def change_nodes(self, tree: Tree, defaults: dict[str, Mapping]) -> Tree:
         if not isinstance(tree, Mapping):
             return tree
         return Mapping(tuple(self._node(entry, defaults) for entry in tree), tree.span)
 
-    def of_connections(self, tree: Tree) -> Tree:
+    def change_connections(self, tree: Tree) -> Tree:
         if not isinstance(tree, Sequence):
             return tree
         return Sequence(
             tuple(_changed(item, self._in_connection) for item in tree.items), tree.span
         )
 
-    def of_chains(self, tree: Tree) -> Tree:
+    def change_chains(self, tree: Tree) -> Tree:
         if not isinstance(tree, Mapping):
             return tree
 
         def renamed(entry: Entry) -> Tree:
-            return self._each(entry.value) if entry.name == "through" else entry.value
+            return self._add_prefix(entry.value) if entry.name == "through" else entry.value
 
         chains = (
-            Entry(self._renamed_key(entry.key), _changed(entry.value, renamed)) for entry in tree
+            Entry(self._prefixed_key(entry.key), _changed(entry.value, renamed)) for entry in tree
         )
         return Mapping(tuple(chains), tree.span)
 
     def _node(self, entry: Entry, defaults: dict[str, Mapping]) -> Entry:
-        key = self._renamed_key(entry.key)
+        key = self._prefixed_key(entry.key)
         if not isinstance(entry.value, Mapping):
             return Entry(key, entry.value)
         tree = _changed_map(entry.value, self._in_node)
-        said = [
+        added = [
             _with_defaults(tree.entry(name), name, defaults[name], key.span) for name in defaults
         ]
-        said.append(self._namespace_entry(entry.value, key.span))
-        changes = {change.name: change for change in said if change is not None}
+        added.append(self._namespace_entry(entry.value, key.span))
+        changes = {change.name: change for change in added if change is not None}
         kept = tuple(changes.pop(inner.name, inner) for inner in tree)
         return Entry(key, Mapping((*kept, *changes.values()), tree.span))
 
@@ -144,18 +146,18 @@ class _NameChanges:
         if entry.name != "depends_on":
             return entry.value
         if isinstance(entry.value, Mapping):
-            entries = (Entry(self._renamed_key(inner.key), inner.value) for inner in entry.value)
+            entries = (Entry(self._prefixed_key(inner.key), inner.value) for inner in entry.value)
             return Mapping(tuple(entries), entry.value.span)
-        return self._each(entry.value)
+        return self._add_prefix(entry.value)
 
     def _in_connection(self, entry: Entry) -> Tree:
         if entry.name in _ENDPOINT_KEYS:
-            return self._each(entry.value)
+            return self._add_prefix(entry.value)
         if entry.name in _CHANNEL_KEYS and self.namespace is not None:
-            return self._channel(entry.value, self.namespace)
+            return self._add_namespace(entry.value, self.namespace)
         return entry.value
 
-    def _channel(self, tree: Tree, namespace: Located[str]) -> Tree:
+    def _add_namespace(self, tree: Tree, namespace: Located[str]) -> Tree:
         if not isinstance(tree, Scalar) or not isinstance(tree.value, str):
             return tree
         if not tree.value or tree.value[0] in "/~" or _is_opaque(tree.value):
@@ -167,29 +169,29 @@ class _NameChanges:
         if self.namespace is None:
             return None
         own = node.entry("namespace")
-        below = _below(self.namespace, own.value if own is not None else None)
+        below = _join_namespaces(self.namespace, own.value if own is not None else None)
         if below is None or (own is not None and not isinstance(own.value, Scalar)):
             return None
         key = own.key if own is not None else Scalar("namespace", span, verbatim=False)
         return Entry(key, Scalar(below.value, below.span, verbatim=False))
 
-    def _each(self, tree: Tree) -> Tree:
+    def _add_prefix(self, tree: Tree) -> Tree:
         """Return ``node`` or ``node.port``, or a list of them, with the prefix."""
         match tree:
             case Sequence():
-                return Sequence(tuple(map(self._each, tree.items)), tree.span)
+                return Sequence(tuple(map(self._add_prefix, tree.items)), tree.span)
             case Scalar(value=str() as text) if self.prefix and not _is_opaque(text):
                 return Scalar(f"{self.prefix}{text}", tree.span, verbatim=False)
             case _:
                 return tree
 
-    def _renamed_key(self, key: Scalar) -> Scalar:
-        renamed = self._each(key)
+    def _prefixed_key(self, key: Scalar) -> Scalar:
+        renamed = self._add_prefix(key)
         return renamed if isinstance(renamed, Scalar) else key
 
 
 def _with_defaults(own: Entry | None, name: str, defaults: Mapping, span: Span) -> Entry | None:
-    """Return what a node says under ``name`` laid over what its file says for all nodes."""
+    """Return the node's entry ``name`` merged over the defaults of its file."""
     if own is None:
         return Entry(Scalar(name, span, verbatim=False), defaults)
     if not isinstance(own.value, Mapping):

@@ -12,10 +12,10 @@ INVALID_INCLUDE = register(
     _error(
         code="RC290",
         name="invalid-include",
-        summary="A file cannot be included, or not in the way that is asked for.",
+        summary="A file cannot be included, or has an invalid prefix or namespace.",
         why=(
-            "What is included is a system in the same project: what is outside is not there on "
-            "another computer. A prefix or namespace makes names that ROS must take."
+            "An included file is a system in the same project: files outside the project may not "
+            "exist on another computer. Prefix and namespace must give valid ROS names."
         ),
         bad="""\
 # file: fleet.yaml
@@ -41,8 +41,8 @@ INCLUDE_CYCLE = register(
     _error(
         code="RC291",
         name="include-cycle",
-        summary="Files include each other in a circle.",
-        why="The system would have no end.",
+        summary="Files include each other in a cycle.",
+        why="The system would be infinite.",
         bad="""\
 # file: fleet.yaml
 system: fleet
@@ -68,10 +68,10 @@ INCLUDE_CONFLICT = register(
     _error(
         code="RC292",
         name="include-conflict",
-        summary="Two files say different things under one name, and a system has both.",
+        summary="Two files of a system define the same name differently.",
         why=(
-            "QoS profiles, executors and chains are shared by all files of a system. One of the "
-            "two would silently win; 'overrides' of the include says which."
+            "QoS profiles, executors and chains are shared by all files of a system. One "
+            "definition would silently win; use 'overrides' of the include to choose."
         ),
         bad="""\
 # file: fleet.yaml
@@ -108,7 +108,7 @@ UNKNOWN_OVERRIDE = register(
         code="RC293",
         name="unknown-override",
         summary="An include overrides something that the included file does not have.",
-        why="It would change nothing; what is new stands in the including file itself.",
+        why="The override would have no effect. Add new entries to the including file itself.",
         bad="""\
 # file: fleet.yaml
 system: fleet
@@ -135,8 +135,8 @@ TOO_MUCH_INCLUDED = register(
     _error(
         code="RC294",
         name="too-much-included",
-        summary="With all that it includes, a system says too much, or files nest too deep.",
-        why="A few files that include each other many times stand for more than anybody can read.",
+        summary="A system with its includes is too large, or its files are nested too deep.",
+        why="A few files that include each other many times can exhaust time and memory.",
         bad="include: [a.yaml, a.yaml]  # and so on in a.yaml, twenty files deep",
         good="include: [a.yaml]",
     )
@@ -145,8 +145,8 @@ UNKNOWN_BASE = register(
     _error(
         code="RC295",
         name="unknown-base",
-        summary="A node type extends one that there is no file for.",
-        why="Without it nothing is known of what it inherits.",
+        summary="A node type extends a type that does not exist.",
+        why="Without the base type, the inherited ports and parameters are unknown.",
         bad="""\
 # file: nodes/fast_relay.yaml
 node: fast_relay
@@ -163,8 +163,8 @@ EXTENDS_CYCLE = register(
     _error(
         code="RC296",
         name="extends-cycle",
-        summary="Node types extend each other in a circle.",
-        why="None of them says what all of them inherit.",
+        summary="Node types extend each other in a cycle.",
+        why="There is no type that the others could inherit from.",
         bad="""\
 # file: nodes/camera.yaml
 node: camera

@@ -1,4 +1,4 @@
-"""``camera_*``: all nodes whose names fit, where connections and dependencies name nodes."""
+"""Wildcards such as ``camera_*`` in the node names of connections and dependencies."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from composer.assembly.limits import IncludeLimits
-from composer.names import fits
+from composer.names import matches_wildcard
 from composer.source import Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
@@ -16,20 +16,20 @@ _ENDPOINT_KEYS = frozenset({"from", "to", "server", "clients"})
 
 @dataclass(slots=True)
 class Wildcards:
-    """Puts names in the place of patterns, in which ``*`` is any text."""
+    """Replaces patterns, in which ``*`` matches any text, with the names of nodes."""
 
     names: tuple[str, ...]
     limits: IncludeLimits
     _found: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def in_connections(self, tree: Tree) -> Tree:
-        """Return ``connections`` with the ends of all nodes that patterns stand for."""
+        """Return ``connections`` with the endpoints of all nodes that match patterns."""
         if not isinstance(tree, Sequence):
             return tree
         return Sequence(tuple(self._in_connection(item) for item in tree.items), tree.span)
 
     def in_nodes(self, tree: Tree) -> Tree:
-        """Return ``nodes`` with the dependencies on all nodes that patterns stand for."""
+        """Return ``nodes`` with dependencies on all nodes that match patterns."""
         return _changed(tree, lambda node: self._in_node(node.value))
 
     def _in_node(self, tree: Tree) -> Tree:
@@ -78,31 +78,33 @@ class Wildcards:
         for item in items:
             text = _text(item)
             node, dot, port = text.rpartition(".")
-            names = self._fitting(node, item.span)
+            names = self._matching(node, item.span)
             yield from (Scalar(f"{name}{dot}{port}", item.span, False) for name in names)
-            if not names:  # a check says that there is no such node
+            if not names:  # a rule reports the unknown node
                 yield item
 
     def _names(self, items: Iterable[Tree]) -> Iterator[Tree]:
         for item in items:
             text = _text(item)
-            names = self._fitting(text, item.span)
+            names = self._matching(text, item.span)
             yield from (Scalar(name, item.span, False) for name in names)
             if not names:
                 yield item
 
-    def _fitting(self, pattern: str, span: Span) -> tuple[str, ...]:
+    def _matching(self, pattern: str, span: Span) -> tuple[str, ...]:
         if WILDCARD not in pattern:
             return ()
         if pattern not in self._found:
             self.limits.compare(len(self.names) * (1 + len(pattern) // 64), span)
-            self._found[pattern] = tuple(name for name in self.names if fits(pattern, name))
+            self._found[pattern] = tuple(
+                name for name in self.names if matches_wildcard(pattern, name)
+            )
         self.limits.add(len(self._found[pattern]), span)
         return self._found[pattern]
 
 
 def _changed(tree: Tree, change: Callable[[Entry], Tree]) -> Tree:
-    """Return a map with other values; the very same where none changes."""
+    """Return a map with changed values; the same object if none changes."""
     if not isinstance(tree, Mapping):
         return tree
     entries = [(entry, change(entry)) for entry in tree]

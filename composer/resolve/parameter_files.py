@@ -16,7 +16,7 @@ from pathlib import Path
 from composer.diagnostics import Diagnostic, Rule, Severity, register, shown
 from composer.document import read_document
 from composer.model import USE_SIM_TIME
-from composer.names import fits, join
+from composer.names import join, matches_wildcard
 from composer.project import Project
 from composer.resolve.tree_values import is_opaque, texts
 from composer.source import Located, shown_path
@@ -192,5 +192,7 @@ def _is_match(pattern: Sequence[str], parts: Sequence[str]) -> bool:
         if piece == "**":
             ends = set(range(min(ends), len(parts) + 1)) if ends else set()
         else:
-            ends = {end + 1 for end in ends if end < len(parts) and fits(piece, parts[end])}
+            ends = {
+                end + 1 for end in ends if end < len(parts) and matches_wildcard(piece, parts[end])
+            }
     return len(parts) in ends
