@@ -1,13 +1,13 @@
 /**
- * Reads diagrams with Mermaid's own parser.
+ * Parses diagrams with Mermaid.
  *
- * stdin: a JSON list of texts. stdout: a JSON list of what Mermaid found in each,
+ * stdin: a JSON list of diagrams. stdout: a JSON list with an object per diagram,
  * {type, vertices: {id: text}, edges: [[start, end, text]], frames: [title]} or {error}.
  */
 import { readFileSync } from "node:fs";
 import { JSDOM } from "jsdom";
 
-// Mermaid cleans texts by means of a document.
+// Mermaid sanitizes text with a DOM document.
 const { window } = new JSDOM("");
 globalThis.window = window;
 globalThis.document = window.document;
@@ -28,6 +28,6 @@ async function read(text) {
   }
 }
 
-const found = [];
-for (const text of JSON.parse(readFileSync(0, "utf8"))) found.push(await read(text));
-process.stdout.write(JSON.stringify(found));
+const diagrams = [];
+for (const text of JSON.parse(readFileSync(0, "utf8"))) diagrams.push(await read(text));
+process.stdout.write(JSON.stringify(diagrams));

@@ -1,6 +1,6 @@
-"""Mermaid's own parser reads every diagram as it was meant.
+"""The parser of Mermaid reads every diagram as intended.
 
-Needs Node.js and ``npm ci --prefix tests/mermaid``; is skipped where they are missing.
+Requires Node.js and ``npm ci --prefix tests/mermaid``; skipped otherwise.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ pytestmark = pytest.mark.skipif(
 
 
 def read(graphs: Sequence[Graph]) -> list[dict[str, Any]]:
-    """Return what Mermaid finds in the diagrams; one process reads them all."""
+    """Return the diagrams as parsed by Mermaid, in a single process."""
     done = subprocess.run(
         ["node", "read.mjs"],
         cwd=HERE,
@@ -42,29 +42,29 @@ def read(graphs: Sequence[Graph]) -> list[dict[str, Any]]:
         check=True,
         text=True,
     )
-    found: list[dict[str, Any]] = json.loads(done.stdout)
-    return found
+    parsed: list[dict[str, Any]] = json.loads(done.stdout)
+    return parsed
 
 
 def plain(text: str) -> str:
-    """Return what is shown of a text: Mermaid writes codes as ``ﬂ°°35¶ß`` until it draws them."""
+    """Return the displayed text: Mermaid encodes entities as ``ﬂ°°35¶ß`` until it draws them."""
     return html.unescape(re.sub(r"ﬂ°°(\d+)¶ß", r"&#\1;", text))
 
 
-def check(graph: Graph, found: dict[str, Any]) -> None:
-    assert "error" not in found, found
-    assert found["type"] == "flowchart-v2"
+def check(graph: Graph, parsed: dict[str, Any]) -> None:
+    assert "error" not in parsed, parsed
+    assert parsed["type"] == "flowchart-v2"
     numbers = {vertex.key: f"v{number}" for number, vertex in enumerate(graph.vertices, 1)}
     assert {numbers[vertex.key]: vertex.lines for vertex in graph.vertices} == {
         name: tuple(map(plain, re.split("<br ?/?>", text)))
-        for name, text in found["vertices"].items()
+        for name, text in parsed["vertices"].items()
     }
     assert [[numbers[edge.source], numbers[edge.target], edge.lines] for edge in graph.edges] == [
         [begin, end, tuple(map(plain, re.split("<br ?/?>", text))) if text else ()]
-        for begin, end, text in found["edges"]
+        for begin, end, text in parsed["edges"]
     ]
     drawn = {vertex.cluster for vertex in graph.vertices}
-    titles = {plain(title) for title in found["frames"]}
+    titles = {plain(title) for title in parsed["frames"]}
     assert {cluster.label for cluster in graph.clusters if cluster.key in drawn} <= titles
 
 
@@ -75,18 +75,18 @@ def test_every_example_system_in_every_view() -> None:
         assert loading.system is not None
         scene = scene_of([loading.system], loading.diagnostics)
         graphs += [build_graph(scene, view) for view in View]
-    for graph, found in zip(graphs, read(graphs), strict=True):
-        check(graph, found)
+    for graph, parsed in zip(graphs, read(graphs), strict=True):
+        check(graph, parsed)
 
 
 def test_thirty_nodes() -> None:
     graphs = [fleet_graph(30, view) for view in View]
-    for graph, found in zip(graphs, read(graphs), strict=True):
-        check(graph, found)
+    for graph, parsed in zip(graphs, read(graphs), strict=True):
+        check(graph, parsed)
 
 
 def test_texts_that_look_like_syntax() -> None:
     graph = evil_graph()
-    (found,) = read([graph])
-    check(graph, found)
-    assert plain(found["vertices"]["v1"]).startswith(EVIL)
+    (parsed,) = read([graph])
+    check(graph, parsed)
+    assert plain(parsed["vertices"]["v1"]).startswith(EVIL)

@@ -1,4 +1,4 @@
-"""The wheel, built once, and an empty environment with the wheel in it."""
+"""Fixtures: the wheel, built once, and an environment in which only the wheel is installed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _pip(python: Path | str, *arguments: str | Path) -> None:
 
 @pytest.fixture(scope="session")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel that would be published."""
+    """The built wheel."""
     folder = tmp_path_factory.mktemp("wheel")
     _pip(sys.executable, "wheel", "-qq", "--no-deps", "--wheel-dir", folder, ROOT)
     (path,) = folder.glob("*.whl")
@@ -38,7 +38,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def installation(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installation:
-    """The wheel in an environment that has nothing but what the wheel asks for."""
+    """An environment with the wheel and its dependencies."""
     environment = tmp_path_factory.mktemp("environment")
     venv.create(environment, with_pip=True, symlinks=True)
     _pip(environment / "bin" / "python", "install", "-qq", wheel)

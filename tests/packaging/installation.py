@@ -1,4 +1,4 @@
-"""An environment with the composer in it, as its user has it."""
+"""A virtual environment in which the composer is installed."""
 
 from __future__ import annotations
 
@@ -8,41 +8,40 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-# Set by this process' own Python when that has the ros wheels, and only right for that one.
-OF_THIS_PYTHON = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
-OF_A_ROS = ("AMENT_PREFIX_PATH", "PYTHONPATH")
+# Set by the ros wheels of this Python, and valid for this Python only.
+WHEEL_VARIABLES = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
+ROS_VARIABLES = ("AMENT_PREFIX_PATH", "PYTHONPATH")
 
 
 def without_ros() -> dict[str, str]:
-    """Return this process' environment variables as they are where there is no ROS."""
-    hidden = (*OF_THIS_PYTHON, *OF_A_ROS)
+    """Return the environment variables of this process without those of ROS."""
+    hidden = (*WHEEL_VARIABLES, *ROS_VARIABLES)
     return {name: value for name, value in os.environ.items() if name not in hidden}
 
 
 def with_this_ros() -> dict[str, str]:
-    """Return environment variables that give another Python the ROS of this one, as sourcing
-    does."""
+    """Return environment variables with which another Python uses the ROS of this one."""
     sites = [path for path in sys.path if path.endswith(("site-packages", "dist-packages"))]
     return dict(os.environ) | {"PYTHONPATH": os.pathsep.join(sites)}
 
 
 @dataclass(frozen=True, slots=True)
 class Installation:
-    """A virtual environment with the wheel installed, and a folder that is not the project's."""
+    """A virtual environment with the wheel, and a working directory outside the project."""
 
     environment: Path
     elsewhere: Path
 
     @property
     def package(self) -> Path:
-        """Where the package was installed."""
+        """The folder of the installed package."""
         (package,) = self.environment.glob("lib/python*/site-packages/composer")
         return package
 
     def run(
         self, *command: str | Path, variables: dict[str, str], timeout_s: float = 60
     ) -> subprocess.CompletedProcess[str]:
-        """Run a command of the environment in the other folder."""
+        """Run a command of the environment in the working directory."""
         program, *arguments = map(str, command)
         return subprocess.run(
             [str(self.environment / "bin" / program), *arguments],

@@ -1,4 +1,4 @@
-"""The GitHub action: its steps, run here as a runner runs them."""
+"""The GitHub action: its steps, run as on a runner."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tests.packaging.installation import without_ros
 ROOT = Path(__file__).parents[2]
 ACTION = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
 STEPS: list[dict[str, Any]] = ACTION["runs"]["steps"]
-# How GitHub starts the shell of a step that says 'bash'.
+# The command with which GitHub starts the shell 'bash' of a step.
 BASH = ("bash", "--noprofile", "--norc", "-eo", "pipefail", "-c")
 
 
 def run(name: str, folder: Path, **variables: str) -> subprocess.CompletedProcess[str]:
-    """Run the step called ``name`` in ``folder``."""
+    """Run a step in ``folder``."""
     (step,) = [step for step in STEPS if step.get("name") == name]
     given = {key: variables.get(key, "") for key in step["env"]}
     return subprocess.run(
@@ -43,7 +43,7 @@ def runner_temp(tmp_path_factory: pytest.TempPathFactory) -> str:
     return folder
 
 
-def test_it_uses_official_actions_and_puts_no_input_into_scripts() -> None:
+def test_it_uses_official_actions_and_no_inputs_in_scripts() -> None:
     assert ACTION["runs"]["using"] == "composite"
     for step in STEPS:
         assert step.get("uses", "actions/").startswith("actions/")
@@ -60,16 +60,16 @@ def test_a_clean_project_passes(runner_temp: str) -> None:
     assert (done.returncode, done.stdout) == (0, "")
 
 
-def test_findings_are_annotations_and_a_report(runner_temp: str, tmp_path: Path) -> None:
+def test_diagnostics_are_annotations_and_sarif(runner_temp: str, tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text("system: a\nnodes: {one: {type: rely}}\n")
     done = run("Validate", tmp_path, RUNNER_TEMP=runner_temp, PATHS=".", SARIF_FILE="out.sarif")
     assert done.returncode == 1
     assert done.stdout.startswith("::error file=a.yaml,line=2,")
-    (found,) = json.loads((tmp_path / "out.sarif").read_text())["runs"][0]["results"]
-    assert found["ruleId"] == "RC201"
+    (result,) = json.loads((tmp_path / "out.sarif").read_text())["runs"][0]["results"]
+    assert result["ruleId"] == "RC201"
 
 
-def test_a_wrong_option_is_not_taken_for_findings(runner_temp: str) -> None:
+def test_an_invalid_option_exits_with_status_2(runner_temp: str) -> None:
     for sarif_file in ("", "out.sarif"):
         done = run(
             "Validate",

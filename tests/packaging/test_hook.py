@@ -1,4 +1,4 @@
-"""The hook, run by pre-commit itself in a repository that uses it."""
+"""The pre-commit hook, run by pre-commit in a repository that uses it."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ pytestmark = pytest.mark.skipif(
 
 
 def git(folder: Path, *arguments: str) -> str:
-    who = ("-c", "user.name=Tester", "-c", "user.email=tester@example.org")
+    identity = ("-c", "user.name=Tester", "-c", "user.email=tester@example.org")
     done = subprocess.run(
-        ["git", *who, *arguments], cwd=folder, capture_output=True, text=True, check=True
+        ["git", *identity, *arguments], cwd=folder, capture_output=True, text=True, check=True
     )
     return done.stdout.strip()
 
 
 def committed(folder: Path) -> str:
-    """Make a repository of ``folder`` and return its commit."""
+    """Commit ``folder`` as a git repository and return the commit."""
     git(folder, "init", "--quiet")
     git(folder, "add", "--all")
     git(folder, "commit", "--quiet", "--message", "all")
@@ -50,7 +50,7 @@ def committed(folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def user(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A repository whose configuration names this one, as it is now."""
+    """A repository that uses the hook of this working tree."""
     published = tmp_path_factory.mktemp("published")
     ignore = shutil.ignore_patterns("__pycache__", "*.egg-info", "build")
     for name in PUBLISHED:
@@ -86,7 +86,7 @@ def run_hook(folder: Path, home: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_pre_commit_passes_what_is_right_and_stops_what_is_wrong(
+def test_the_hook_passes_valid_files_and_fails_on_errors(
     user: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     home = tmp_path_factory.mktemp("pre_commit")

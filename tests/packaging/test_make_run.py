@@ -1,4 +1,4 @@
-"""Ctrl-C on `make run`: the system ends in order, and make does not call that an error."""
+"""Ctrl-C in `make run`: the system shuts down in order, and make does not report an error."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 CTRL_C = b"\x03"
 CTRL_Z = b"\x1a"
-# Stands where compose would stand, so that only make and the way to it are looked at.
+# Replaces compose.
 COMMAND = f"""#!{sys.executable} -S
 import signal, sys, time
 received = []
@@ -32,7 +32,7 @@ print("down after", received[0], flush=True)
 
 @pytest.fixture
 def make_run(tmp_path: Path) -> list[str]:
-    """`make run` in an environment in which everything is said to be installed."""
+    """The command `make run` with an environment in which everything is marked as installed."""
     command = tmp_path / "bin" / "compose"
     command.parent.mkdir()
     command.write_text(COMMAND, "utf-8")
@@ -45,7 +45,7 @@ def make_run(tmp_path: Path) -> list[str]:
 
 
 class Terminal:
-    """A command in a terminal of its own: the keys, the output, the end."""
+    """A command in a pseudo-terminal: its input, output and exit code."""
 
     def __init__(self, command: list[str]) -> None:
         self.output = b""
@@ -64,15 +64,15 @@ class Terminal:
     def wait_for_stop(self) -> None:
         os.waitpid(self.process, os.WUNTRACED)
 
-    def go_on(self) -> None:
-        """Do what a shell's `fg` does, and wait until the system has the terminal again."""
+    def resume(self) -> None:
+        """Resume the command like `fg` in a shell, until the system has the terminal again."""
         os.killpg(self.process, signal.SIGCONT)
         while os.tcgetpgrp(self._keys) == self.process:
             time.sleep(0.01)
 
-    def end(self) -> int:
-        """Read what is left and return the exit code."""
-        with contextlib.suppress(OSError):  # a terminal that nobody has open any more
+    def wait(self) -> int:
+        """Read the remaining output and return the exit code."""
+        with contextlib.suppress(OSError):  # raised when the terminal is closed
             while more := os.read(self._keys, 4096):
                 self.output += more
         os.close(self._keys)
@@ -87,28 +87,28 @@ def terminal(make_run: list[str]) -> Iterator[Terminal]:
         os.killpg(terminal.process, signal.SIGKILL)
 
 
-def test_ctrl_c_in_a_terminal_ends_with_0_and_without_a_word_of_make(terminal: Terminal) -> None:
+def test_ctrl_c_in_a_terminal_exits_with_0_without_output_of_make(terminal: Terminal) -> None:
     terminal.wait_for(b"up: run some.yaml")
     terminal.press(CTRL_C)
 
-    assert terminal.end() == 0
+    assert terminal.wait() == 0
     assert b"down after SIGINT" in terminal.output
     assert b"make:" not in terminal.output
 
 
-def test_a_stopped_system_goes_on_and_still_hears_ctrl_c(terminal: Terminal) -> None:
+def test_a_stopped_system_resumes_and_reacts_to_ctrl_c(terminal: Terminal) -> None:
     terminal.wait_for(b"up:")
     terminal.press(CTRL_Z)
     terminal.wait_for_stop()
-    terminal.go_on()
+    terminal.resume()
     terminal.press(CTRL_C)
 
-    assert terminal.end() == 0
+    assert terminal.wait() == 0
     assert b"down after SIGINT" in terminal.output
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_to_everything_reaches_the_system_without_a_terminal(
+def test_a_signal_to_the_process_group_reaches_the_system_without_a_terminal(
     make_run: list[str], number: signal.Signals
 ) -> None:
     with subprocess.Popen(

@@ -1,3 +1,5 @@
+"""The wheel, installed with and without ROS."""
+
 from __future__ import annotations
 
 import zipfile
@@ -9,7 +11,7 @@ import pytest
 from tests.packaging.installation import Installation, with_this_ros, without_ros
 
 
-def test_the_wheel_carries_everything_and_no_litter(wheel: Path) -> None:
+def test_the_wheel_contains_all_shared_files_and_no_others(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
 
     for path in (
@@ -27,7 +29,7 @@ def test_the_wheel_carries_everything_and_no_litter(wheel: Path) -> None:
     assert [name for name in names if "__pycache__" in name or name.startswith("tests/")] == []
 
 
-def test_the_command_tells_its_version(installation: Installation) -> None:
+def test_the_command_prints_its_version(installation: Installation) -> None:
     done = installation.run("compose", "--version", variables=without_ros())
 
     assert done.returncode == 0, done.stderr
@@ -52,7 +54,7 @@ def test_the_shipped_files_are_valid_from_another_folder_and_without_ros(
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_a_mistake_is_found_without_ros(installation: Installation) -> None:
+def test_an_error_is_reported_without_ros(installation: Installation) -> None:
     broken = installation.elsewhere / "broken.yaml"
     broken.write_text("system: broken\nnodes:\n  planner: {type: planer}\n", "utf-8")
 
@@ -83,7 +85,7 @@ def test_a_shipped_system_runs_with_ros(installation: Installation, name: str) -
 
 
 @pytest.mark.ros
-def test_what_runs_is_the_wheel_and_not_the_checkout(installation: Installation) -> None:
+def test_the_installed_package_is_imported(installation: Installation) -> None:
     where = "import composer, rclpy; print(composer.__file__)"
 
     done = installation.run("python", "-c", where, variables=with_this_ros())

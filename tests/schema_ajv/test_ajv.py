@@ -1,4 +1,4 @@
-"""The schemas in the validator that editors use: it takes what is right, and refuses the rest."""
+"""The JSON Schemas in ajv, a validator for editors: valid files pass, others fail."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ INSTALLED = HERE / "node_modules" / "ajv"
 NAMES = (*SCHEMAS, REPORT)
 Ajv = Callable[[list[tuple[str, Any]]], list[list[str]]]
 
-BAD = [
+INVALID = [
     "nodes: {one: {}}",
     "system: a",
     "system: a\nnodes: {}",
@@ -90,16 +90,16 @@ def ajv() -> Ajv:
             check=False,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
-        found: list[list[str]] = json.loads(done.stdout)
-        return found
+        errors: list[list[str]] = json.loads(done.stdout)
+        return errors
 
     return check
 
 
 def document(text: str) -> tuple[str, Any]:
-    tree, findings = parse_document(SourceFile("f", text))
+    tree, diagnostics = parse_document(SourceFile("f", text))
     assert tree is not None
-    assert findings == []
+    assert diagnostics == []
     return str(kind_of(tree) or "system"), plain(tree)
 
 
@@ -109,32 +109,34 @@ def shipped() -> list[tuple[str, Any]]:
     return [document(path.read_text(encoding="utf-8")) for path in paths]
 
 
-def test_shipped_files_are_right(ajv: Ajv) -> None:
+def test_shipped_files_are_valid(ajv: Ajv) -> None:
     assert ajv(shipped()) == [[]] * len(shipped())
 
 
-def test_what_we_write_is_what_its_schema_says(ajv: Ajv) -> None:
-    tree, _, findings = read_document(Path("/no/such/file"))
+def test_reports_match_their_schema(ajv: Ajv) -> None:
+    tree, _, diagnostics = read_document(Path("/no/such/file"))
     assert tree is None
-    assert ajv([(REPORT, json.loads(report.render(findings)))]) == [[]]
+    assert ajv([(REPORT, json.loads(report.render(diagnostics)))]) == [[]]
     assert ajv([(REPORT, {"version": 1, "findings": []})]) != [[]]
 
 
-@pytest.mark.parametrize("text", BAD)
-def test_what_we_refuse_is_bad(text: str) -> None:
+@pytest.mark.parametrize("text", INVALID)
+def test_the_composer_rejects_invalid_files(text: str) -> None:
     tree, _ = parse_document(SourceFile("f", text))
     assert tree is not None
     assert check_schema(tree, document(text)[0]) != []
 
 
-def test_what_is_bad_is_refused(ajv: Ajv) -> None:
+def test_ajv_rejects_invalid_files(ajv: Ajv) -> None:
     passed = [
-        text for text, found in zip(BAD, ajv(list(map(document, BAD))), strict=True) if not found
+        text
+        for text, errors in zip(INVALID, ajv(list(map(document, INVALID))), strict=True)
+        if not errors
     ]
     assert passed == []
 
 
-def test_both_validators_have_one_opinion_of_files_with_mistakes(ajv: Ajv) -> None:
+def test_both_validators_agree_on_mutated_files(ajv: Ajv) -> None:
     documents: list[tuple[str, Any]] = []
 
     @settings(
@@ -152,6 +154,6 @@ def test_both_validators_have_one_opinion_of_files_with_mistakes(ajv: Ajv) -> No
     collect()
     validators = {name: Draft7Validator(schema(name)) for name in SCHEMAS}
     expected = [validators[name].is_valid(content) for name, content in documents]
-    found = [errors == [] for errors in ajv(documents)]
+    actual = [errors == [] for errors in ajv(documents)]
     assert 0 < sum(expected) < len(expected)
-    assert found == expected
+    assert actual == expected
