@@ -101,7 +101,7 @@ def _due(total: float, step: int) -> range:
 
 
 def _set_rate(node: RunningNode, rate_hz: float) -> None:
-    ros = node.cores[0].node
+    ros = node.contexts[0].node
     done: Any = node.loop.run(
         lambda: ros.set_parameters([Parameter("rate_hz", value=rate_hz)]), _TIMEOUT_S
     )
@@ -112,7 +112,7 @@ def _set_rate(node: RunningNode, rate_hz: float) -> None:
 def _cycle(node: RunningNode) -> None:
     for transition in _CYCLE:
         ended = threading.Event()
-        node.loop.run_task(node.change(transition)).add_done_callback(
+        node.loop.run_task(node.lifecycle.change(transition)).add_done_callback(
             lambda _, ended=ended: ended.set()
         )
         if not ended.wait(_TIMEOUT_S):

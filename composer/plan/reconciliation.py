@@ -30,12 +30,11 @@ class FaultKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A failure of a node. ``node`` is its key in the system, ``at_s`` a steady-clock time."""
+    """A failure of a node. ``node`` is its key in the system."""
 
     node: str
     kind: FaultKind
     text: str
-    at_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,16 +52,32 @@ class Decision:
 
 
 @dataclass(frozen=True, slots=True)
+class Restart:
+    """A scheduled restart of a failed node; see :class:`Decision` for ``attempt``."""
+
+    node: str
+    attempt: int
+    due_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class DesiredState:
     """The desired state of each node, by its key.
 
     ``goals`` are the states requested for the nodes, ``down`` the reasons why failed nodes are kept
-    down anyway, ``restarts`` the times of each node's restarts in seconds, oldest first.
+    down anyway. ``scheduled`` are the restarts to come, ``restarts`` the times of earlier ones,
+    oldest first, in seconds of the caller's clock.
     """
 
     goals: Mapping[str, PrimaryState]
     down: Mapping[str, str] = field(default_factory=dict)
     restarts: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    scheduled: Mapping[str, Restart] = field(default_factory=dict)
+
+    @property
+    def next_restart(self) -> Restart | None:
+        """The scheduled restart that is due first."""
+        return min(self.scheduled.values(), key=lambda restart: restart.due_s, default=None)
 
     def with_goals(self, goals: Mapping[str, PrimaryState]) -> DesiredState:
         """Return a copy with new goals for some of the nodes."""
@@ -72,17 +87,23 @@ class DesiredState:
         """Return a copy that keeps the node of ``fault`` down."""
         return replace(self, down={**self.down, fault.node: fault.text})
 
+    def schedule(self, restart: Restart) -> DesiredState:
+        """Return a copy with a restart of a node that is kept down."""
+        return replace(self, scheduled={**self.scheduled, restart.node: restart})
+
     def restart(self, node: str, at_s: float) -> DesiredState:
         """Return a copy that releases the node and counts one more restart."""
         restarts = {**self.restarts, node: (*self.restarts.get(node, ()), at_s)}
         return replace(self.release(node), restarts=restarts)
 
     def release(self, node: str) -> DesiredState:
-        """Return a copy that no longer keeps the node down."""
-        return replace(self, down={name: why for name, why in self.down.items() if name != node})
+        """Return a copy that no longer keeps the node down, without a restart to come."""
+        down = {name: reason for name, reason in self.down.items() if name != node}
+        scheduled = {name: item for name, item in self.scheduled.items() if name != node}
+        return replace(self, down=down, scheduled=scheduled)
 
 
-def decide(system: System, desired: DesiredState, fault: Fault) -> Decision | None:
+def decide(system: System, desired: DesiredState, fault: Fault, now_s: float) -> Decision | None:
     """Return how to handle ``fault``; None if the node is unknown or already kept down."""
     node = system.node(fault.node)
     if node is None or fault.node in desired.down:
@@ -93,7 +114,7 @@ def decide(system: System, desired: DesiredState, fault: Fault) -> Decision | No
     if fault.kind is FaultKind.LOST:
         return Decision(OnFailure.SHUTDOWN, f"{fault.text}; it cannot be restarted")
     restart = node.supervision.restart
-    since_s = fault.at_s - restart.window_ms / 1000.0
+    since_s = now_s - restart.window_ms / 1000.0
     attempts = sum(at_s > since_s for at_s in desired.restarts.get(fault.node, ()))
     if attempts >= restart.max_attempts:
         times = "once" if attempts == 1 else f"{attempts} times"

@@ -39,7 +39,7 @@ class NodeReport:
 
     node: str
     state: str
-    wanted: str
+    desired: str
     since_s: float
     restarts: int
     errors: int
@@ -149,7 +149,7 @@ class Systems:
     def command(self, name: str, what: str) -> tuple[bool, str]:
         """Have a system do something, and return whether it did and what it says. Raises NoAnswer.
 
-        ``what`` is one of the services of :class:`composer.runtime.manager.node.Manager`.
+        ``what`` is one of the services of :class:`composer.runtime.manager.node.ManagerNode`.
         """
         life = _Life(name, self._deadline)
         # Who tells its state is alive: of a killed process, services are in the graph for a while.
@@ -271,7 +271,7 @@ def _node_report(status: DiagnosticStatus) -> NodeReport:
     return NodeReport(
         node=str(status.name).partition(": ")[2],
         state=values["state"],
-        wanted=values["wanted"],
+        desired=values["desired"],
         since_s=float(values["since"]),
         restarts=int(values["restarts"]),
         errors=int(values["errors"]),

@@ -51,7 +51,9 @@ def test_an_environment_that_hinders_a_start_is_told_with_a_remedy(
         for pair in zip(done.out.splitlines(), done.out.splitlines()[1:], strict=False)
         if pair[0].startswith("error    environment  ")
     )
-    assert head.endswith("ROS_AUTOMATIC_DISCOVERY_RANGE is 'LOCLHOST', which is no discovery range")
+    assert head.endswith(
+        "ROS_AUTOMATIC_DISCOVERY_RANGE is 'LOCLHOST', which is not a discovery range"
+    )
     assert remedy.strip().startswith("-> did you mean LOCALHOST?")
     assert "not looked at: the environment does not let ROS start" in done.out
 

@@ -1,4 +1,4 @@
-"""A system comes up as a whole or not at all, and goes down in order and in time."""
+"""The bring-up of a system is all or nothing; the tear-down is ordered and limited in time."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_up_in_dependency_order_and_down_in_reverse(tmp_path: Path, peer: Peer) 
     assert [node.state for node in outcome.nodes] == ["finalized"] * 3
 
 
-def test_nothing_of_a_system_is_left_in_the_graph(tmp_path: Path, peer: Peer) -> None:
+def test_a_stopped_system_leaves_the_ros_graph(tmp_path: Path, peer: Peer) -> None:
     with running(CHAIN, tmp_path, planner=WELL):
         wait_until(lambda: "sensor" in peer.node.get_node_names(), "the node in the graph")
     wait_until(lambda: "sensor" not in peer.node.get_node_names(), "the node out of the graph")
@@ -68,12 +68,12 @@ def test_nothing_of_a_system_is_left_in_the_graph(tmp_path: Path, peer: Peer) ->
 @pytest.mark.parametrize(
     ("autostart", "state"), [(PrimaryState.INACTIVE, "inactive"), (None, "active")]
 )
-def test_as_far_as_the_plan_says(
+def test_the_bring_up_ends_in_the_autostart_state(
     tmp_path: Path, peer: Peer, autostart: PrimaryState | None, state: str
 ) -> None:
     with running(CHAIN, tmp_path, autostart=autostart, planner=WELL) as system:
         assert peer.state("/planning/planner") == state
-        assert system.told(BroughtUp)[0].active == (3 if state == "active" else 0)
+        assert system.reported(BroughtUp)[0].active == (3 if state == "active" else 0)
 
 
 @pytest.mark.parametrize(
@@ -100,10 +100,10 @@ def test_a_failing_bring_up_is_rolled_back_in_reverse(
     transition = "configure" if handler == "__init__" else handler.removeprefix("on_")
     assert outcome.exit_code == 1
     assert outcome.reason == "/planning/planner failed"
-    assert [(event.node, event.reason) for event in system.told(RollingBack)] == [
-        ("/planning/planner", f"it did not {transition}: {reason}")
+    assert [(event.node, event.reason) for event in system.reported(RollingBack)] == [
+        ("/planning/planner", f"{transition} failed: {reason}")
     ]
-    assert not system.told(BroughtUp)
+    assert not system.reported(BroughtUp)
     rolled_back = system.states()[system.states().index("/sensor finalized") - 2 :]
     assert rolled_back == [
         f"{n} finalized" for n in ("/control/motor", "/planning/planner", "/sensor")
@@ -113,19 +113,19 @@ def test_a_failing_bring_up_is_rolled_back_in_reverse(
         assert "/sensor active" in system.states()
 
 
-def test_a_module_that_cannot_be_imported_is_a_failure_like_any_other(tmp_path: Path) -> None:
-    module = "import not_to_be_found_anywhere"
+def test_a_behavior_that_cannot_be_imported_fails_the_bring_up(tmp_path: Path) -> None:
+    module = "import no_such_module"
     system = RunningSystem(system_of(CHAIN, tmp_path, planner=module), HostOptions(), None)
     assert system.end().exit_code == 1
-    assert "ModuleNotFoundError" in system.told(RollingBack)[0].reason
+    assert "ModuleNotFoundError" in system.reported(RollingBack)[0].reason
 
 
-def test_the_time_a_system_is_to_run(tmp_path: Path) -> None:
+def test_a_system_stops_after_its_run_time(tmp_path: Path) -> None:
     options = HostOptions(run_for_s=0.3)
     system = RunningSystem(system_of(CHAIN, tmp_path, planner=WELL), options, None)
     outcome = system.end()
-    assert (outcome.exit_code, outcome.reason) == (0, "0.3 s are over")
-    up, stopping = system.told(BroughtUp)[0], system.told(Stopping)[0]
+    assert (outcome.exit_code, outcome.reason) == (0, "--for elapsed")
+    up, stopping = system.reported(BroughtUp)[0], system.reported(Stopping)[0]
     assert 0.3 <= stopping.elapsed_s - up.elapsed_s < 3.0
 
 
@@ -148,40 +148,38 @@ nodes:
 
 
 @pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
-def test_a_callback_that_hangs_does_not_hold_up_the_end(
-    tmp_path: Path, peer: Peer, kind: str
-) -> None:
+def test_a_hanging_callback_does_not_delay_the_end(tmp_path: Path, peer: Peer, kind: str) -> None:
     text = HANGING.replace("KIND", kind)
     module = HANG.format(handler="on_tick")
     with running(text, tmp_path, options=HostOptions(), planner=module) as system:
         system.wait_for_log("hanging")
-        peer.call(Trigger, "/trigger")  # the other executor goes on
+        peer.call(Trigger, "/trigger")  # the other executor still works
         began_s = time.monotonic()
         outcome = system.stop()
         took_s = time.monotonic() - began_s
     assert took_s < end_limit_s()
     assert (outcome.exit_code, outcome.hung) == (1, True)
-    stuck = system.told(Stuck)[0]
-    assert (stuck.node, stuck.transition) == ("/planner", "deactivate")
+    stuck = system.reported(Stuck)[0]
+    assert (stuck.node, stuck.action) == ("/planner", "deactivate")
     assert "in on_tick" in stuck.stack
     assert "sleep(6.0)" in stuck.stack
     assert {node.node: node.state for node in outcome.nodes}["/sensor"] == "finalized"
 
 
-def test_a_transition_that_hangs_fails_the_bring_up(tmp_path: Path) -> None:
+def test_a_hanging_transition_fails_the_bring_up(tmp_path: Path) -> None:
     text = HANGING.replace("KIND", "events")
     module = HANG.format(handler="on_configure")
     options = HostOptions(transition_timeout_s=1.0)
     system = RunningSystem(system_of(text, tmp_path, planner=module), options, None)
     outcome = system.end()
     assert (outcome.exit_code, outcome.hung) == (1, True)
-    assert "in on_configure" in system.told(Stuck)[0].stack
-    assert system.told(RollingBack)[0].reason == "it did not configure: it is stuck"
+    assert "in on_configure" in system.reported(Stuck)[0].stack
+    assert system.reported(RollingBack)[0].reason == "configure failed: stuck"
     assert "/sensor finalized" in system.states()
 
 
-@pytest.mark.parametrize("hurry", [False, True])
-def test_a_handler_that_awaits_for_long_is_given_up(tmp_path: Path, hurry: bool) -> None:
+@pytest.mark.parametrize("urgent", [False, True])
+def test_a_slow_asynchronous_handler_is_canceled(tmp_path: Path, urgent: bool) -> None:
     module = """
     from composer.behavior import Behavior
 
@@ -190,26 +188,26 @@ def test_a_handler_that_awaits_for_long_is_given_up(tmp_path: Path, hurry: bool)
             self.log.info("slow")
             await self.clock.sleep(60.0)
     """
-    # Without the hurry it would be waited for more than half of that.
-    options = HostOptions(stop_within_s=10.0) if hurry else HostOptions()
+    # Without the second request, the handler gets more than half of that time.
+    options = HostOptions(stop_within_s=10.0) if urgent else HostOptions()
     with running(CHAIN, tmp_path, options=options, planner=module) as system:
         began_s = time.monotonic()
         system.host.stop("first")
-        asked_s = time.monotonic()
+        stopped_s = time.monotonic()
         system.wait_for_log("slow")
-        if hurry:
-            wait_until(lambda: time.monotonic() > asked_s + 0.15, "as long as a person takes")
+        if urgent:
+            wait_until(lambda: time.monotonic() > stopped_s + 0.15, "the time that a user takes")
             system.host.stop("second")
         outcome = system.end()
         took_s = time.monotonic() - began_s
-    assert took_s < (4.0 if hurry else end_limit_s())
+    assert took_s < (4.0 if urgent else end_limit_s())
     assert outcome.exit_code == 1
     assert not outcome.hung
-    assert system.told(Stuck)[0].node == "/planning/planner"
+    assert system.reported(Stuck)[0].node == "/planning/planner"
     assert "/control/motor inactive" in system.states()
 
 
-def test_a_refused_deactivation_is_told_and_ends_in_shutdown(tmp_path: Path) -> None:
+def test_a_refused_deactivation_is_reported_and_followed_by_shutdown(tmp_path: Path) -> None:
     module = """
     from composer.behavior import Behavior, TransitionFailed
 
@@ -219,12 +217,12 @@ def test_a_refused_deactivation_is_told_and_ends_in_shutdown(tmp_path: Path) -> 
     """
     with running(CHAIN, tmp_path, planner=module) as system:
         outcome = system.stop()
-    refused = system.told(NodeTransitionFailed)[0]
+    refused = system.reported(NodeTransitionFailed)[0]
     assert (refused.state, refused.reason) == ("active", "TransitionFailed: not now")
     assert [node.state for node in outcome.nodes] == ["finalized"] * 3
 
 
-def test_a_node_that_fails_at_run_time_is_told_of(tmp_path: Path, peer: Peer) -> None:
+def test_a_failure_in_an_external_transition_is_reported(tmp_path: Path, peer: Peer) -> None:
     module = """
     from composer.behavior import Behavior
 
@@ -235,12 +233,12 @@ def test_a_node_that_fails_at_run_time_is_told_of(tmp_path: Path, peer: Peer) ->
     with running(CHAIN, tmp_path, planner=module) as system:
         assert not peer.change("/planning/planner", "deactivate")
         assert peer.state("/planning/planner") == "unconfigured"
-        wait_until(lambda: system.told(NodeFailed), "the failure, before the end is asked for")
+        wait_until(lambda: system.reported(NodeFailed), "the failure, before the stop")
         assert system.stop().exit_code == 1
 
 
-def test_a_failure_that_nobody_came_to_deal_with_counts(tmp_path: Path, peer: Peer) -> None:
-    """The end is asked for while a command is carried out in which a node has failed."""
+def test_a_fault_that_was_not_handled_before_the_stop_counts(tmp_path: Path, peer: Peer) -> None:
+    """The stop is requested during a command in which a node has failed."""
     text = """
     system: both
     nodes:
@@ -265,13 +263,13 @@ def test_a_failure_that_nobody_came_to_deal_with_counts(tmp_path: Path, peer: Pe
         assert system.stop().exit_code == 1
 
 
-def test_who_listens_badly_does_not_disturb(tmp_path: Path) -> None:
+def test_a_failing_listener_does_not_affect_the_system(tmp_path: Path) -> None:
     system = RunningSystem(system_of(CHAIN, tmp_path, planner=WELL), HostOptions(), None)
-    wait_until(lambda: system.told(BroughtUp))
+    wait_until(lambda: system.reported(BroughtUp))
 
     def fail(_: object) -> None:
         raise BrokenPipeError
 
     system.host._reporter._listener = fail
     assert system.stop().exit_code == 0
-    assert not system.told(CallbackFailed)
+    assert not system.reported(CallbackFailed)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
 import traceback
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from typing import TypeAlias
@@ -98,39 +100,80 @@ class Log:
         self.write(LogLevel.FATAL, message)
 
 
-class ErrorLog:
-    """Takes the exceptions of user code: counts them, logs them, and lets the node go on.
+class ErrorLimit:
+    """Reports once when more than ``max_errors`` errors happen within ``window_s``. Thread-safe.
 
-    The first fault of a callback comes with its traceback; after that a callback that fails all
-    the time gets one line a second.
+    It counts only while it is not ``paused``, as it is until :meth:`start`.
+    """
+
+    def __init__(self, max_errors: int, window_s: float, report: Callable[[str], None]) -> None:
+        self._max_errors = max_errors
+        self._window_s = window_s
+        self._report = report
+        self._lock = threading.Lock()
+        self._times_s: deque[float] = deque(maxlen=max_errors + 1)
+        self._has_reported = False
+        self.paused = True
+
+    def start(self) -> None:
+        """Start to count from zero."""
+        with self._lock:
+            self._times_s.clear()
+            self._has_reported = False
+            self.paused = False
+
+    def count(self, now_s: float) -> None:
+        """Count an error; report it if it is one too many."""
+        with self._lock:
+            if self.paused or self._has_reported:
+                return
+            self._times_s.append(now_s)
+            is_full = len(self._times_s) > self._max_errors
+            self._has_reported = is_full and now_s - self._times_s[0] <= self._window_s
+            if not self._has_reported:
+                return
+        self._report(f"more than {self._max_errors} errors within {self._window_s:g} s")
+
+
+class ErrorLog:
+    """Counts and logs the errors of user code, which then continues.
+
+    The first error of a callback is logged with its traceback, later ones as one line a second.
     """
 
     def __init__(
-        self, log: Log, statistics: Statistics, report: Callable[[str, str], None]
+        self,
+        log: Log,
+        statistics: Statistics,
+        report: Callable[[str, str], None],
+        limit: ErrorLimit | None = None,
     ) -> None:
-        """``report(callback, text)`` is told of each fault that is logged."""
+        """Call ``report(callback, text)`` for each error that is logged."""
         self._log = log
         self._statistics = statistics
         self._report = report
-        self._silent_until_s: dict[str, float] = {}
-        self._unsaid: dict[str, int] = {}
+        self._limit = limit
+        self._quiet_until_s: dict[str, float] = {}
+        self._omitted: dict[str, int] = {}
 
     def exception(self, callback: str, error: BaseException) -> None:
         """Log that ``callback`` raised ``error``."""
         self.error(callback, describe(error), traceback_of(error))
 
     def error(self, callback: str, text: str, details: str = "") -> None:
-        """Log that ``callback`` did something wrong; ``details`` only the first time."""
+        """Log an error of ``callback``; ``details`` only the first time."""
         self._statistics.errors += 1
         now_s = time.monotonic()
-        silent_until_s = self._silent_until_s.get(callback)
-        if silent_until_s is not None and now_s < silent_until_s:
-            self._unsaid[callback] = self._unsaid.get(callback, 0) + 1
+        if self._limit is not None:
+            self._limit.count(now_s)
+        quiet_until_s = self._quiet_until_s.get(callback)
+        if quiet_until_s is not None and now_s < quiet_until_s:
+            self._omitted[callback] = self._omitted.get(callback, 0) + 1
             return
-        self._silent_until_s[callback] = now_s + _AGAIN_AFTER_S
-        unsaid = self._unsaid.pop(callback, 0)
-        times = f" ({unsaid} more since the last time)" if unsaid else ""
-        story = f"\n{details}" if details and silent_until_s is None else ""
+        self._quiet_until_s[callback] = now_s + _AGAIN_AFTER_S
+        omitted = self._omitted.pop(callback, 0)
+        times = f" ({omitted} more since the last message)" if omitted else ""
+        story = f"\n{details}" if details and quiet_until_s is None else ""
         self._log.error(f"{callback}: {text}{times}{story}")
         self._report(callback, text)
 

@@ -1,23 +1,24 @@
-"""The system's own node: what can be asked of the system as a whole, and how it is.
+"""The manager node of a system: its commands as services, and its status as topics.
 
-Its services are those of nav2's lifecycle manager as far as both have them (std_srvs/srv/Trigger):
-``startup``, ``pause``, ``resume``, ``reset``, ``shutdown`` and ``is_active``. It tells the state of
-every node on ``/diagnostics`` (REP 107) and, latched, on ``state``: on change, and while somebody
-listens each second and as soon as somebody does. What the callbacks of the nodes take it tells on
-``callbacks`` and ``/diagnostics``, while somebody listens.
+The services (std_srvs/srv/Trigger) are named as those of nav2's lifecycle manager: ``startup``,
+``pause``, ``resume``, ``reset``, ``shutdown`` and ``is_active``.
+
+The node publishes the states of all nodes on ``/diagnostics`` (REP 107) and, latched, on ``state``:
+on each change, and while there are subscriptions every second and for each new one. While there
+are subscriptions, it publishes callback timings on ``callbacks`` and ``/diagnostics``.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -26,7 +27,6 @@ from rclpy.qos import QoSProfile
 from rclpy.time_source import USE_SIM_TIME_NAME
 from std_srvs.srv import Trigger
 
-from composer.names import join
 from composer.runtime.clock.clock import Clock
 from composer.runtime.clock.sim_time import SimulatedTime
 from composer.runtime.executors.event_counts import AnnouncedEvents
@@ -34,9 +34,10 @@ from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.factory import log_exception
 from composer.runtime.executors.loop import Reply, Taken, never_called
 from composer.runtime.manager.proxy_services import ProxyServices
+from composer.runtime.manager.status_messages import status_message
 from composer.runtime.metrics.diagnostics import Figures, to_message
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
-from composer.runtime.node.node import RunningNode, Shared
+from composer.runtime.node.node import ProcessContext, RunningNode
 from composer.runtime.ros.manager_protocol import (
     CALLBACKS_QOS,
     CALLBACKS_TOPIC,
@@ -45,72 +46,60 @@ from composer.runtime.ros.manager_protocol import (
     STATE_QOS,
     STATE_TOPIC,
 )
-from composer.runtime.supervision.status import NodeStatus, Status, SystemStatus
+from composer.runtime.supervision.main_queue import Command
+from composer.runtime.supervision.status import Status
 
 COMMANDS = ("startup", "pause", "resume", "reset", "shutdown")
 _DIAGNOSTICS = "/diagnostics"
 _PERIOD_S = 1.0
-_OWN = 1  # the subscription that looks for rivals
-#: Many changes at once, as in a bring-up, become one message.
-_TOGETHER_S = 0.05
+_OWN_SUBSCRIPTIONS = 1  # for other instances of the system
+#: Changes within this time, as in a bring-up, become one message.
+_BATCH_S = 0.05
 _ENDS_WITHIN_S = 0.2
-_ANSWERS_ARRIVE_WITHIN_S = 0.15
-#: Composers that started within so short a time of each other are told apart by their names.
-_SAME_TIME_S = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class Command:
-    """Somebody wants something of the system. ``answer(success, message)`` is called once."""
-
-    what: str  # one of COMMANDS
-    answer: Callable[[bool, str], None]
-
-
-def manager_namespace(namespace: str, system: str) -> str:
-    """Return the namespace of the manager node of a system in ``namespace``."""
-    return join(namespace, system)
+_RESPONSES_ARRIVE_WITHIN_S = 0.15
+#: If two instances started within this time, the order of host names and process ids decides.
+_SAME_START_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class ManagerCallbacks:
-    """Who is behind a manager; all of it is called on the manager's loop.
+    """What a manager node calls, on its loop.
 
-    ``obey`` takes commands; ``measure`` works out rates; ``callbacks`` returns what these took,
-    ``chains`` how long data was on its way;
-    ``yield_to(host, pid)`` is called when a composer that runs the same system was there first;
-    ``members`` returns the nodes, by their full names.
+    ``on_command(command)`` receives the commands; ``on_other_instance(host, pid)`` is called if
+    another process has run the same system for longer; ``update_status()`` updates rates and
+    states; ``callbacks()`` and ``chains()`` return timings; ``nodes()`` returns the nodes by their
+    full names.
     """
 
-    obey: Callable[[Command], None]
-    measure: Callable[[], None]
+    on_command: Callable[[Command], None]
+    on_other_instance: Callable[[str, str], None]
+    update_status: Callable[[], None]
     callbacks: Callable[[], tuple[CallbackFigures, ...]]
     chains: Callable[[], tuple[ChainFigures, ...]]
-    yield_to: Callable[[str, str], None]
-    members: Callable[[], Mapping[str, RunningNode]]
+    nodes: Callable[[], Mapping[str, RunningNode]]
 
 
-class Manager:
-    """The node, and the loop of its own that serves it whatever the others do.
+class ManagerNode:
+    """The manager node, on a loop of its own, which no other node can block.
 
-    Its subscription of /clock serves all nodes, so that none of them can hold up time.
+    Its subscription to /clock serves all nodes, so that none of them can delay the time.
     """
 
     def __init__(
         self,
         namespace: str,
         status: Status,
-        office: ManagerCallbacks,
+        host: ManagerCallbacks,
         *,
         use_sim_time: bool = False,
     ) -> None:
-        """Join the ROS graph. With ``use_sim_time`` its stamps are the time of /clock."""
+        """Join the ROS graph. With ``use_sim_time``, stamps have the time of /clock."""
         self._status = status
-        self._office = office
+        self._host = host
         self._started_s = time.monotonic()
-        self._rivals: set[tuple[str, str]] = set()
+        self._other_instances: set[tuple[str, str]] = set()
         self._loop = EventLoop(NAME, log_exception)
-        self._due = threading.Lock()  # held while a message that tells the changes is due
+        self._publish_due = threading.Lock()  # held while a message with changes is due
         self._node = Node(
             NAME,
             namespace=namespace,
@@ -120,7 +109,7 @@ class Manager:
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
         simulated_time = SimulatedTime(self._node, self._loop)
-        self.shared = Shared(simulated_time, AnnouncedEvents(self._loop))
+        self.process_context = ProcessContext(simulated_time, AnnouncedEvents(self._loop))
         self._clock = Clock(self._node, self._loop, simulated_time)
         self._node.set_parameters([Parameter(USE_SIM_TIME_NAME, value=use_sim_time)])
         self._diagnostics = self._publisher(_DIAGNOSTICS, 10, self._publish)
@@ -128,29 +117,29 @@ class Manager:
         self._callbacks = self._publisher(
             f"~/{CALLBACKS_TOPIC}", CALLBACKS_QOS, self._publish_callbacks
         )
-        for what in COMMANDS:
-            self._serve(what, partial(self._take, what))
-        self._serve(IS_ACTIVE, self._tell_whether_active)
-        rivals = self._node.create_subscription(
-            DiagnosticArray, f"~/{STATE_TOPIC}", self._look_at_rival, STATE_QOS
+        for command in COMMANDS:
+            self._add_service(command, partial(self._on_command, command))
+        self._add_service(IS_ACTIVE, self._on_is_active)
+        instances = self._node.create_subscription(
+            DiagnosticArray, f"~/{STATE_TOPIC}", self._on_state, STATE_QOS
         )
-        self._loop.add_subscription(rivals, self._look_at_rival)
+        self._loop.add_subscription(instances, self._on_state)
         if any(node.left_to_manager for node in status.snapshot().nodes):
-            ProxyServices(self._node, self._loop, office.members, self._publish)
+            ProxyServices(self._node, self._loop, host.nodes, self._publish)
         self._loop.start()
         self._loop.call_every(_PERIOD_S, self._tick)
         self._loop.call_soon(self._publish)
         status.on_change(self._publish_soon)
 
     def retire(self, *, linger: bool) -> None:
-        """Tell the last state and fall silent; with ``linger`` an answer given just now arrives.
+        """Publish the last status and stop the loop; ``linger`` until responses have arrived.
 
-        With shared memory it would be gone with the node.
+        In shared memory, a response would disappear together with the node.
         """
         self._status.on_change(lambda: None)
         self._loop.call_soon(self._publish)
         if linger:
-            time.sleep(_ANSWERS_ARRIVE_WITHIN_S)
+            time.sleep(_RESPONSES_ARRIVE_WITHIN_S)
         self._loop.stop(_ENDS_WITHIN_S)
 
     def destroy(self) -> None:
@@ -158,153 +147,88 @@ class Manager:
         self._node.destroy_node()
 
     def _publisher(
-        self, name: str, profile: QoSProfile | int, tell: Callable[[], None]
+        self, name: str, profile: QoSProfile | int, publish: Callable[[], None]
     ) -> Publisher:
-        """Make a publisher; whoever begins to listen to it is told at once."""
+        """Create a publisher; call ``publish`` for each new subscription."""
         publisher = self._node.create_publisher(DiagnosticArray, name, profile)
-        listeners = 0
+        subscriptions = 0
 
-        def matched() -> None:
-            nonlocal listeners
-            before, listeners = listeners, publisher.get_subscription_count()
-            if listeners > before:
-                tell()
+        def on_matched() -> None:
+            nonlocal subscriptions
+            before, subscriptions = subscriptions, publisher.get_subscription_count()
+            if subscriptions > before:
+                publish()
 
-        with suppress(UnsupportedEventTypeError):  # then who listens is told within a second
+        with suppress(UnsupportedEventTypeError):  # then the next message follows within a second
             kind = QoSPublisherEventType.RCL_PUBLISHER_MATCHED
-            self.shared.events.watch(publisher.handle, kind, matched)
+            self.process_context.events.watch(publisher.handle, kind, on_matched)
         return publisher
 
-    def _serve(self, name: str, callback: Callable[[Any, Reply], None]) -> None:
+    def _add_service(self, name: str, callback: Callable[[Any, Reply], None]) -> None:
         service = self._node.create_service(Trigger, f"~/{name}", never_called)
         self._loop.add_service(service, callback)
 
-    def _take(self, what: str, _: Trigger.Request, reply: Reply) -> None:
+    def _on_command(self, name: str, _: Trigger.Request, reply: Reply) -> None:
         def answer(success: bool, message: str) -> None:
             self._loop.call_soon(lambda: reply(Trigger.Response(success=success, message=message)))
 
-        self._office.obey(Command(what, answer))
+        self._host.on_command(Command(name, answer))
 
-    def _tell_whether_active(self, _: Trigger.Request, reply: Reply) -> None:
+    def _on_is_active(self, _: Trigger.Request, reply: Reply) -> None:
         status = self._status.snapshot()
         reply(Trigger.Response(success=status.is_active, message=status.summary))
 
     def _tick(self) -> None:
-        self._office.measure()
-        heard = self._diagnostics.get_subscription_count()
-        if heard or self._state.get_subscription_count() > _OWN:
+        self._host.update_status()
+        is_external = self._state.get_subscription_count() > _OWN_SUBSCRIPTIONS
+        if is_external or self._diagnostics.get_subscription_count():
             self._publish()
         if self._callbacks.get_subscription_count():
             self._publish_callbacks()
 
     def _publish_callbacks(self) -> None:
-        figures: tuple[Figures, ...] = (*self._office.chains(), *self._office.callbacks())
+        figures: tuple[Figures, ...] = (
+            *self._host.chains(),
+            *self._host.callbacks(),
+        )
         message = to_message(self._status.without_nodes.system, figures)
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._callbacks.publish(message)
 
     def _publish_soon(self) -> None:
-        if self._due.acquire(blocking=False):
-            self._loop.call_later(_TOGETHER_S, self._publish_changes)
+        if self._publish_due.acquire(blocking=False):
+            self._loop.call_later(_BATCH_S, self._publish_changes)
 
     def _publish_changes(self) -> None:
-        self._due.release()
+        self._publish_due.release()
         self._publish()
 
-    def _look_at_rival(self, taken: Taken) -> None:
-        """See whether another composer runs the same system, and for how long."""
+    def _on_state(self, taken: Taken) -> None:
+        """Check whether another process has run the same system for longer."""
         message: DiagnosticArray = taken[0]
         values = {item.key: item.value for item in message.status[0].values}
-        rival = (values["host"], values["pid"])
+        other = (values["host"], values["pid"])
         status = self._status.without_nodes
         own = (status.host, str(status.pid))
-        if rival == own:
+        if other == own:
             return
-        if rival not in self._rivals:
-            self._rivals.add(rival)  # the first message was latched, who knows when
+        if other not in self._other_instances:
+            self._other_instances.add(other)  # its first message is latched, of unknown age
             return
         lead_s = float(values["uptime"]) - self._uptime_s
-        if lead_s > _SAME_TIME_S or (abs(lead_s) <= _SAME_TIME_S and rival < own):
-            self._office.yield_to(*rival)
+        if lead_s > _SAME_START_S or (abs(lead_s) <= _SAME_START_S and other < own):
+            self._host.on_other_instance(*other)
 
     @property
     def _uptime_s(self) -> float:
-        # Not the time of day, on which two hosts may disagree.
+        # Not the time of day, which may differ between hosts.
         return time.monotonic() - self._started_s
 
     def _publish(self) -> None:
-        message = diagnostics(self._status.snapshot(), self._uptime_s, self._office.chains())
+        message = status_message(self._status.snapshot(), self._uptime_s, self._host.chains())
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._state.publish(message)
         if self._diagnostics.get_subscription_count():
-            callbacks = to_message(self._status.without_nodes.system, self._office.callbacks())
+            callbacks = to_message(self._status.without_nodes.system, self._host.callbacks())
             message.status = [*message.status, *callbacks.status]
             self._diagnostics.publish(message)
-
-
-def diagnostics(
-    status: SystemStatus, uptime_s: float, chains: Iterable[ChainFigures]
-) -> DiagnosticArray:
-    """Return the state of a system and of its nodes; the system comes first."""
-    nodes = (_of_node(status.system, node) for node in status.nodes)
-    return DiagnosticArray(status=[_of_system(status, uptime_s, chains), *nodes])
-
-
-def _of_system(
-    status: SystemStatus, uptime_s: float, chains: Iterable[ChainFigures]
-) -> DiagnosticStatus:
-    level = DiagnosticStatus.OK
-    if status.failed:
-        level = DiagnosticStatus.ERROR
-    elif not status.is_active:
-        level = DiagnosticStatus.WARN
-    values = {
-        "activity": status.activity,
-        "active": str(status.is_active).lower(),
-        "host": status.host,
-        "pid": str(status.pid),
-        "started": f"{status.started_s:.3f}",
-        "uptime": f"{uptime_s:.3f}",
-    }
-    values |= {f"chain {chain.chain}": chain.text for chain in chains}
-    return _status(status.system, status.system, level, status.summary, values)
-
-
-def _of_node(system: str, node: NodeStatus) -> DiagnosticStatus:
-    level = DiagnosticStatus.OK
-    message = node.state
-    if node.held_down:
-        level = DiagnosticStatus.ERROR
-        message = f"{node.state}: {node.held_down}"
-    elif node.state != "active":
-        level = DiagnosticStatus.WARN
-    values = {
-        "state": node.state,
-        "wanted": node.wanted,
-        "left_to_manager": " ".join(node.left_to_manager),
-        "since": f"{node.since_s:.3f}",
-        "restarts": str(node.restarts),
-        "errors": str(node.errors),
-        "last_error": node.last_error,
-        "held_down": node.held_down,
-        "sent_hz": f"{node.sent_hz:.1f}",
-        "received_hz": f"{node.received_hz:.1f}",
-        "busy": f"{node.busy:.4f}",
-        "slowest": node.slowest,
-        "overruns": str(node.overruns),
-        "queue_drops": str(node.queue_drops),
-        "qos_events": " ".join(f"{name}={count}" for name, count in node.qos_events.items()),
-    }
-    return _status(f"{system}: {node.node}", system, level, message, values)
-
-
-def _status(
-    name: str, system: str, level: bytes, message: str, values: dict[str, str]
-) -> DiagnosticStatus:
-    return DiagnosticStatus(
-        level=level,
-        name=name,
-        message=message,
-        hardware_id=system,
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
-    )

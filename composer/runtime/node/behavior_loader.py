@@ -1,4 +1,4 @@
-"""Finds the Python class that a node names, and gives it what the composer promised."""
+"""Loads the behavior class of a node, and what the composer provides to behaviors."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.tasks import Future, sleep
 from composer.runtime.executors.user_code import calls_user_code, may_be_interrupted
 
-#: A behaviour's method, or None where it has none of that name.
+#: A method of a behavior.
 Method = Callable[..., Any]
 
-#: Nodes of several loops may want the same file at once; nobody is to get a half of it.
-_IMPORTING = threading.RLock()
+#: Held during imports: another loop must not see a module that is only half executed.
+_IMPORT_LOCK = threading.RLock()
 
 
 class BehaviorLoadError(Exception):
-    """A behaviour that cannot be loaded; the text says which and why."""
+    """A behavior cannot be loaded; the text says which one and why."""
 
 
 def behavior_class(reference: BehaviorReference) -> type[Any]:
@@ -68,20 +68,20 @@ def _module(reference: BehaviorReference) -> ModuleType:
 
 
 def _module_of_file(path: Path) -> ModuleType:
-    """Import a file under a name of its own, so that ``planner.py`` of two folders are two."""
-    mark = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
-    name = f"_composer_behavior_{mark}_{path.stem}"
-    with _IMPORTING:
-        return sys.modules.get(name) or _imported(name, path)
+    """Import a file under a unique name: two folders may each have a ``planner.py``."""
+    digest = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
+    name = f"_composer_behavior_{digest}_{path.stem}"
+    with _IMPORT_LOCK:
+        return sys.modules.get(name) or _import_file(name, path)
 
 
 @calls_user_code
-def _imported(name: str, path: Path) -> ModuleType:
+def _import_file(name: str, path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise BehaviorLoadError(f"{path} is not a Python file")
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses and pickles look their module up there
+    sys.modules[name] = module  # dataclasses and pickle look up their module there
     try:
         spec.loader.exec_module(module)
     except BaseException:
@@ -91,7 +91,7 @@ def _imported(name: str, path: Path) -> ModuleType:
 
 
 class Named:
-    """``self.publishers``, ``self.clients``: things of one kind, by name."""
+    """``self.publishers``, ``self.clients`` ...: items of one kind, by name."""
 
     __slots__ = ("__entries", "__kind")
 
@@ -105,7 +105,7 @@ class Named:
             return self.__entries[name]
         except KeyError:
             known = ", ".join(sorted(self.__entries)) or "none"
-            raise AttributeError(f"no {self.__kind} '{name}'; there is: {known}") from None
+            raise AttributeError(f"no {self.__kind} '{name}'; available: {known}") from None
 
     def __getitem__(self, name: str) -> Any:
         return self.__entries[name]
@@ -115,9 +115,9 @@ class Named:
 
 
 def named_ports(kind: str, entries: Mapping[str, Any]) -> Named:
-    """Return ports by name: there are never others, so that most are attributes, found at once."""
-    # A slot with a leading underscore might be of another name, or one of ours; and a port that has
-    # a topic of its own may be called as it likes, but attributes are identifiers.
+    """Return ports by name, most of them in slots: the set of ports never changes."""
+    # A name with a leading underscore may clash with an attribute of Named; a port with an explicit
+    # topic may have a name that is not an identifier.
     plain = tuple(name for name in entries if name.isidentifier() and not name.startswith("_"))
     ports = _ports_type(plain)(kind, entries)
     for name in plain:
@@ -127,33 +127,34 @@ def named_ports(kind: str, entries: Mapping[str, Any]) -> Named:
 
 @cache
 def _ports_type(names: tuple[str, ...]) -> type[Named]:
-    """Return the type of ports with these names: slots are in the object, a dict is far away."""
+    """Return a type with a slot for each name: slots are read faster than a dict."""
     return type("Ports", (Named,), {"__slots__": names})
 
 
 class NodeClock:
-    """A behaviour's ``clock``; see :class:`composer.behavior.Clock`."""
+    """A behavior's ``clock``; see :class:`composer.behavior.Clock`."""
 
-    def __init__(self, core: NodeContext, standby: NodeContext) -> None:
-        self._core = core
-        self._standby = standby
+    def __init__(self, context: NodeContext, always_on_context: NodeContext) -> None:
+        self._context = context
+        self._always_on_context = always_on_context
 
     def now(self) -> float:
         """Return the time in seconds."""
-        return self._core.now_s()
+        return self._context.now_s()
 
     def stamp(self) -> Any:
         """Return the time as a builtin_interfaces/msg/Time."""
-        return self._core.node.get_clock().now().to_msg()
+        return self._context.node.get_clock().now().to_msg()
 
     def sleep(self, seconds: float) -> Future[None]:
-        """Let other callbacks run for so long. Raises CallCancelled when the node leaves active.
+        """Let other callbacks run for ``seconds``.
 
-        While the node is inactive it is for handlers of ports that are always on.
+        Raises CallCancelled when the node leaves *active*. While the node is inactive, only
+        handlers of ports that are always on can sleep.
         """
-        for gate in (self._core.gate, self._standby.gate):
+        for gate in (self._context.gate, self._always_on_context.gate):
             if gate.waiting:
-                return gate.pending.hold(sleep(self._core.clock, max(0.0, seconds)))
-        ended: Future[None] = Future()
-        ended.set_exception(CallCancelled(self._core.gate.refusal))
-        return ended
+                return gate.pending.hold(sleep(self._context.clock, max(0.0, seconds)))
+        canceled: Future[None] = Future()
+        canceled.set_exception(CallCancelled(self._context.gate.refusal))
+        return canceled

@@ -1,4 +1,4 @@
-"""Builds the ports and timers of a node from its model and binds reactions and handlers."""
+"""Creates the ports and timers of a node from its model and binds reactions and handlers."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from composer.runtime.ros.messages import interface_class
 
 
 @dataclass(slots=True)
-class Assembly:
+class NodeEntities:
     """The entities of a configured node, by name, and its reactions to transitions.
 
-    ``standby`` is the core of what is always on; it differs from ``core`` in its gate.
+    ``always_on_context`` is for ports and timers that are always on; only its gate differs.
     """
 
-    core: NodeContext
-    standby: NodeContext
+    context: NodeContext
+    always_on_context: NodeContext
     publishers: dict[str, PublisherPort] = field(default_factory=dict)
     clients: dict[str, ClientPort] = field(default_factory=dict)
     action_clients: dict[str, ActionClientPort] = field(default_factory=dict)
@@ -43,12 +43,12 @@ class Assembly:
 
     @property
     def senders(self) -> dict[str, Sender]:
-        """What the node publishes with, by the name of the publisher."""
+        """What reactions and behaviors publish with, by the name of the publisher."""
         return {name: port.sender for name, port in self.publishers.items()}
 
     @property
     def ports(self) -> Iterator[RunningPort]:
-        """Everything: first what sends, then what takes, then what drives."""
+        """All ports: first those that send, then those that receive, then timers."""
         yield from self.publishers.values()
         yield from self.clients.values()
         yield from self.action_clients.values()
@@ -59,41 +59,41 @@ class Assembly:
 
     @property
     def gated(self) -> Iterator[RunningPort]:
-        """What is to stand still unless the node is active."""
+        """The ports and timers that work only while the node is active."""
         return (port for port in self.ports if port not in self.always_on)
 
-    def build(self, model: Node, behavior: object | None) -> None:
-        """Create the entities of ``model``. What was created is kept when one of them cannot be.
+    def create(self, model: Node, behavior: object | None) -> None:
+        """Create the entities of ``model``; if one fails, those created before it remain.
 
-        Raises MessageError, PeriodError, and what rclpy raises.
+        Raises MessageError, PeriodError, and exceptions of rclpy.
         """
-        self._tell_of_dds(model)
+        self._log_dds_ports(model)
         for port in model.ports_of(PortKind.PUBLISHER):
-            self.publishers[port.name.value] = PublisherPort(self._core_of(port), port)
+            self.publishers[port.name.value] = PublisherPort(self._context_of(port), port)
         for port in model.ports_of(PortKind.CLIENT):
-            self.clients[port.name.value] = ClientPort(self._core_of(port), port)
+            self.clients[port.name.value] = ClientPort(self._context_of(port), port)
         for port in model.ports_of(PortKind.ACTION_CLIENT):
-            self.action_clients[port.name.value] = ActionClientPort(self._core_of(port), port)
-        self._bind_answers(model)
+            self.action_clients[port.name.value] = ActionClientPort(self._context_of(port), port)
+        self._bind_responses(model)
         for port in model.ports_of(PortKind.SUBSCRIPTION, PortKind.SERVICE, PortKind.ACTION_SERVER):
             self._add_receiver(port, behavior)
         for timer in model.timers:
             name = timer.name.value
             reaction = self._reaction(timer.reaction)
             handler = method(behavior, f"on_{name}")
-            self.timers[name] = TimerPort(self._core_of(timer), timer, reaction, handler)
+            self.timers[name] = TimerPort(self._context_of(timer), timer, reaction, handler)
         for event, declared in model.reactions:
             self.transitions[event] = self._compile(declared)
         self.always_on.extend(self._always_on(model))
 
-    def _tell_of_dds(self, model: Node) -> None:
+    def _log_dds_ports(self, model: Node) -> None:
         for port in model.ports:
-            objection = self.core.delivery.objection(port)
+            objection = self.context.delivery.objection(port)
             if objection is not None:
-                self.core.log.debug(f"{port.kind} '{port.name}' uses DDS alone: {objection}")
+                self.context.log.debug(f"{port.kind} '{port.name}' uses DDS only: {objection}")
 
-    def _core_of(self, declared: Port | Timer) -> NodeContext:
-        return self.standby if declared.always_on else self.core
+    def _context_of(self, declared: Port | Timer) -> NodeContext:
+        return self.always_on_context if declared.always_on else self.context
 
     def _always_on(self, model: Node) -> Iterator[RunningPort]:
         sections: dict[PortKind, Mapping[str, RunningPort]] = {
@@ -111,7 +111,7 @@ class Assembly:
             if timer.always_on:
                 yield self.timers[timer.name.value]
 
-    def _bind_answers(self, model: Node) -> None:
+    def _bind_responses(self, model: Node) -> None:
         for port in model.ports_of(PortKind.CLIENT):
             for event, declared in port.reactions:
                 self.clients[port.name.value].react(event, self._compile(declared))
@@ -121,20 +121,20 @@ class Assembly:
 
     def _add_receiver(self, port: Port, behavior: object | None) -> None:
         name = port.name.value
-        core = self._core_of(port)
+        context = self._context_of(port)
         handler = method(behavior, f"on_{name}")
         match port.kind:
             case PortKind.SUBSCRIPTION:
                 reaction = self._reaction(port.reaction(Event.MESSAGE))
-                self.subscriptions[name] = SubscriptionPort(core, port, reaction, handler)
+                self.subscriptions[name] = SubscriptionPort(context, port, reaction, handler)
             case PortKind.SERVICE:
                 response_type = interface_class(port.interface.value).Response
                 reaction = self._reaction(port.reaction(Event.REQUEST), response_type)
-                self.services[name] = ServicePort(core, port, reaction, handler)
+                self.services[name] = ServicePort(context, port, reaction, handler)
             case PortKind.ACTION_SERVER:
                 reaction = self._reaction(port.reaction(Event.GOAL))
                 handlers = Handlers(handler, method(behavior, f"accept_{name}"))
-                self.action_servers[name] = ActionServerPort(core, port, reaction, handlers)
+                self.action_servers[name] = ActionServerPort(context, port, reaction, handlers)
 
     def _reaction(
         self, declared: Reaction | None, response_type: Any = None
@@ -143,4 +143,4 @@ class Assembly:
 
     def _compile(self, declared: Reaction, response_type: Any = None) -> RunningReaction:
         callers: dict[str, Caller] = {**self.clients, **self.action_clients}
-        return RunningReaction(self.core, declared, self.senders, callers, response_type)
+        return RunningReaction(self.context, declared, self.senders, callers, response_type)

@@ -1,8 +1,8 @@
-"""The lifecycle of one node, told truthfully.
+"""The lifecycle of one node: its state machine, services and transitions.
 
-rcl's own state machine holds the state, so every ROS 2 tool sees it. rclpy's handling of it is
-not used: there, one request with a wrong id ends the process, exceptions vanish, and a callback
-that returns nothing leaves the node between two states for ever.
+rcl's state machine holds the state, so every ROS 2 tool sees it. rclpy's layer above it is not
+used: there, one request with a wrong id ends the process, exceptions disappear, and a callback
+that returns None leaves the node in a transition state forever.
 """
 
 from __future__ import annotations
@@ -38,6 +38,8 @@ _NAMES = {
     Transition.TRANSITION_INACTIVE_SHUTDOWN: "shutdown",
     Transition.TRANSITION_ACTIVE_SHUTDOWN: "shutdown",
 }
+#: The label of the state that a node cannot leave.
+FINALIZED = "finalized"
 _Work: TypeAlias = Callable[[], Coroutine[Any, Any, None]]
 _SUCCESS, _FAILURE, _ERROR = "transition_success", "transition_failure", "transition_error"
 
@@ -45,46 +47,44 @@ _SUCCESS, _FAILURE, _ERROR = "transition_success", "transition_failure", "transi
 class Hooks(Protocol):
     """What a node does in its transitions.
 
-    Raising TransitionFailed refuses one; any other exception leads through error processing.
+    TransitionFailed refuses a transition; any other exception starts error processing.
     """
 
     async def on_transition(self, transition: str, start: str) -> None:
-        """Do the work of ``transition``, which began in the state ``start``."""
+        """Do the work of ``transition``, which started in the state ``start``."""
 
     async def on_error(self, cause: BaseException) -> None:
         """Clean up after a transition that raised ``cause``. Raising finalizes the node."""
 
-    def on_rest(self, state: str, transition: str, cause: BaseException | None) -> None:
-        """Take note that the node has come to rest in the primary state ``state``.
-
-        ``cause`` is what went wrong on the way, if anything did.
-        """
+    def on_transition_end(self, result: TransitionResult) -> None:
+        """Adapt to the primary state that a transition ended in."""
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
-    """What became of a requested transition. ``reason`` says why it did not succeed."""
+class TransitionResult:
+    """How a requested transition ended, in which state, and why it did not succeed."""
 
-    success: bool
+    transition: str
     state: str
+    success: bool
     reason: str = ""
 
 
 class TransitionTimeout(Exception):
-    """A handler that awaits did not come to an end in time."""
+    """An asynchronous handler of a transition did not finish in time."""
 
 
 class Lifecycle:
     """The state machine of one node, its services and its ``transition_event`` topic.
 
-    One transition at a time: requests from outside are refused while one is under way, those of
-    the host wait for their turn.
+    It runs one transition at a time. During a transition, ``change_state`` requests fail, while
+    :meth:`change` waits.
     """
 
     def __init__(
         self, core: NodeContext, hooks: Hooks, *, timeout_s: float, services: bool = True
     ) -> None:
-        """Join the graph; without ``services`` with the topic ``transition_event`` alone."""
+        """Join the graph. Without ``services`` there is only the topic ``transition_event``."""
         node = core.node
         loop = core.loop
         self._node = node
@@ -94,16 +94,16 @@ class Lifecycle:
         self._log = core.log
         self._timeout_s = timeout_s
         self._lock = threading.Lock()
-        self._under_way: Future[None] | None = None
+        self._current: Future[None] | None = None  # the transition that runs now
         self._last_state = ""
-        self._waiting: list[Reply] = []  # who asked for the transition under way, if from outside
+        self._pending_reply: list[Reply] = []  # of the change_state request for it, if any
         with node.handle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, services)
         self._services: list[Service] = []
         if services:
-            self._serve()
+            self._add_services()
 
-    def _serve(self) -> None:
+    def _add_services(self) -> None:
         self._services = _services(self._node, self._machine)
         callbacks: tuple[Callable[[Any, Reply], None], ...] = (
             self._on_change_state,
@@ -117,9 +117,9 @@ class Lifecycle:
 
     @property
     def state(self) -> str:
-        """The label of the state: a primary one, or a transition state such as *activating*.
+        """The label of the state: a primary state, or a transition state such as *activating*.
 
-        From any thread, also while the machine is destroyed; after that it is the last one.
+        Thread-safe. Once the machine is destroyed, this is its last state.
         """
         try:
             with self._machine:
@@ -128,69 +128,69 @@ class Lifecycle:
             return self._last_state
 
     @property
-    def legal(self) -> Mapping[str, int]:
-        """The transitions that may be requested now, with their ids."""
+    def available(self) -> Mapping[str, int]:
+        """The ids of the transitions that can be requested now, by name."""
         try:
             with self._machine:
-                available = self._machine.available_transitions
+                transitions = self._machine.available_transitions
         except InvalidHandle:
             return {}
         return {
             _NAMES[transition_id]: transition_id
-            for transition_id, *_ in available
+            for transition_id, *_ in transitions
             if transition_id in _NAMES
         }
 
-    async def change(self, transition: str) -> Result:
-        """Make the transition as soon as no other one is under way. Raises nothing."""
-        while (under_way := self._begin()) is not None:
-            await under_way
-        return await self._change(transition)
+    async def change(self, transition: str) -> TransitionResult:
+        """Run ``transition`` as soon as no other one runs. Raises nothing."""
+        while (current := self._acquire()) is not None:
+            await current
+        return await self._run(transition)
 
-    def give_up(self) -> None:
-        """Answer who asked for the transition under way: it hangs. May be called on any thread."""
+    def fail_request(self) -> None:
+        """Answer the pending ``change_state`` request: its transition hangs. Thread-safe."""
         self._answer(success=False)
 
     def destroy(self) -> None:
-        """Give back the services and the state machine, which holds the node."""
+        """Destroy the services and the state machine, which holds the node."""
         for service in self._services:
             self._loop.remove(service)
             self._node.destroy_service(service)
         self._last_state = self.state
         self._machine.destroy_when_not_in_use()
 
-    def _begin(self) -> Future[None] | None:
-        """Take the right to make a transition, or return the future of the one under way."""
+    def _acquire(self) -> Future[None] | None:
+        """Acquire the state machine, or return the future of the transition that runs."""
         with self._lock:
-            if self._under_way is None:
-                self._under_way = Future()
+            if self._current is None:
+                self._current = Future()
                 return None
-            return self._under_way
+            return self._current
 
-    def _finish(self) -> None:
+    def _release(self) -> None:
         with self._lock:
-            under_way, self._under_way = self._under_way, None
-        if under_way is not None:
-            under_way.set_result(None)
+            current, self._current = self._current, None
+        if current is not None:
+            current.set_result(None)
 
-    async def _change(self, transition: str) -> Result:
-        """Make a transition; the right to has been taken and is given back."""
+    async def _run(self, transition: str) -> TransitionResult:
+        """Run a transition; the state machine has been acquired, and is released at the end."""
         try:
             return await self._transition(transition)
         except (Cancelled, GeneratorExit):
             raise
         except BaseException as error:
-            # What user code raises is dealt with: this is rcl, whose context may have gone, or us.
-            self._log.error(f"'{transition}' came to nothing: {traceback_of(error)}")
-            return Result(success=False, state=self.state, reason=describe(error))
+            # Exceptions of user code do not get here: rcl failed, maybe without its context.
+            self._log.error(f"'{transition}' was not completed: {traceback_of(error)}")
+            return TransitionResult(transition, self.state, success=False, reason=describe(error))
         finally:
-            self._finish()
+            self._release()
 
-    async def _transition(self, transition: str) -> Result:
+    async def _transition(self, transition: str) -> TransitionResult:
         start = self.state
-        transition_id = self.legal.get(transition)
+        transition_id = self.available.get(transition)
         if transition_id is None:
-            return self._refused(transition, f"the node is {start}")
+            return self._refuse(transition, f"the node is {start}")
         self._machine.trigger_transition_by_id(transition_id, True)
         cause = await self._attempt(
             transition, partial(self._hooks.on_transition, transition, start)
@@ -202,18 +202,17 @@ class Lifecycle:
             await self._process_error(cause)
         else:
             self._machine.trigger_transition_by_label(_SUCCESS, True)
-        state = self.state
-        self._hooks.on_rest(state, transition, cause)
-        if cause is None:
-            return Result(success=True, state=state)
-        return Result(success=False, state=state, reason=describe(cause))
+        reason = "" if cause is None else describe(cause)
+        result = TransitionResult(transition, self.state, success=cause is None, reason=reason)
+        self._hooks.on_transition_end(result)
+        return result
 
     async def _attempt(self, transition: str, work: _Work) -> BaseException | None:
-        """Do the work of a transition; return what went wrong."""
+        """Do the work of a transition; return the exception that it raised."""
         try:
             await self._in_time(work)
         except TransitionFailed as failure:
-            self._log.warn(f"on_{transition} refuses: {failure}")
+            self._log.warn(f"on_{transition} refused the transition: {failure}")
             return failure
         except GeneratorExit:
             raise
@@ -234,22 +233,22 @@ class Lifecycle:
             self._machine.trigger_transition_by_label(_SUCCESS, True)
 
     async def _in_time(self, work: _Work) -> None:
-        """Do the work. Its time begins with its turn on the loop, which others may keep it from."""
-        turn: Future[None] = Future()
+        """Do the work. Its time starts when the loop starts it: other nodes may keep the loop."""
+        started: Future[None] = Future()
 
-        async def in_turn() -> None:
-            turn.set_result(None)
+        async def start() -> None:
+            started.set_result(None)
             await self._strand.wrap(work())
 
         try:
-            await within(self._loop, self._begun(in_turn()), self._timeout_s, after=turn)
+            await within(self._loop, self._run_task(start()), self._timeout_s, after=started)
         except TimeoutError as error:
-            raise TransitionTimeout(f"not through after {self._timeout_s:g} s") from error
+            raise TransitionTimeout(f"timed out after {self._timeout_s:g} s") from error
         except Cancelled as error:
             raise TransitionTimeout("the executor is stopping") from error
 
-    def _begun(self, work: Coroutine[Any, Any, None]) -> Future[None]:
-        """Have the loop do it. What interrupts a callback may come late, and strike here."""
+    def _run_task(self, work: Coroutine[Any, Any, None]) -> Future[None]:
+        """Run ``work`` on the loop, also when a late interrupt of a callback is raised here."""
         task: Future[None] | None = None
         try:
             task = self._loop.run_task(work)
@@ -258,30 +257,30 @@ class Lifecycle:
             if task is None:
                 work.close()
 
-    def _refused(self, transition: str, why: str) -> Result:
-        legal = ", ".join(self.legal) or "none"
-        reason = f"'{transition}' is refused: {why}; legal now: {legal}"
+    def _refuse(self, transition: str, why: str) -> TransitionResult:
+        available = ", ".join(self.available) or "none"
+        reason = f"refused '{transition}': {why}; available transitions: {available}"
         self._log.warn(reason)
-        return Result(success=False, state=self.state, reason=reason)
+        return TransitionResult(transition, self.state, success=False, reason=reason)
 
     # --- the services
 
     def _on_change_state(self, request: ChangeState.Request, reply: Reply) -> None:
-        if self._begin() is not None:
-            self._refused(_shown(request), f"the node is {self.state}")
+        if self._acquire() is not None:
+            self._refuse(_label(request), f"the node is {self.state}")
             reply(ChangeState.Response(success=False))
             return
-        self._loop.run_task(self._answer_change_state(_requested(request, self.legal), reply))
+        self._loop.run_task(self._answer_change_state(_requested(request, self.available), reply))
 
     async def _answer_change_state(self, transition: str, reply: Reply) -> None:
-        self._waiting.append(reply)
-        result = await self._change(transition)
+        self._pending_reply.append(reply)
+        result = await self._run(transition)
         self._answer(success=result.success)
 
     def _answer(self, *, success: bool) -> None:
-        """Answer once: popping is atomic."""
+        """Answer the pending request once: ``pop`` is atomic."""
         with suppress(IndexError):
-            self._waiting.pop()(ChangeState.Response(success=success))
+            self._pending_reply.pop()(ChangeState.Response(success=success))
 
     def _on_get_state(self, _: GetState.Request, reply: Reply) -> None:
         state_id, label = self._machine.current_state
@@ -298,20 +297,20 @@ class Lifecycle:
         reply(GetAvailableTransitions.Response(available_transitions=transitions))
 
 
-def _requested(request: ChangeState.Request, legal: Mapping[str, int]) -> str:
-    """Return the transition that is asked for: by label where there is one, else by id.
+def _requested(request: ChangeState.Request, available: Mapping[str, int]) -> str:
+    """Return the name of the requested transition: its label if there is one, else by its id.
 
-    An id says more than a name for shutdown, which has one for each state it starts from.
+    The id of a shutdown must match the state: there is one for each state it can start from.
     """
     if request.transition.label:
         return str(request.transition.label)
     name = _NAMES.get(request.transition.id)
-    if name is not None and legal.get(name) == request.transition.id:
+    if name is not None and available.get(name) == request.transition.id:
         return name
-    return _shown(request)
+    return _label(request)
 
 
-def _shown(request: ChangeState.Request) -> str:
+def _label(request: ChangeState.Request) -> str:
     return str(request.transition.label) or f"transition {request.transition.id}"
 
 
@@ -329,7 +328,7 @@ def _described(entry: tuple[int, str, int, str, int, str]) -> TransitionDescript
 
 
 def _services(node: Node, machine: Any) -> list[Service]:
-    """Wrap the services that rcl has made, so that the node owns and destroys them."""
+    """Wrap the services that rcl created, so that the node owns and destroys them."""
     group = node.default_callback_group
     services = [
         Service(handle, kind, handle.name, never_called, group, QoSProfile(**handle.qos))
@@ -342,7 +341,7 @@ def _services(node: Node, machine: Any) -> list[Service]:
         )
     ]
     for service in services:
-        check_is_valid_srv_type(service.srv_type)  # it loads the type support as well
+        check_is_valid_srv_type(service.srv_type)  # also loads the type support
         group.add_entity(service)
     node._services.extend(services)
     return services

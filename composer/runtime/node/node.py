@@ -1,7 +1,7 @@
-"""The generic lifecycle node: any node of any system, made from its model.
+"""The generic lifecycle node: any node of any system, created from its model.
 
-It builds its ports when it is configured, opens them when it is activated, and gives all of them
-back when it is cleaned up, shut down or has failed.
+It creates its ports when it is configured, opens them when it is activated, and destroys them when
+it is cleaned up, shut down, or has failed.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from time import monotonic
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node as RosNode
@@ -19,7 +19,7 @@ from composer.behavior import TransitionFailed
 from composer.model import BehaviorReference, Event, LogLevel, Node, PeriodError
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.log import ErrorLog, Log, Write, describe
+from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log, describe
 from composer.runtime.callbacks.mutation_check import MutationCheck, SeenMessages
 from composer.runtime.clock.clock import Clock
 from composer.runtime.clock.sim_time import SimulatedTime
@@ -39,9 +39,9 @@ from composer.runtime.node.behavior_loader import (
     method,
     named_ports,
 )
-from composer.runtime.node.entities import Assembly
-from composer.runtime.node.lifecycle import Lifecycle, Result
-from composer.runtime.node.parameters import Parameters
+from composer.runtime.node.entities import NodeEntities
+from composer.runtime.node.lifecycle import FINALIZED, Lifecycle, TransitionResult
+from composer.runtime.node.parameters import NodeParameters
 from composer.runtime.node.ros_node import make_ros_node
 from composer.runtime.ports.port import RunningPort
 
@@ -56,12 +56,12 @@ _EVENTS = {
 
 
 class WrongReturn(Exception):
-    """A lifecycle handler returned something that says neither yes nor no."""
+    """A lifecycle handler returned something other than None, True or False."""
 
 
 @dataclass(frozen=True, slots=True)
-class Shared:
-    """What serves all nodes of the process, on the loop of the manager."""
+class ProcessContext:
+    """What all nodes of the process share, on the loop of the manager node."""
 
     simulated_time: SimulatedTime
     events: AnnouncedEvents
@@ -71,62 +71,67 @@ class Shared:
 class NodeOptions:
     """How a node is run.
 
-    ``delivery`` is where its ports meet those of the nodes beside it, ``chains`` are those of the
-    system, ``shared`` is what there is once in the process;
-    ``seen_messages`` is what all of them remember when changes of messages are looked for;
-    ``parallel`` is true when its loop has several threads.
+    ``delivery`` connects its ports with those of the other nodes of the process; ``chains`` are
+    those of the system; ``seen_messages`` is set if messages are checked for changes by callbacks;
+    ``parallel`` is true if its loop has several threads; ``system_is_up`` is false during the
+    bring-up, when errors do not count as faults: some nodes wait for others.
     """
 
     delivery: Delivery
     chains: Chains
-    shared: Shared
+    process: ProcessContext
     seen_messages: SeenMessages | None = None
     parallel: bool = False
     log_level: LogLevel = LogLevel.INFO
     transition_timeout_s: float = 10.0
+    system_is_up: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Listener:
-    """Who is told what a node does.
+class NodeListener(Protocol):
+    """Receives what a node reports, on the threads of the node's loop. It must not block."""
 
-    ``on_rest(transition, state, cause)``: a transition has ended, and ``cause`` is what went wrong
-    with it, if anything did; ``on_fault(callback, text)``: user code failed; ``write_log(level,
-    logger, message)``: a line for the log.
-    """
+    def on_transition_end(self, result: TransitionResult) -> None:
+        """Receive the end of a transition."""
 
-    on_rest: Callable[[str, str, BaseException | None], None]
-    on_fault: Callable[[str, str], None]
-    write_log: Write
+    def on_error(self, callback: str, text: str) -> None:
+        """Receive an error of user code, at most once a second for each callback."""
+
+    def on_error_limit(self, text: str) -> None:
+        """Receive that the node has exceeded its ``max_errors``, once per activation."""
+
+    def write_log(self, level: LogLevel, logger: str, message: str) -> None:
+        """Receive a line of the log."""
 
 
 class RunningNode:
-    """One node of a running system. To be created before its loop is started, or on it."""
+    """One node of a running system. Create it before its loop is started, or on the loop."""
 
     def __init__(
         self,
         model: Node,
         loop: Loop,
         options: NodeOptions,
-        listener: Listener,
+        listener: NodeListener,
         statistics: Statistics | None = None,
     ) -> None:
-        """Join the ROS graph, unconfigured; count on from ``statistics``. Raises ParameterError."""
+        """Join the ROS graph, unconfigured; continue ``statistics``. Raises ParameterError."""
         self.model = model
         self.loop = loop
         self.activations = 0  # how often it became active
-        #: When, by ``time.monotonic()``, the work of its last transition began.
-        self.turn_s = 0.0
+        #: When, by ``time.monotonic()``, the work of its last transition started.
+        self.transition_started_s = 0.0
         self.statistics = Statistics() if statistics is None else statistics
         self._listener = listener
+        self._system_is_up = options.system_is_up
         self._ros = make_ros_node(model)
         offers = model.introspection
         log = Log(self._ros, options.log_level, listener.write_log, rosout=offers.rosout)
-        error_log = ErrorLog(log, self.statistics, listener.on_fault)
-        self._core = NodeContext(
+        self._error_limit = _error_limit(model, listener)
+        error_log = ErrorLog(log, self.statistics, listener.on_error, self._error_limit)
+        self._context = NodeContext(
             node=self._ros,
             loop=loop,
-            clock=Clock(self._ros, loop, options.shared.simulated_time, self._time_switched),
+            clock=Clock(self._ros, loop, options.process.simulated_time, self._time_switched),
             gate=Gate(model.full_name, Pending(loop.call_later)),
             strand=SerialStrand(loop.call_soon) if options.parallel else InlineStrand(),
             log=log,
@@ -135,22 +140,22 @@ class RunningNode:
             names={"parameters": {}, "state": {}, "node": model.full_name},
             delivery=options.delivery,
             chains=options.chains.of(model),
-            events=options.shared.events,
+            events=options.process.events,
             mutations=_mutation_check(options.seen_messages, error_log),
         )
-        # What is always on has a gate of its own and shares the rest.
-        standby_gate = Gate(model.full_name, Pending(loop.call_later))
-        self._standby = replace(self._core, gate=standby_gate)
+        # Ports that are always on have a gate of their own and share the rest.
+        always_on_gate = Gate(model.full_name, Pending(loop.call_later))
+        self._always_on_context = replace(self._context, gate=always_on_gate)
         self._behavior: Any = None
-        self._assembly = Assembly(self._core, self._standby)
-        parameters = Parameters(
-            self._ros, model.parameters, objection=self._objection, changed=self._changed
+        self._entities = NodeEntities(self._context, self._always_on_context)
+        parameters = NodeParameters(
+            self._ros, model.parameters, check=self._check_timers, changed=self._parameters_changed
         )
-        self._core.names["parameters"] = parameters.values
+        self._context.names["parameters"] = parameters.values
         self._keeps_entities = False
         loop.add_node(self._ros)
-        self._lifecycle = Lifecycle(
-            self._core,
+        self.lifecycle = Lifecycle(
+            self._context,
             self,
             timeout_s=options.transition_timeout_s,
             services=offers.lifecycle_services,
@@ -164,156 +169,163 @@ class RunningNode:
     @property
     def state(self) -> str:
         """The label of the lifecycle state, as ROS tools see it."""
-        return self._lifecycle.state
+        return self.lifecycle.state
 
     def now_s(self) -> float:
         """Return the node's time in seconds."""
-        return self._core.now_s()
+        return self._context.now_s()
 
-    def stand_still(self) -> None:
-        """Let nothing through, from any thread: it has failed.
+    def count_errors(self) -> None:
+        """Count errors as faults from now on: the system is up. Thread-safe."""
+        self._system_is_up = True
+        if self._error_limit is not None and self.state == "active":
+            self._error_limit.start()
 
-        It may say a last word in the next transition, and takes in what comes once that is over.
+    def block(self) -> None:
+        """Block all ports of a failed node until its next transition. Thread-safe.
+
+        In that transition the node can send last messages; it receives again after it.
         """
-        for core in self.cores:
-            core.gate.hush()
-
-    def give_up(self) -> None:
-        """Tell who waits for a transition that it hangs, from any thread."""
-        self._lifecycle.give_up()
+        if self._error_limit is not None:
+            self._error_limit.paused = True  # it has failed already
+        for context in self.contexts:
+            context.gate.hush()
 
     def sent(self, publisher: str) -> int:
-        """Return how many messages went through a publisher."""
+        """Return how many messages a publisher has sent."""
         return self.statistics.publisher(publisher).count
 
     @property
-    def cores(self) -> tuple[NodeContext, NodeContext]:
-        """What its parts share: those that stand still unless it is active, and the others."""
-        return self._core, self._standby
+    def contexts(self) -> tuple[NodeContext, NodeContext]:
+        """What its parts share: those that are gated by *active*, and those that are always on."""
+        return self._context, self._always_on_context
 
-    @property
-    def legal(self) -> Mapping[str, int]:
-        """The transitions that the state allows."""
-        return self._lifecycle.legal
+    def query(self, function: Callable[[RosNode], T]) -> Future[T]:
+        """Return the result of ``function(ROS node)``, which is called on the node's loop."""
 
-    async def change(self, transition: str) -> Result:
-        """Make a transition when no other one is under way. Raises nothing."""
-        return await self._lifecycle.change(transition)
+        async def call() -> T:
+            return function(self._ros)
 
-    def ask(self, question: Callable[[RosNode], T]) -> Future[T]:
-        """Return the answer to a question about the ROS node, which is put on its loop."""
-
-        async def answer() -> T:
-            return question(self._ros)
-
-        return self.loop.run_task(answer())
+        return self.loop.run_task(call())
 
     def keep_entities(self) -> None:
-        """Keep ports when they are to be given back: the process ends, and they go with it."""
+        """Do not destroy ports from now on: the end of the process does."""
         self._keeps_entities = True
 
     def destroy(self) -> None:
-        """Give back everything, whatever the state. No transition can be made afterwards."""
+        """Destroy the node in any state. No transition is possible afterwards."""
         self._release()
-        self._lifecycle.destroy()
-        self._core.clock.close()
+        self.lifecycle.destroy()
+        self._context.clock.close()
         self.loop.remove_node(self._ros)
         self._ros.destroy_node()
 
-    # --- what the lifecycle asks for
+    # --- hooks of the lifecycle
 
     async def on_transition(self, transition: str, start: str) -> None:
         """Do the work of ``transition``; raise what goes wrong."""
-        self._take_turn()
-        gate = self._core.gate
-        gate.state = self._standby.gate.state = self.state
+        self._begin_transition()
+        gate = self._context.gate
+        gate.state = self._always_on_context.gate.state = self.state
         gate.waiting = True
         if transition == "configure":
             self._configure()
-            self._standby.gate.outgoing = True
+            self._always_on_context.gate.outgoing = True
         elif transition == "activate":
             gate.outgoing = True
         elif start == "active":
-            await self._leave(self._core, self._assembly.gated)
+            await self._deactivate(self._context, self._entities.gated)
         if transition in ("cleanup", "shutdown"):
-            await self._leave(self._standby, self._assembly.always_on)
-        await self._tell(transition)
+            await self._deactivate(self._always_on_context, self._entities.always_on)
+        await self._call_handler(transition)
 
     async def on_error(self, cause: BaseException) -> None:
-        """Let the behaviour know why the node failed."""
-        self._take_turn()
-        await self._leave(self._core, self._assembly.gated)
-        await self._leave(self._standby, self._assembly.always_on)
-        self._core.gate.waiting = True
-        await self._tell("error", cause)
+        """Call the behavior's ``on_error``."""
+        self._begin_transition()
+        await self._deactivate(self._context, self._entities.gated)
+        await self._deactivate(self._always_on_context, self._entities.always_on)
+        self._context.gate.waiting = True
+        await self._call_handler("error", cause)
 
-    def on_rest(self, state: str, transition: str, cause: BaseException | None) -> None:
-        """Open or shut everything as ``state`` wants it."""
-        if state == "active" and transition == "activate":
-            self.activations += 1
-        _rest(self._core.gate, state, state == "active", self._assembly.gated)
-        living = state in ("inactive", "active")
-        _rest(self._standby.gate, state, living, self._assembly.always_on)
-        if state in ("unconfigured", "finalized"):
+    def on_transition_end(self, result: TransitionResult) -> None:
+        """Open or close the gates for the new state, and report it."""
+        state = result.state
+        if state == "active":
+            self._resume_error_limit(restart=result.transition == "activate")
+            self.activations += result.transition == "activate"
+        _settle(self._context.gate, state, state == "active", self._entities.gated)
+        is_configured = state in ("inactive", "active")
+        _settle(self._always_on_context.gate, state, is_configured, self._entities.always_on)
+        if state in ("unconfigured", FINALIZED):
             self._release()
-        self._listener.on_rest(transition, state, cause)
+        self._listener.on_transition_end(result)
 
     # --- transitions
 
-    def _take_turn(self) -> None:
-        self.turn_s = monotonic()
-        for core in self.cores:
-            core.gate.end_hush()
+    def _begin_transition(self) -> None:
+        self.transition_started_s = monotonic()
+        if self._error_limit is not None:
+            self._error_limit.paused = True
+        for context in self.contexts:
+            context.gate.end_hush()
+
+    def _resume_error_limit(self, *, restart: bool) -> None:
+        if self._error_limit is None or not self._system_is_up:
+            return
+        if restart:
+            self._error_limit.start()
+        else:  # a refused transition
+            self._error_limit.paused = False
 
     def _configure(self) -> None:
-        """Make the behaviour and the entities anew, so that nothing of an earlier life is left."""
-        state = self._core.names["state"]
+        """Create a new behavior and new entities, so that nothing of an earlier life remains."""
+        state = self._context.names["state"]
         state.clear()
         state.update({name.value: deepcopy(value) for name, value in self.model.state})
-        # A callback group never forgets what was in it, so an old one is not used again.
-        self._core.group = self._standby.group = MutuallyExclusiveCallbackGroup()
-        self._assembly = Assembly(self._core, self._standby)
+        # A callback group never forgets its entities, so an old one is not used again.
+        self._context.group = self._always_on_context.group = MutuallyExclusiveCallbackGroup()
+        self._entities = NodeEntities(self._context, self._always_on_context)
         reference = self.model.behavior
         behavior = None if reference is None else self._make_behavior(reference)
         try:
-            self._assembly.build(self.model, behavior)
+            self._entities.create(self.model, behavior)
         finally:
             if behavior is not None:
-                self._equip(behavior, self._assembly)
-                self._behavior = behavior  # whole: nobody meets it without what was promised
+                self._set_attributes(behavior, self._entities)
+                self._behavior = behavior  # only now that it is complete
 
     @calls_user_code
     def _make_behavior(self, reference: BehaviorReference) -> Any:
         return behavior_class(reference)()
 
-    def _equip(self, behavior: Any, assembly: Assembly) -> None:
+    def _set_attributes(self, behavior: Any, entities: NodeEntities) -> None:
         behavior.name = self.full_name
-        behavior.log = self._core.log
-        behavior.clock = NodeClock(self._core, self._standby)
-        behavior.parameters = Named("parameter", self._core.names["parameters"])
-        behavior.publishers = named_ports("publisher", assembly.senders)
-        behavior.clients = named_ports("client", assembly.clients)
-        behavior.action_clients = named_ports("action client", assembly.action_clients)
-        self._use(behavior, behavior.publishers, *assembly.senders.values())
+        behavior.log = self._context.log
+        behavior.clock = NodeClock(self._context, self._always_on_context)
+        behavior.parameters = Named("parameter", self._context.names["parameters"])
+        behavior.publishers = named_ports("publisher", entities.senders)
+        behavior.clients = named_ports("client", entities.clients)
+        behavior.action_clients = named_ports("action client", entities.action_clients)
+        self._set_used(behavior, behavior.publishers, *entities.senders.values())
 
-    def _use(self, *used: object) -> None:
-        self._core.used = self._standby.used = used
+    def _set_used(self, *used: object) -> None:
+        self._context.used = self._always_on_context.used = used
 
-    async def _leave(self, core: NodeContext, ports: Iterable[RunningPort]) -> None:
-        """Take nothing more in, end what is under way. Publishers stay open for a last word."""
-        core.gate.incoming = False
-        left = tuple(ports)
-        for port in left:
+    async def _deactivate(self, context: NodeContext, ports: Iterable[RunningPort]) -> None:
+        """Stop receiving and cancel what is pending. Publishers stay open for last messages."""
+        context.gate.incoming = False
+        deactivated = tuple(ports)
+        for port in deactivated:
             port.deactivate()
-        core.gate.end_pending()
-        for server in self._assembly.action_servers.values():
-            if server in left:
+        context.gate.end_pending()
+        for server in self._entities.action_servers.values():
+            if server in deactivated:
                 await server.drain()
 
     @calls_user_code
-    async def _tell(self, transition: str, *arguments: Any) -> None:
+    async def _call_handler(self, transition: str, *arguments: Any) -> None:
         event = _EVENTS.get(transition)
-        reaction = self._assembly.transitions.get(event) if event is not None else None
+        reaction = self._entities.transitions.get(event) if event is not None else None
         if reaction is not None:
             reaction.run()
         name = f"on_{transition}"
@@ -323,8 +335,8 @@ class RunningNode:
         result = handler(*arguments)
         if isinstance(result, Awaitable):
             result = await result
-        if self._core.mutations is not None:
-            self._core.mutations.look(name)
+        if self._context.mutations is not None:
+            self._context.mutations.look(name)
         if result is None or result is True:
             return
         if result is False:
@@ -332,29 +344,29 @@ class RunningNode:
         raise WrongReturn(f"{name} returned {result!r:.80}; None and True mean done, False refused")
 
     def _release(self) -> None:
-        self._core.cancel_tasks()
+        self._context.cancel_tasks()
         if self._keeps_entities:
             return
-        for port in reversed(tuple(self._assembly.ports)):
+        for port in reversed(tuple(self._entities.ports)):
             try:
                 port.destroy()
             except Exception as error:
-                self._core.log.error(f"cannot destroy {type(port).__name__}: {describe(error)}")
-        self._assembly = Assembly(self._core, self._standby)
+                self._context.log.error(f"cannot destroy {type(port).__name__}: {describe(error)}")
+        self._entities = NodeEntities(self._context, self._always_on_context)
         self._behavior = None
-        self._use()
+        self._set_used()
 
     # --- parameters
 
     def _time_switched(self) -> None:
-        self._core.strand.post(self._follow_clock)
+        self._context.strand.post(self._follow_clock)
 
     def _follow_clock(self) -> None:
-        for timer in self._assembly.timers.values():
+        for timer in self._entities.timers.values():
             timer.follow_clock()
 
-    def _objection(self, values: Mapping[str, Any]) -> str | None:
-        """Return why a timer could not go on with the new parameter values, or None."""
+    def _check_timers(self, values: Mapping[str, Any]) -> str | None:
+        """Return why a timer cannot use the new parameter values, or None."""
         for timer in self.model.timers:
             try:
                 timer.period.seconds(values)
@@ -362,21 +374,21 @@ class RunningNode:
                 return f"timer '{timer.name}': {error}"
         return None
 
-    def _changed(self, changes: Mapping[str, Any]) -> None:
-        self._core.strand.post(lambda: self._follow_parameters(changes))
+    def _parameters_changed(self, changes: Mapping[str, Any]) -> None:
+        self._context.strand.post(lambda: self._follow_parameters(changes))
 
     def _follow_parameters(self, changes: Mapping[str, Any]) -> None:
-        for timer in self._assembly.timers.values():
+        for timer in self._entities.timers.values():
             timer.follow_parameters()
         handler = method(self._behavior, "on_parameters")
         if handler is not None:
-            rest = self._core.call("on_parameters", handler, changes)
+            rest = self._context.call("on_parameters", handler, changes)
             if rest is not None:
-                self._core.spawn(self._core.strand.wrap(rest))
+                self._context.spawn(self._context.strand.wrap(rest))
 
 
-def _rest(gate: Gate, state: str, is_open: bool, ports: Iterable[RunningPort]) -> None:
-    """Let a gate, and the ports behind it, rest in ``state``."""
+def _settle(gate: Gate, state: str, is_open: bool, ports: Iterable[RunningPort]) -> None:
+    """Open or close a gate, and the ports behind it, in the primary state ``state``."""
     gate.state = state
     if is_open:
         gate.open()
@@ -386,6 +398,15 @@ def _rest(gate: Gate, state: str, is_open: bool, ports: Iterable[RunningPort]) -
     for port in ports:
         port.deactivate()
     gate.close()
+
+
+def _error_limit(model: Node, listener: NodeListener) -> ErrorLimit | None:
+    supervision = model.supervision
+    max_errors = supervision.watch.max_errors
+    if max_errors is None:
+        return None
+    window_s = supervision.restart.window_ms / 1000.0
+    return ErrorLimit(max_errors.value, window_s, listener.on_error_limit)
 
 
 def _mutation_check(seen: SeenMessages | None, error_log: ErrorLog) -> MutationCheck | None:

@@ -1,4 +1,4 @@
-"""A node's parameters: declared to ROS with all that is known of them, checked when they change."""
+"""A node's parameters: declared with descriptors, and checked when they change."""
 
 from __future__ import annotations
 
@@ -32,70 +32,70 @@ _ROS_TYPES = {
 _LOWEST_INTEGER, _HIGHEST_INTEGER = -(2**63), 2**63 - 1
 _HIGHEST_DOUBLE = sys.float_info.max
 
-#: Says why the new values cannot be, or None when they can.
-Objection = Callable[[Mapping[str, Any]], str | None]
-#: Told of the values that have changed.
+#: Returns why the new values are not possible, or None.
+Check = Callable[[Mapping[str, Any]], str | None]
+#: Receives the values that have changed.
 Changed = Callable[[Mapping[str, Any]], None]
 
 
 class ParameterError(Exception):
-    """A parameter that cannot be declared with the value it has."""
+    """A parameter cannot be declared with its value."""
 
 
-class Parameters:
-    """The parameters of one node. ``values`` is kept up to date in place."""
+class NodeParameters:
+    """The parameters of one node. ``values`` is updated in place."""
 
     def __init__(
         self,
         node: Node,
         declared: Iterable[Parameter],
         *,
-        objection: Objection,
+        check: Check,
         changed: Changed,
     ) -> None:
-        """Declare them. Raises ParameterError."""
+        """Declare the parameters. Raises ParameterError."""
         self._declared = {parameter.name.value: parameter for parameter in declared}
-        self._objection = objection
+        self._check_values = check
         self._changed = changed
         self.values: dict[str, Any] = {}
         for parameter in self._declared.values():
             self.values[parameter.name.value] = _declare(node, parameter)
-        node.add_pre_set_parameters_callback(self._widen)
+        node.add_pre_set_parameters_callback(self._convert_integers)
         node.add_on_set_parameters_callback(self._check)
-        node.add_post_set_parameters_callback(self._take_over)
+        node.add_post_set_parameters_callback(self._apply)
 
-    def _widen(self, changes: list[RosParameter]) -> list[RosParameter]:
-        """Let an integer be given where a floating-point number is declared."""
-        return [self._widened(change) for change in changes]
+    def _convert_integers(self, changes: list[RosParameter]) -> list[RosParameter]:
+        """Accept integers for parameters that are declared as floating-point numbers."""
+        return [self._converted(change) for change in changes]
 
-    def _widened(self, change: RosParameter) -> RosParameter:
+    def _converted(self, change: RosParameter) -> RosParameter:
         parameter = self._declared.get(change.name)
         if parameter is None:
             return change
-        wanted = _ROS_TYPES[ParameterType(parameter.type.value)]
-        if wanted is RosParameter.Type.DOUBLE and change.type_ is RosParameter.Type.INTEGER:
-            return RosParameter(change.name, wanted, float(change.value))
+        declared = _ROS_TYPES[ParameterType(parameter.type.value)]
+        if declared is RosParameter.Type.DOUBLE and change.type_ is RosParameter.Type.INTEGER:
+            return RosParameter(change.name, declared, float(change.value))
         if (
-            wanted is RosParameter.Type.DOUBLE_ARRAY
+            declared is RosParameter.Type.DOUBLE_ARRAY
             and change.type_ is RosParameter.Type.INTEGER_ARRAY
         ):
-            return RosParameter(change.name, wanted, [float(item) for item in change.value])
+            return RosParameter(change.name, declared, [float(item) for item in change.value])
         return change
 
     def _check(self, changes: list[RosParameter]) -> SetParametersResult:
         values = {change.name: _plain(change.value) for change in changes}
-        reason = self._first_objection(values)
+        reason = self._first_problem(values)
         return SetParametersResult(successful=reason is None, reason=reason or "")
 
-    def _first_objection(self, values: Mapping[str, Any]) -> str | None:
+    def _first_problem(self, values: Mapping[str, Any]) -> str | None:
         for name, value in values.items():
             parameter = self._declared.get(name)
             reason = _out_of_bounds(parameter, value) if parameter is not None else None
             if reason is not None:
                 return reason
-        return self._objection({**self.values, **values})
+        return self._check_values({**self.values, **values})
 
-    def _take_over(self, changes: list[RosParameter]) -> None:
+    def _apply(self, changes: list[RosParameter]) -> None:
         values = {
             change.name: _plain(change.value) for change in changes if change.name in self._declared
         }
@@ -112,7 +112,7 @@ def _declare(node: Node, parameter: Parameter) -> Any:
     reason = _out_of_bounds(parameter, value)
     if reason is not None:
         raise ParameterError(reason)
-    if node.has_parameter(name):  # use_sim_time, which every node has
+    if node.has_parameter(name):  # rclpy declares use_sim_time for every node
         node.undeclare_parameter(name)
     try:
         node.declare_parameter(name, value, _descriptor(parameter))
@@ -122,7 +122,7 @@ def _declare(node: Node, parameter: Parameter) -> Any:
 
 
 def _ros_value(parameter: Parameter) -> Any:
-    """Return the value as rclpy wants it for the declared type."""
+    """Return the value as rclpy expects it for the declared type."""
     value: Any = parameter.value.value if parameter.value is not None else None
     match parameter.type.value:
         case ParameterType.DOUBLE if isinstance(value, int) and not isinstance(value, bool):
@@ -136,7 +136,7 @@ def _ros_value(parameter: Parameter) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return the value of a ROS parameter as behaviours and expressions get it."""
+    """Return the value of a ROS parameter as behaviors and expressions see it."""
     if isinstance(value, (str, bytes)) or not hasattr(value, "__iter__"):
         return value
     items = list(value)
@@ -156,7 +156,7 @@ def _descriptor(parameter: Parameter) -> ParameterDescriptor:
     )
     if parameter.minimum is None and parameter.maximum is None:
         return descriptor
-    # rclpy counts steps from the lower bound: without one it has nothing to count from.
+    # rclpy counts steps from the lower bound, so a step needs one.
     step = 0.0 if parameter.step is None or parameter.minimum is None else parameter.step.value
     low = None if parameter.minimum is None else parameter.minimum.value
     high = None if parameter.maximum is None else parameter.maximum.value
@@ -186,9 +186,9 @@ def _constraints(parameter: Parameter) -> str:
 
 
 def _out_of_bounds(parameter: Parameter, value: Any) -> str | None:
-    """Return what is wrong with ``value`` beyond its type, or None.
+    """Return why ``value`` violates the choices, minimum or maximum, or None.
 
-    For arrays, minimum and maximum hold for every item.
+    For arrays, minimum and maximum apply to every item.
     """
     name = parameter.name.value
     choices = parameter.choices

@@ -1,4 +1,4 @@
-"""The ROS node under a running node, with no more endpoints for tools than it is to have."""
+"""The ROS node of a running node, with only the endpoints for tools that its model declares."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from rclpy.parameter import Parameter
 from composer.model import Node
 
 
-class _Nobody:
-    """Stands where rclpy wants the publisher of /parameter_events."""
+class _NoPublisher:
+    """Replaces the publisher of /parameter_events."""
 
     def publish(self, _: ParameterEvent) -> None:
-        """Tell nobody."""
+        """Do nothing."""
 
 
-class _QuietNode(RosNode):
-    """A node that tells nobody of its parameters. rclpy has an option for the services only."""
+class _NodeWithoutParameterEvents(RosNode):
+    """A node that does not publish /parameter_events, for which rclpy has no option."""
 
     def create_publisher(self, msg_type: Any, topic: str, *args: Any, **kwargs: Any) -> Any:
-        """Create a publisher, but none of /parameter_events, as rclpy does for each node."""
+        """Create a publisher, except for the one of /parameter_events that rclpy creates."""
         if msg_type is ParameterEvent:
-            return _Nobody()
+            return _NoPublisher()
         return super().create_publisher(msg_type, topic, *args, **kwargs)
 
 
 def make_ros_node(model: Node) -> RosNode:
-    """Return the ROS node of ``model``, in the graph. Its log has a publisher of its own."""
+    """Return a ROS node for ``model``. It does not publish /rosout: the node's log does."""
     offers = model.introspection
-    kind = RosNode if offers.parameters else _QuietNode
+    kind = RosNode if offers.parameters else _NodeWithoutParameterEvents
     overrides = []
     if not offers.type_description:
         overrides.append(Parameter("start_type_description_service", value=False))

@@ -1,8 +1,8 @@
-"""The DDS participants on this computer by their sockets: how many there are, what ours can hold.
+"""The DDS participants on this host, by their sockets.
 
-Discovery tells nobody when it is complete. But each participant holds a UDP port that says its
-domain and its index there, and Linux tells which ports are held: as long as there are more of them
-than participants that were met, somebody is missing. See 'Discovery traffic' in the DDSI-RTPS
+DDS does not report when discovery is complete. But each participant holds a UDP port, whose number
+follows from its domain and index, and Linux lists the ports in use: as long as there are more of
+them than discovered participants, some are missing. See 'Discovery traffic' in the DDSI-RTPS
 specification, 9.6.1.1, for the numbers.
 """
 
@@ -18,14 +18,14 @@ _BASE_PORT = 7400
 _PORTS_OF_A_DOMAIN = 250
 _FIRST_PARTICIPANT = 10
 _PORTS_OF_A_PARTICIPANT = 2
-#: Enough for what some thousands of endpoints announce; Linux gives less where it may not be more.
-_ROOM_BYTES = 4_194_304
+#: Enough for announcements of some thousands of endpoints; Linux may limit it to less.
+_RECEIVE_BUFFER_BYTES = 4_194_304
 
 
 def count_participants(domain_id: int, table: Path = _TABLE) -> int:
-    """Return how many participants of a domain hold a port here, this process included.
+    """Return the number of participants of a domain on this host, including this process.
 
-    0 where nobody tells, as on other systems than Linux.
+    0 if unknown, as on systems other than Linux.
     """
     try:
         rows = table.read_text(encoding="ascii").splitlines()[1:]
@@ -38,22 +38,24 @@ def count_participants(domain_id: int, table: Path = _TABLE) -> int:
 
 
 def enlarge_receive_buffers() -> None:
-    """Let the UDP sockets of this process hold all that others announce to it at once.
+    """Enlarge the receive buffers of the UDP sockets of this process.
 
-    By default they hold some 80 packets. A system of three nodes announces its endpoints with more,
-    within a millisecond, and what finds no room is announced again up to a second later.
+    By default they hold about 80 packets. A system of three nodes announces its endpoints with more
+    within a millisecond, and those that do not fit are announced again up to a second later.
     """
     for number in _open_sockets():
         try:
-            with socket.socket(fileno=os.dup(number)) as end:
-                if (end.family, end.type) == (socket.AF_INET, socket.SOCK_DGRAM):
-                    end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _ROOM_BYTES)
-        except OSError:  # closed meanwhile
+            with socket.socket(fileno=os.dup(number)) as udp_socket:
+                if (udp_socket.family, udp_socket.type) == (socket.AF_INET, socket.SOCK_DGRAM):
+                    udp_socket.setsockopt(
+                        socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES
+                    )
+        except OSError:  # closed in the meantime
             continue
 
 
 def _open_sockets() -> list[int]:
-    """Return the numbers of the sockets that are open in this process."""
+    """Return the file descriptors of the open sockets of this process."""
     folder = Path("/proc/self/fd")
     if not folder.is_dir():
         return []

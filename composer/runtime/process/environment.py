@@ -1,7 +1,7 @@
-"""What ROS finds when it starts: checked and put in order before.
+"""Checks and completes the environment variables that ROS reads when it starts.
 
-rclpy starts without complaint with a domain id of -1 or a discovery range nobody knows, and runs
-unsecured where security was asked for and is not there. We do not.
+rclpy accepts a domain id of -1 and unknown discovery ranges without an error, and runs unsecured if
+security is enabled but not available. Here, these are errors.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ CONSOLE_FORMAT = "[{severity}] [{name}] {message}"
 
 
 def check_environment(environment: Mapping[str, str]) -> None:
-    """Look at everything ROS will read. Raises StartRefused."""
+    """Check everything that ROS will read. Raises StartRefused."""
     for refusal in refusals(environment):
         raise refusal
 
 
 def refusals(environment: Mapping[str, str]) -> Iterator[StartRefused]:
-    """Yield every reason why the environment does not allow a start."""
+    """Yield each reason why the environment does not allow a start."""
     for check in _CHECKS:
         try:
             check(environment)
@@ -39,7 +39,7 @@ def refusals(environment: Mapping[str, str]) -> Iterator[StartRefused]:
 
 
 def log_folder(environment: Mapping[str, str]) -> Path | None:
-    """Return where ROS writes its logs; None where nothing says what is at home.
+    """Return the folder that ROS writes its logs to; None without a home folder.
 
     See https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Logging.html.
     """
@@ -53,19 +53,17 @@ def log_folder(environment: Mapping[str, str]) -> Path | None:
 
 
 def complete_environment(environment: MutableMapping[str, str]) -> None:
-    """Fill in what rclpy from PyPI leaves unset, and the format of log lines."""
+    """Set the variables that rclpy from PyPI leaves unset, and the format of log lines."""
     if Path(sys.prefix, "share", "ament_index").is_dir():
         environment.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     environment.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", CONSOLE_FORMAT)
 
 
 def prepare_environment() -> None:
-    """Check and complete the environment of this process, and what killed ones left to it.
+    """Check and complete the environment, and remove incomplete shared memory.
 
-    Raises StartRefused.
-
-    To be called before rclpy is imported: with a middleware that is not there, the import ends
-    the process.
+    Raises StartRefused. Call it before rclpy is imported: the import ends the process if the
+    middleware does not exist.
     """
     complete_environment(os.environ)
     use_discovery_profile(os.environ)
@@ -79,7 +77,7 @@ def _check_domain_id(environment: Mapping[str, str]) -> None:
         return
     if not (text.isascii() and text.isdigit() and int(text) <= HIGHEST_DOMAIN_ID):
         raise StartRefused(
-            f"ROS_DOMAIN_ID is '{text}', which is no domain id",
+            f"ROS_DOMAIN_ID is '{text}', which is not a domain id",
             f"set it to a number from 0 to {HIGHEST_DOMAIN_ID} (up to 101 is safe everywhere)",
         )
 
@@ -87,25 +85,25 @@ def _check_domain_id(environment: Mapping[str, str]) -> None:
 def _check_discovery_range(environment: Mapping[str, str]) -> None:
     text = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "")
     if text and text not in DISCOVERY_RANGES:
-        close = nearest(text, DISCOVERY_RANGES)
-        meant = f"did you mean {close}? " if close else ""
+        similar = nearest(text, DISCOVERY_RANGES)
+        hint = f"did you mean {similar}? " if similar else ""
         raise StartRefused(
-            f"ROS_AUTOMATIC_DISCOVERY_RANGE is '{text}', which is no discovery range",
-            f"{meant}valid values: {', '.join(DISCOVERY_RANGES)}",
+            f"ROS_AUTOMATIC_DISCOVERY_RANGE is '{text}', which is not a discovery range",
+            f"{hint}valid values: {', '.join(DISCOVERY_RANGES)}",
         )
 
 
 def _check_security(environment: Mapping[str, str]) -> None:
-    """Refuse to run unsecured when security is asked for.
+    """Refuse to run unsecured if security is enabled.
 
-    rcl asks for it when ROS_SECURITY_ENABLE is exactly ``true``; with the strategy Permissive it
-    goes on without when the middleware has none.
+    For rcl, it is if ROS_SECURITY_ENABLE is exactly ``true``; with the strategy Permissive, rcl
+    continues without security if the middleware does not have it.
     """
     if environment.get("ROS_SECURITY_ENABLE") != "true":
         return
     if not environment.get("ROS_SECURITY_KEYSTORE"):
         raise StartRefused(
-            "ROS_SECURITY_ENABLE is true, but ROS_SECURITY_KEYSTORE names no keystore",
+            "ROS_SECURITY_ENABLE is true, but ROS_SECURITY_KEYSTORE is not set",
             "create one with 'ros2 security create_keystore', or unset ROS_SECURITY_ENABLE",
         )
     if environment.get("ROS_SECURITY_STRATEGY") != "Enforce":
@@ -117,8 +115,8 @@ def _check_security(environment: Mapping[str, str]) -> None:
 
 
 def _check_middleware(environment: Mapping[str, str]) -> None:
-    """Refuse a middleware that no ROS prefix has; unset, rmw_implementation takes what is there."""
-    wanted = environment.get("RMW_IMPLEMENTATION")
+    """Refuse a middleware that is not installed. By default, rmw_implementation selects one."""
+    selected = environment.get("RMW_IMPLEMENTATION")
     prefixes = environment.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     index = "share/ament_index/resource_index/rmw_typesupport"
     known = {
@@ -127,23 +125,23 @@ def _check_middleware(environment: Mapping[str, str]) -> None:
         if prefix and Path(prefix, index).is_dir()
         for entry in Path(prefix, index).iterdir()
     } - {"rmw_implementation"}
-    if wanted and known and wanted not in known:
+    if selected and known and selected not in known:
         raise StartRefused(
-            f"RMW_IMPLEMENTATION is '{wanted}', which is not installed",
+            f"RMW_IMPLEMENTATION is '{selected}', which is not installed",
             f"installed: {', '.join(sorted(known))}",
         )
 
 
 def _check_log_folder(environment: Mapping[str, str]) -> None:
-    """Refuse to start where rcl would: without a folder for its logs."""
+    """Refuse to start without a writable folder for logs, as rcl does."""
     folder = log_folder(environment)
     if folder is None:
         return
-    there = next((place for place in (folder, *folder.parents) if os.path.lexists(place)), folder)
-    if not os.access(there, os.W_OK | os.X_OK):
+    ancestors = (path for path in (folder, *folder.parents) if os.path.lexists(path))
+    if not os.access(next(ancestors, folder), os.W_OK | os.X_OK):
         raise StartRefused(
-            f"ROS writes its logs to '{folder}', and that is not possible",
-            "set ROS_LOG_DIR to a folder that can be written",
+            f"ROS cannot write its logs to '{folder}'",
+            "set ROS_LOG_DIR to a writable folder",
         )
 
 

@@ -1,9 +1,8 @@
-"""How a process leaves the ROS graph in one go, right before it ends.
+"""Fast exit: leave the ROS graph with all nodes at once, right before the process ends.
 
-Fast DDS looks through all endpoints of a participant for each one that is destroyed: 300 nodes take
-half a minute one by one. Others need none of that. They need to hear that the participant is gone,
-which Fast DDS says itself when it is told to stop: that takes a second for the same 300 nodes.
-What remains in memory goes with the process.
+Fast DDS searches all endpoints of a participant for each endpoint that it destroys, so 300 nodes
+take half a minute one by one. Other processes only need to know that the participant is gone, which
+Fast DDS announces when it is stopped: that takes a second for the same 300 nodes.
 """
 
 from __future__ import annotations
@@ -18,15 +17,15 @@ _LIBRARY = "libfastrtps.so"
 
 
 def supports_fast_exit() -> bool:
-    """Say whether the middleware in use has a way to leave in one go."""
+    """Return whether the middleware in use supports a fast exit."""
     return _stop_all() is not None
 
 
 def leave_ros_graph() -> bool:
-    """Take every participant of this process out of the ROS graph; false where that cannot be.
+    """Remove all participants of this process from the ROS graph; return False if unsupported.
 
-    Afterwards nothing of ROS may be touched, not even destroyed: ``os._exit`` has to follow. No
-    thread may be using ROS meanwhile.
+    No thread may use ROS meanwhile, and nothing of ROS may be used or destroyed afterwards:
+    ``os._exit`` has to follow.
     """
     stop_all = _stop_all()
     if stop_all is None:
@@ -36,7 +35,7 @@ def leave_ros_graph() -> bool:
 
 
 def _stop_all() -> Callable[[], object] | None:
-    """Return Fast DDS's function, of the library that this process has loaded."""
+    """Return the function of the Fast DDS library that this process has loaded."""
     for line in Path("/proc/self/maps").read_text(encoding="utf-8").splitlines():
         path = line.partition("/")[2]
         if path.rpartition("/")[2].startswith(_LIBRARY):

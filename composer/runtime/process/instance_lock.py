@@ -1,7 +1,7 @@
-"""One composer a system and domain: whoever comes second is refused, and told who was first.
+"""The instance lock: one process per system and ROS domain.
 
-On one host a lock file says so before anything starts. Lock files of other hosts cannot be seen:
-there the manager node finds its rival (:mod:`composer.runtime.manager.node`).
+On one host, a lock file ensures that before anything starts. Processes on other hosts are detected
+by the manager node (:mod:`composer.runtime.manager.node`).
 """
 
 from __future__ import annotations
@@ -23,21 +23,19 @@ _SUFFIX = ".lock"
 
 
 def already_running(name: str, host: str, pid: str | int) -> StartRefused:
-    """Return why the system cannot be run. ``name`` is its manager's namespace."""
+    """Return the error for a system that runs already. ``name`` is its manager's namespace."""
     system = name if name.count("/") > 1 else name.removeprefix("/")
     return StartRefused(
-        f"system '{system}' runs already in ROS domain {_domain()}: host {host}, process {pid}",
-        f"end it with 'compose down {system}', or run this one with another ROS_DOMAIN_ID or"
-        " --namespace",
+        f"system '{system}' already runs in ROS domain {_domain()}: host {host}, process {pid}",
+        f"stop it with 'compose down {system}', or set another ROS_DOMAIN_ID or --namespace",
     )
 
 
 @contextmanager
 def hold_instance_lock(name: str) -> Iterator[None]:
-    """Hold the right to run the system for the length of a ``with`` block.
+    """Hold the instance lock of a system; ``name`` is the namespace of its manager.
 
-    ``name`` is the namespace of its manager. The operating system gives the right back however the
-    process ends. Raises StartRefused.
+    The operating system releases it however the process ends. Raises StartRefused.
     """
     lock = _open(name)
     if lock is None:
@@ -57,11 +55,11 @@ def hold_instance_lock(name: str) -> Iterator[None]:
 
 
 def local_systems() -> dict[str, str]:
-    """Return the systems that composers of this user run on this host and in this domain.
+    """Return the process ids of this user's systems on this host and in this domain, by name.
 
-    By name, with the process. Their nodes may take seconds to be discovered; this is known at once.
+    Unlike discovery, which may take seconds, this is complete at once.
     """
-    found: dict[str, str] = {}
+    pids: dict[str, str] = {}
     prefix = f"{_domain()}."
     for path in sorted(_folder().glob(f"{prefix}*{_SUFFIX}")):
         name = "/" + path.name.removeprefix(prefix).removesuffix(_SUFFIX).replace(".", "/")
@@ -72,8 +70,8 @@ def local_systems() -> dict[str, str]:
             try:
                 fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
             except BlockingIOError:
-                found[name] = _holder(lock)[1]
-    return found
+                pids[name] = _holder(lock)[1]
+    return pids
 
 
 def _domain() -> str:
@@ -86,9 +84,9 @@ def _folder() -> Path:
 
 
 def _open(name: str) -> TextIO | None:
-    """Open the lock file of a system; None where there can be none: then there is no such right."""
+    """Open the lock file of a system; None if there cannot be one, and thus no lock."""
     if os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "OFF":
-        return None  # nobody sees anybody
+        return None  # no process discovers another one
     folder = _folder()
     path = folder / f"{_domain()}{name.replace('/', '.')}{_SUFFIX}"
     try:
@@ -102,9 +100,9 @@ def _open(name: str) -> TextIO | None:
 
 
 def _holder(lock: TextIO) -> tuple[str, str]:
-    """Return the host and the process that a lock file names."""
+    """Return the host and the process id in a lock file."""
     try:
         holder = json.load(lock)
         return str(holder["host"]), str(holder["pid"])
     except (ValueError, KeyError, TypeError):
-        return socket.gethostname(), "unknown"  # it is writing just now
+        return socket.gethostname(), "unknown"  # it is being written

@@ -1,9 +1,8 @@
-"""What killed processes leave in shared memory, as far as it would hang the next one.
+"""Removes shared memory of killed processes that would hang new ones.
 
-Fast DDS opens the shared memory segment of a port or makes it, whichever comes first. Where a
-process was killed between making and filling it, everybody who opens it later waits for ever, in
-the constructor of the participant: before any node is there, and deaf to signals. See
-boost/interprocess/detail/managed_open_or_create_impl.hpp for what is waited for.
+Fast DDS opens or creates a shared memory segment for each port. If a process is killed between
+creating and filling it, every later participant that opens it waits in its constructor forever,
+without reacting to signals: see boost/interprocess/detail/managed_open_or_create_impl.hpp.
 """
 
 from __future__ import annotations
@@ -15,48 +14,48 @@ from pathlib import Path
 from composer.runtime.process import StartRefused
 
 #: Where Linux keeps it; shm_open(3).
-SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - nothing is put there
+SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - nothing is written there
 _PORT = re.compile(r"fastrtps_port\d+")
-#: The first word of a segment: uninitialized, initializing. What is ready has a 2 there.
+#: The first word of a segment: uninitialized, initializing. 2 means initialized.
 _UNFINISHED = (0, 1)
 _WORD_BYTES = 4
-#: Filling a segment takes microseconds: who has not done it by then never will.
-_PATIENCE_S = 1.0
-_STEP_S = 0.02
+#: Filling a segment takes microseconds: after this time, its process was killed.
+_FILLED_WITHIN_S = 1.0
+_POLL_S = 0.02
 
 
 def remove_incomplete_ports(folder: Path = SHARED_MEMORY) -> None:
     """Remove the segments that would hang a new participant.
 
-    Waits for those that somebody may be filling just now, a second at most. Raises StartRefused
-    when one belongs to somebody else.
+    Wait up to a second for segments that a process may be filling. Raises StartRefused if one
+    belongs to another user.
     """
     if not folder.is_dir():
         return
     for path in sorted(folder.iterdir()):
-        if _PORT.fullmatch(path.name) and _stays_half_made(path):
+        if _PORT.fullmatch(path.name) and _stays_incomplete(path):
             _remove(path)
 
 
-def _stays_half_made(path: Path) -> bool:
-    until_s = time.monotonic() + _PATIENCE_S
-    while (made_s := _half_made_since_s(path)) is not None:
-        # The clock of files may jump: nobody waits longer than by the steady one.
-        if time.time() - made_s >= _PATIENCE_S or time.monotonic() >= until_s:
+def _stays_incomplete(path: Path) -> bool:
+    until_s = time.monotonic() + _FILLED_WITHIN_S
+    while (changed_s := _incomplete_since_s(path)) is not None:
+        # The clock of files may jump; the monotonic one limits the wait.
+        if time.time() - changed_s >= _FILLED_WITHIN_S or time.monotonic() >= until_s:
             return True
-        time.sleep(_STEP_S)
+        time.sleep(_POLL_S)
     return False
 
 
-def _half_made_since_s(path: Path) -> float | None:
-    """Return when the segment was last changed if it is half-made, else None."""
+def _incomplete_since_s(path: Path) -> float | None:
+    """Return when the segment was last changed if it is incomplete, else None."""
     try:
         with path.open("rb") as segment:
             word = segment.read(_WORD_BYTES)
         if len(word) < _WORD_BYTES or int.from_bytes(word, "little") in _UNFINISHED:
             return path.stat().st_mtime
     except OSError:
-        pass  # gone, or not ours to read: then it is not ours to open either
+        pass  # removed, or not readable: then a participant cannot open it either
     return None
 
 
@@ -65,7 +64,6 @@ def _remove(path: Path) -> None:
         path.unlink(missing_ok=True)
     except OSError as problem:
         raise StartRefused(
-            f"shared memory of Fast DDS is half-made: {path} ({problem.strerror})",
-            f"a process was killed while it made it, and whoever opens it hangs: remove {path}, or"
-            " use another ROS_DOMAIN_ID",
+            f"cannot remove incomplete shared memory of Fast DDS: {path} ({problem.strerror})",
+            f"it would hang this process; remove {path}, or set another ROS_DOMAIN_ID",
         ) from problem

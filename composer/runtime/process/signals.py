@@ -15,18 +15,17 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @contextmanager
 def stop_signals(
-    stop: Callable[[str], None], bell: WakeupPipe, *, ends_process: bool
+    stop: Callable[[str], None], wakeup: WakeupPipe, *, ends_process: bool
 ) -> Iterator[None]:
     """Call ``stop(name of the signal)`` for each signal, on the main thread.
 
-    That happens between two instructions of Python. The main thread therefore sleeps only until
-    ``bell`` rings, or for a limited time.
+    Python calls signal handlers between two instructions of the main thread, which therefore must
+    sleep only in ``wakeup.wait()``. ``stop`` must not acquire a lock that the main thread may hold.
 
-    Where the process ends after this, as the signals ask for, they are ignored from then on: it is
-    to say how the run was, and not to die of an impatient Ctrl-C.
+    If the process ends after this (``ends_process``), signals are ignored from then on, so that
+    another Ctrl-C does not kill the process before it has reported the outcome.
 
-    ``stop`` must not take a lock that the main thread may hold. On any other thread than the main
-    one nothing is installed, since Python allows it there alone.
+    Python installs signal handlers on the main thread only; on other threads this does nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -36,10 +35,10 @@ def stop_signals(
         stop(signal.Signals(number).name)
 
     before = {number: signal.signal(number, handle) for number in _SIGNALS}
-    rung_before = signal.set_wakeup_fd(bell.fd, warn_on_full_buffer=False)
+    fd_before = signal.set_wakeup_fd(wakeup.fd, warn_on_full_buffer=False)
     try:
         yield
     finally:
-        signal.set_wakeup_fd(rung_before)
+        signal.set_wakeup_fd(fd_before)
         for number, handler in before.items():
             signal.signal(number, signal.SIG_IGN if ends_process else handler)

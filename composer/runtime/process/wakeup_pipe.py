@@ -1,4 +1,4 @@
-"""Sleeping until somebody rings: another thread, or a signal."""
+"""A pipe that wakes a sleeping thread, from another thread or from a signal handler."""
 
 from __future__ import annotations
 
@@ -9,41 +9,39 @@ import time
 from contextlib import suppress
 
 _MILLISECONDS = 1000
-_LONGEST_MS = 2**31 - 1  # more cannot be slept at once: 24 days
-_MANY = 65536
+_LONGEST_MS = 2**31 - 1  # the longest timeout of poll(2): 24 days
+_READ_BYTES = 65536
 
 
 class WakeupPipe:
-    """A ring that comes before the wait ends it, too.
+    """Wakes the current wait, or the next one.
 
-    Waiting on a lock does not do: a signal that comes just before the lock is waited for does not
-    end the wait, and its handler, which Python runs between two instructions, never gets its turn.
-    What Python writes to a file descriptor when the signal comes is still there to be read.
+    A lock does not work here: a signal that arrives just before the wait for a lock does not end
+    it, and Python never runs the handler. A byte in a pipe is still there for the wait.
     """
 
     def __init__(self) -> None:
-        #: Any byte written here rings; made for ``signal.set_wakeup_fd``, too.
-        self._ear, self.fd = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        #: Any byte written here wakes, also by ``signal.set_wakeup_fd``.
+        self._read_fd, self.fd = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._poll = select.poll()
-        self._poll.register(self._ear, select.POLLIN)
+        self._poll.register(self._read_fd, select.POLLIN)
 
-    def ring(self) -> None:
+    def wake(self) -> None:
         """End the current or the next wait, from any thread or a signal handler."""
-        with suppress(BlockingIOError):  # full: it rings already
+        with suppress(BlockingIOError):  # full: the next wait ends anyway
             os.write(self.fd, b"\0")
 
-    def wait(self, until_s: float | None) -> bool:
-        """Sleep until it rings; false when ``time.monotonic()`` reached ``until_s`` before."""
-        end_s = math.inf if until_s is None else until_s
-        while not self._poll.poll(_milliseconds_until(end_s)):
-            if time.monotonic() >= end_s:
+    def wait(self, until_s: float = math.inf) -> bool:
+        """Sleep until a wake-up; return False if ``until_s`` (monotonic) comes first."""
+        while not self._poll.poll(_milliseconds_until(until_s)):
+            if time.monotonic() >= until_s:
                 return False
-        os.read(self._ear, _MANY)
+        os.read(self._read_fd, _READ_BYTES)
         return True
 
     def __del__(self) -> None:
-        # Not sooner: a late ring must not be written to what is somebody else's by now.
-        os.close(self._ear)
+        # Not sooner: a late wake-up must not write to a descriptor that was reused.
+        os.close(self._read_fd)
         os.close(self.fd)
 
 

@@ -1,9 +1,9 @@
-"""What can be asked of a running system as a whole, as nav2's lifecycle manager has it.
+"""Commands for a running system as a whole, as in nav2's lifecycle manager.
 
-``startup``   every node goes where a start takes it, as a whole or not at all; failures are history
-``pause``     active nodes become inactive
-``resume``    nodes that are inactive go where a start takes them, as a whole or not at all
-``reset``     every node becomes unconfigured; failures are history
+``startup``   bring up all nodes, all or nothing, and forget failures
+``pause``     deactivate the active nodes
+``resume``    bring up the inactive nodes, all or nothing
+``reset``     make all nodes unconfigured, and forget failures
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ _ACTIVITIES = {
 
 @dataclass(frozen=True, slots=True)
 class Commands:
-    """Carries commands out, on the main thread."""
+    """Runs commands, on the main thread."""
 
     system: System
     node_set: NodeSet
     supervisor: Supervisor
     status: Status
 
-    def carry_out(self, what: str) -> tuple[bool, str]:
-        """Do it; return whether it went well, and how the system is now, or what went wrong."""
-        doing, done = _ACTIVITIES[what]
+    def run(self, name: str) -> tuple[bool, str]:
+        """Run a command; return whether it succeeded, and the problem and state of the system."""
+        doing, done = _ACTIVITIES[name]
         before = self.status.without_nodes.activity
         self.status.set_activity(doing)
         actions: dict[str, Callable[[], str | None]] = {
@@ -45,21 +45,21 @@ class Commands:
             "resume": self._resume,
             "reset": self._reset,
         }
-        problem = actions[what]()
+        problem = actions[name]()
         self.status.set_activity(done if problem is None else before)
         if problem is not None:
             return False, f"{problem}; {self.status.snapshot().summary}"
         return True, self.status.snapshot().summary
 
     def _start_up(self) -> str | None:
-        problem = self._revive()
-        return problem or self._bring_up(dict(self._start_goals()), forget=True)
+        problem = self._recreate()
+        return problem or self._bring_up(dict(self._start_goals()), forget_failures=True)
 
     def _resume(self) -> str | None:
         states = self.node_set.states()
         goals = self._start_goals()
         inactive = [name for name, state in states.items() if state is PrimaryState.INACTIVE]
-        return self._bring_up({name: goals[name] for name in inactive}, forget=False)
+        return self._bring_up({name: goals[name] for name in inactive})
 
     def _pause(self) -> str | None:
         low = (PrimaryState.UNCONFIGURED, PrimaryState.INACTIVE)
@@ -71,28 +71,27 @@ class Commands:
 
     def _reset(self) -> str | None:
         goals = dict.fromkeys(self.node_set.nodes, PrimaryState.UNCONFIGURED)
-        self.supervisor.want({}, forget=True)
-        return self._lower(goals, "the system is reset") or self._revive()
+        self.supervisor.set_goals({}, forget_failures=True)
+        return self._lower(goals, "the system is reset") or self._recreate()
 
-    def _bring_up(self, goals: dict[str, PrimaryState], *, forget: bool) -> str | None:
+    def _bring_up(
+        self, goals: dict[str, PrimaryState], *, forget_failures: bool = False
+    ) -> str | None:
         causes = start_causes(self.system, PrimaryState.ACTIVE)
         plan = plan_transitions(self.system, self.node_set.states(), goals, causes)
         problem = self.supervisor.bring_up(plan)
         if problem is not None:
-            return f"{problem}; what this had started is where it was before"
-        self.supervisor.want(goals, forget=forget)
+            return f"{problem}; rolled back"
+        self.supervisor.set_goals(goals, forget_failures=forget_failures)
         return self._unreached(goals)
 
-    def _lower(self, goals: Mapping[str, PrimaryState], why: str) -> str | None:
-        self.supervisor.want(goals)
-        failures = self.supervisor.mend(why)
-        if failures:
-            step = failures[0].step
-            return f"{step.full_name}: it did not {step.transition}: {failures[0].reason}"
-        return None
+    def _lower(self, goals: Mapping[str, PrimaryState], cause: str) -> str | None:
+        self.supervisor.set_goals(goals)
+        failures = self.supervisor.reconcile(cause)
+        return str(failures[0]) if failures else None
 
     def _unreached(self, goals: Mapping[str, PrimaryState]) -> str | None:
-        """Name a node that could not be asked: its executor hangs, or it is in mid-transition."""
+        """Name a node that could not be moved: its executor hangs, or a transition runs."""
         states = self.node_set.states()
         for name, goal in goals.items():
             if states.get(name) is not goal:
@@ -103,11 +102,11 @@ class Commands:
     def _start_goals(self) -> Mapping[str, PrimaryState]:
         return start_goals(self.system, PrimaryState.ACTIVE)
 
-    def _revive(self) -> str | None:
-        """Make finalized nodes anew; return what is in the way of that."""
+    def _recreate(self) -> str | None:
+        """Create finalized nodes again; return why one cannot be created."""
         for name in self.node_set.nodes:
             try:
-                self.node_set.revive(name)
+                self.node_set.recreate(name)
             except CreationFailed as error:
                 return f"{error.node}: {error}"
         return None

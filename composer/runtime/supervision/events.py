@@ -1,10 +1,12 @@
-"""What the host tells while it runs. Whoever starts it decides what of it is shown, and how.
+"""Events that a host reports while it runs, and the outcome of the run.
 
-Every event prints as one line (a stuck callback as several).
+``str(event)`` is the line to show; for a stuck callback, the lines.
 """
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -15,7 +17,7 @@ from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 
 @dataclass(frozen=True, slots=True)
 class StateChanged:
-    """A node has come to rest in a primary state; ``elapsed_s`` counts from the start."""
+    """A node has reached a primary state; ``elapsed_s`` counts from the start of the host."""
 
     elapsed_s: float
     node: str
@@ -28,7 +30,7 @@ class StateChanged:
 
 @dataclass(frozen=True, slots=True)
 class NodeTransitionFailed:
-    """A transition of the plan did not get where it was to."""
+    """A transition of a plan has failed."""
 
     elapsed_s: float
     node: str
@@ -37,12 +39,12 @@ class NodeTransitionFailed:
     reason: str
 
     def __str__(self) -> str:
-        return f"{self.node} did not {self.transition}, it is {self.state}: {self.reason}"
+        return f"{self.node}: {self.transition} failed, state {self.state}: {self.reason}"
 
 
 @dataclass(frozen=True, slots=True)
 class RollingBack:
-    """The bring-up failed; what it had started is stopped in reverse order."""
+    """The bring-up has failed; the nodes that it started are stopped in reverse order."""
 
     elapsed_s: float
     node: str
@@ -54,18 +56,18 @@ class RollingBack:
 
 @dataclass(frozen=True, slots=True)
 class RolledBack:
-    """What a bring-up that failed had started is where it was before, in the order of that."""
+    """The nodes that a failed bring-up had started are in their previous states again."""
 
     elapsed_s: float
     nodes: tuple[str, ...]
 
     def __str__(self) -> str:
-        return f"rolled back: {', '.join(self.nodes) or 'nothing, there was nothing to undo'}"
+        return f"rolled back: {', '.join(self.nodes) or 'nothing to undo'}"
 
 
 @dataclass(frozen=True, slots=True)
 class NodeFailed:
-    """A node of a system that is up has failed; ``consequence`` is what is done about it."""
+    """A node of a system that is up has failed; ``consequence`` is the reaction to that."""
 
     elapsed_s: float
     node: str
@@ -78,25 +80,25 @@ class NodeFailed:
 
 @dataclass(frozen=True, slots=True)
 class Restarted:
-    """A node that had failed is up again, and so are those that depend on it."""
+    """A node that had failed is up again, and so are the nodes that depend on it."""
 
     elapsed_s: float
     node: str
     attempt: int
 
     def __str__(self) -> str:
-        return f"{self.node} is up again, restart {self.attempt}"
+        return f"{self.node} is up again after restart {self.attempt}"
 
 
 @dataclass(frozen=True, slots=True)
 class Commanded:
-    """Somebody outside wants something of the whole system."""
+    """A command for the whole system was requested externally."""
 
     elapsed_s: float
-    what: str
+    command: str
 
     def __str__(self) -> str:
-        return f"{self.what}, asked for from outside"
+        return f"{self.command} requested externally"
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +115,7 @@ class BroughtUp:
 
 @dataclass(frozen=True, slots=True)
 class CallbackFailed:
-    """User code raised or returned what it must not; the full story is in the log."""
+    """User code raised an exception or returned a wrong value; the log has the details."""
 
     elapsed_s: float
     node: str
@@ -126,7 +128,7 @@ class CallbackFailed:
 
 @dataclass(frozen=True, slots=True)
 class Stopping:
-    """The tear-down begins."""
+    """The tear-down starts."""
 
     elapsed_s: float
     reason: str
@@ -137,21 +139,24 @@ class Stopping:
 
 @dataclass(frozen=True, slots=True)
 class Stuck:
-    """A node did not answer in time. ``stack`` is where its executor hangs; empty if unknown."""
+    """A node did not do something in time: ``deactivate``, ``return from on_tick within 1 s``.
+
+    ``stack`` is where its executor hangs; empty if unknown.
+    """
 
     elapsed_s: float
     node: str
-    transition: str
+    action: str
     stack: str
 
     def __str__(self) -> str:
         where = f" in\n{self.stack.rstrip()}" if self.stack else ""
-        return f"{self.node} is stuck and did not {self.transition}{where}"
+        return f"{self.node} is stuck and did not {self.action}{where}"
 
 
 @dataclass(frozen=True, slots=True)
 class Logged:
-    """A node has something to say. ``logger`` is its full name with dots, as ROS writes it."""
+    """A line of the log. ``logger`` is the full name of the node with dots, as in ROS."""
 
     elapsed_s: float
     logger: str
@@ -169,14 +174,45 @@ Event: TypeAlias = (
 Report: TypeAlias = Callable[[Event], None]
 
 
+class Reporter:
+    """Passes events to a listener, one at a time, from any thread.
+
+    The system keeps running without its listener: the first exception of it ends the reports.
+    """
+
+    def __init__(self, listener: Report | None) -> None:
+        self._listener = listener
+        self._lock = threading.Lock()
+        self._started_at_s = time.monotonic()
+
+    @property
+    def elapsed_s(self) -> float:
+        """The seconds since the start, for events."""
+        return time.monotonic() - self._started_at_s
+
+    def report(self, event: Event) -> None:
+        """Pass an event to the listener."""
+        with self._lock:
+            if self._listener is None:
+                return
+            try:
+                self._listener(event)
+            except Exception:  # such as a closed pipe
+                self._listener = None
+
+    def log(self, level: LogLevel, logger: str, message: str) -> None:
+        """Report a line of the log."""
+        self.report(Logged(self.elapsed_s, logger, level, message))
+
+
 @dataclass(frozen=True, slots=True)
 class NodeSummary:
-    """What one node did.
+    """The final state and the counters of one node.
 
-    ``received`` and ``sent`` count topic messages; ``calls`` requests and goals, both ways;
-    ``dropped`` messages that came or were to leave while the node was not active, or that a full
-    queue pushed out; ``skipped`` calls of timers whose call before was not through; ``errors``
-    exceptions and wrong results of user code, and failed calls.
+    ``received`` and ``sent`` count topic messages; ``calls`` requests and goals in both directions;
+    ``dropped`` messages that arrived or were sent while the node was not active, or were dropped
+    from a full queue; ``skipped`` timer calls skipped because the previous one was still running;
+    ``errors`` exceptions and wrong results of user code, and failed calls.
     """
 
     node: str
@@ -191,10 +227,10 @@ class NodeSummary:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a run ended. ``exit_code`` is 0 after a clean stop and 1 when a node failed.
+    """How a run ended. ``exit_code`` is 0 after a clean stop and 1 if a node failed.
 
-    ``hung`` is true when something remains that only the end of the process removes: a callback
-    that never returned, or nodes that were not given back one by one. ``os._exit`` has to end it.
+    ``hung`` is true if the process must end by ``os._exit``: a callback never returned, or nodes
+    were not destroyed one by one.
     """
 
     exit_code: int

@@ -1,7 +1,7 @@
-"""Callbacks that do not return: found by looking at the stacks of threads, and interrupted.
+"""Finds running callbacks in the stacks of threads, and interrupts them.
 
-Nothing is counted or timed when a callback is called, so watching costs nothing there: whoever
-watches looks every now and then, and what he sees twice has run in between.
+Calling a callback costs nothing extra: the health monitor samples the stacks periodically, and a
+call that it sees twice has run in between.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from composer.runtime.executors.user_code import CALLERS, HARMLESS
 from composer.runtime.node.node import RunningNode
 from composer.runtime.ports.mailbox import Mailbox
 
-_OURS = str(Path(__file__).parents[1])
-_TRANSITIONS = {id(RunningNode._tell.__code__), id(RunningNode._make_behavior.__code__)}
+_COMPOSER = str(Path(__file__).parents[1])
+_TRANSITIONS = {id(RunningNode._call_handler.__code__), id(RunningNode._make_behavior.__code__)}
 _REACTION = RunningReaction.run.__code__
-_TRIES = 50
+_ATTEMPTS = 50
 _MOMENT_S = 0.001
 
 
@@ -41,25 +41,25 @@ class CallbackInterrupted(BaseException):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunningCallback:
-    """What a user has written, in Python or as a reaction, that runs now.
+    """A handler or a reaction that runs now.
 
-    ``call`` is the same as long as it is the same call. ``name`` is the function that was called;
-    ``in_transition`` is true for what belongs to a transition.
+    ``call`` is a frame that identifies the call. ``name`` is the function that was called;
+    ``in_transition`` is true for handlers of transitions.
     """
 
     thread: int
     call: FrameType
     name: str
     in_transition: bool
-    _callers: Sequence[FrameType]  # from the frame that calls it outward
+    _callers: Sequence[FrameType]  # from the frame that calls it, outward
 
     def node(self, nodes: Iterable[RunningNode]) -> RunningNode | None:
-        """Return which of ``nodes`` it belongs to. To be asked once, of what does not return.
+        """Return the node among ``nodes`` that it belongs to. Call this once per callback.
 
-        Reading the variables of a frame a second time drops what they were before, which may run
-        Python while the frame is looked at.
+        Reading the variables of a frame again releases their earlier values, which may run Python
+        code while the frame is read.
         """
-        owners = {id(part): node for node in nodes for part in (node, *node.cores)}
+        owners = {id(part): node for node in nodes for part in (node, *node.contexts)}
         with undisturbed():
             for frame in self._callers:
                 subject = frame.f_locals.get("self")
@@ -69,47 +69,47 @@ class RunningCallback:
         return None
 
     def stack(self) -> str:
-        """Return the Python stack as far as it belongs to the callback; empty when it has ended."""
+        """Return the Python stack of the callback; empty if it has returned."""
         stack = stacks_of((self.thread,)).get(self.thread, [])
         return shown(stack[: stack.index(self.call)]) if self.call in stack else ""
 
     def interrupt(self) -> None:
-        """Raise CallbackInterrupted in it, as soon as it is back from whatever is not Python.
+        """Raise CallbackInterrupted in it, as soon as it runs Python code of the user.
 
-        It strikes in a user's Python alone. What never is there when somebody looks, but always in
-        something of ours, is let be.
+        A callback that is always in code of the composer when its stack is sampled is not
+        interrupted.
         """
         exception = ctypes.py_object(CallbackInterrupted)
         thread = ctypes.c_ulong(self.thread)
-        for _ in range(_TRIES):
-            # Who slept and is given the interpreter's lock has it for 5 ms: what is seen holds.
+        for _ in range(_ATTEMPTS):
+            # After a sleep, this thread holds the GIL for 5 ms, so the sampled stack stays valid.
             sleep(_MOMENT_S)
             stack = stacks_of((self.thread,)).get(self.thread, [])
             if self.call not in stack:
                 return
             at = next(_callers(stack), None)
-            if at is None or _plain(stack[at:]) is not self.call:
+            if at is None or _plain_frame(stack[at:]) is not self.call:
                 continue
-            if not any(map(_is_ours, stack[:at])):
+            if not any(map(_is_composer, stack[:at])):
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, exception)
                 return
 
 
 def running_callbacks(loop: Loop) -> Iterator[list[RunningCallback]]:
-    """Yield the callbacks that each thread of ``loop`` is in now, the innermost first.
+    """Yield for each thread of ``loop`` the callbacks that run now, the innermost first.
 
-    Delivering a message calls the callback of another node within that of its sender.
+    Delivery calls the callback of a receiver within that of the sender.
     """
     for ident, stack in stacks_of(loop.threads()).items():
-        if found := [_callback(ident, stack, at) for at in _callers(stack)]:
-            yield found
+        if callbacks := [_callback(ident, stack, at) for at in _callers(stack)]:
+            yield callbacks
 
 
 def _callers(stack: Sequence[FrameType]) -> Iterator[int]:
-    """Yield, for each callback on a stack, where the frame is that calls it."""
+    """Yield, for each callback on a stack, the index of the frame that calls it."""
     inner: FrameType | None = None
     for at, frame in enumerate(stack):
-        calls_user = id(frame.f_code) in CALLERS and (inner is None or not _is_ours(inner))
+        calls_user = id(frame.f_code) in CALLERS and (inner is None or not _is_composer(inner))
         if calls_user or frame.f_code is _REACTION:
             yield at
         inner = frame
@@ -120,14 +120,14 @@ def _callback(ident: int, stack: Sequence[FrameType], at: int) -> RunningCallbac
     is_reaction = callers[0].f_code is _REACTION
     name = "a reaction" if is_reaction else stack[max(at - 1, 0)].f_code.co_name
     in_transition = any(id(frame.f_code) in _TRANSITIONS for frame in callers[:2])
-    return RunningCallback(ident, _plain(callers), name, in_transition, callers)
+    return RunningCallback(ident, _plain_frame(callers), name, in_transition, callers)
 
 
-def _plain(callers: Sequence[FrameType]) -> FrameType:
-    """Return the first frame that is one call: coroutines outlive the calls of theirs."""
-    lasting = inspect.CO_COROUTINE | inspect.CO_GENERATOR | inspect.CO_ITERABLE_COROUTINE
-    return next((frame for frame in callers if not frame.f_code.co_flags & lasting), callers[0])
+def _plain_frame(callers: Sequence[FrameType]) -> FrameType:
+    """Return the first frame of a plain function: frames of coroutines outlive a call."""
+    coroutine = inspect.CO_COROUTINE | inspect.CO_GENERATOR | inspect.CO_ITERABLE_COROUTINE
+    return next((frame for frame in callers if not frame.f_code.co_flags & coroutine), callers[0])
 
 
-def _is_ours(frame: FrameType) -> bool:
-    return frame.f_code.co_filename.startswith(_OURS) and id(frame.f_code) not in HARMLESS
+def _is_composer(frame: FrameType) -> bool:
+    return frame.f_code.co_filename.startswith(_COMPOSER) and id(frame.f_code) not in HARMLESS

@@ -1,82 +1,124 @@
-"""What reaches the main thread: requests to stop, and things to deal with one after the other."""
+"""The queue of the main thread: stop requests, and events to handle one after the other."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import Generic, TypeVar
+from dataclasses import dataclass
+from typing import Generic, TypeAlias, TypeVar
 
+from composer.plan import Fault
 from composer.runtime.process.wakeup_pipe import WakeupPipe
 
 T = TypeVar("T")
 
-#: What is left of any time limit once somebody is in a hurry.
-_HURRY_S = 0.05
-#: Whoever forwards signals sends a second one beside the terminal's: no person is that quick.
-_TOGETHER_S = 0.1
+#: What remains of any time limit after a second stop request.
+_URGENT_S = 0.05
+#: Tools that forward signals send a second one along with the terminal's; no user is that fast.
+_SAME_REQUEST_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class ExternalTransition:
+    """A transition that was not part of a plan. ``node`` is a key, ``state`` a label."""
+
+    node: str
+    state: str
+
+
+@dataclass(frozen=True, slots=True)
+class CallbackHanging:
+    """A callback takes too long. ``node`` is a key; ``stack`` is where the callback is."""
+
+    node: str
+    callback: str
+    limit_s: float
+    stack: str
+
+
+@dataclass(frozen=True, slots=True)
+class LoopRecovered:
+    """A callback whose loop was abandoned has returned after all. ``loop`` is its name."""
+
+    loop: str
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A command for the system, see :mod:`.commands`. Call ``answer(success, message)`` once."""
+
+    name: str
+    answer: Callable[[bool, str], None]
+
+
+NodeEvent: TypeAlias = Fault | ExternalTransition | CallbackHanging | LoopRecovered
+Item: TypeAlias = NodeEvent | Command
 
 
 class MainQueue(Generic[T]):
-    """Items for the main thread, whether the system is to stop, and why.
+    """Items for the main thread, and the request to stop.
 
-    Nothing in it takes a lock, which the code that a signal handler interrupts might hold.
+    It uses no locks: code that is interrupted by a signal handler might hold them.
     """
 
     def __init__(self) -> None:
-        #: Rung for whatever there is to look at.
-        self.bell = WakeupPipe()
+        #: Woken for every item and request.
+        self.wakeup = WakeupPipe()
         self._items: deque[T] = deque()
-        self.reason: str | None = None
-        self.hurry = False
-        self._asked_s = 0.0
+        #: Why the system stops; None while no stop is requested.
+        self.stop_reason: str | None = None
+        #: Whether a stop was requested a second time.
+        self.urgent = False
+        self._requested_s = 0.0
 
     @property
-    def closing(self) -> bool:
-        """Whether the end was asked for."""
-        return self.reason is not None
+    def stopping(self) -> bool:
+        """Whether a stop is requested."""
+        return self.stop_reason is not None
 
-    def ask(self, reason: str) -> None:
-        """Ask for the end, from any thread or a signal handler. Asking again, later, hurries."""
+    def request_stop(self, reason: str) -> None:
+        """Request a stop, from any thread or a signal handler; a later second one is urgent."""
         now_s = time.monotonic()
-        if self.reason is None:
-            self.reason = reason
-            self._asked_s = now_s
-        elif now_s - self._asked_s > _TOGETHER_S:
-            self.hurry = True
-        self.bell.ring()
+        if self.stop_reason is None:
+            self.stop_reason = reason
+            self._requested_s = now_s
+        elif now_s - self._requested_s > _SAME_REQUEST_S:
+            self.urgent = True
+        self.wakeup.wake()
 
     def put(self, item: T) -> None:
-        """Leave something to deal with, from any thread."""
+        """Append an item, from any thread."""
         self._items.append(item)
-        self.bell.ring()
+        self.wakeup.wake()
 
     def wake(self) -> None:
-        """Let a wait look again, from any thread."""
-        self.bell.ring()
+        """Make :meth:`wait` check its condition again, from any thread."""
+        self.wakeup.wake()
 
-    def rest(self) -> list[T]:
-        """Return everything that nobody has dealt with."""
+    def drain(self) -> list[T]:
+        """Remove and return all items."""
         return [self._items.popleft() for _ in range(len(self._items))]
 
-    def take(self, until_s: float | None = None) -> T | None:
-        """Return the next item; None once the end is asked for, or ``time.monotonic()`` says so."""
-        while not self.closing and not self._items:
-            if not self.bell.wait(until_s):
+    def get(self, until_s: float = math.inf) -> T | None:
+        """Return the next item; None when a stop is requested, or at ``until_s`` (monotonic)."""
+        while not self.stopping and not self._items:
+            if not self.wakeup.wait(until_s):
                 break
-        return self._items.popleft() if self._items and not self.closing else None
+        return self._items.popleft() if self._items and not self.stopping else None
 
-    def wait(self, done: Callable[[], bool], until_s: float, *, stoppable: bool) -> bool:
-        """Wait until ``done()``, at most until ``time.monotonic()`` says so; return whether it is.
+    def wait(self, condition: Callable[[], bool], until_s: float, *, stoppable: bool) -> bool:
+        """Wait for ``condition()``, at most until ``until_s`` (monotonic); return its value.
 
-        With ``stoppable`` a request to stop ends the wait; without it a second one shortens it.
-        Items that come meanwhile are kept.
+        If ``stoppable``, a request to stop ends the wait; otherwise an urgent one shortens it.
+        Items stay in the queue.
         """
-        while not done():
-            if stoppable and self.closing:
+        while not condition():
+            if stoppable and self.stopping:
                 break
-            if self.hurry:
-                until_s = min(until_s, time.monotonic() + _HURRY_S)
-            if not self.bell.wait(until_s):
+            if self.urgent:
+                until_s = min(until_s, time.monotonic() + _URGENT_S)
+            if not self.wakeup.wait(until_s):
                 break
-        return done()
+        return condition()

@@ -27,20 +27,20 @@ from composer.runtime.intra_process.eligibility import shared_channels
 from composer.runtime.intra_process.router import Delivery
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, chain_figures, figures
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node.node import Listener, NodeOptions, RunningNode, Shared
+from composer.runtime.node.lifecycle import FINALIZED
+from composer.runtime.node.node import NodeListener, NodeOptions, ProcessContext, RunningNode
 from composer.runtime.node.parameters import ParameterError
 from composer.source import Located
 
-_PRIMARY = {state.value: state for state in PrimaryState}
-FINALIZED = "finalized"
+_PRIMARY_STATES = {state.value: state for state in PrimaryState}
 _LOOP_ENDS_WITHIN_S = 0.2
-#: A loop lets go of everything that its nodes have; on a busy machine that takes up to so long.
-_NODE_IS_LET_GO_WITHIN_S = 0.005
-_MADE_ANEW_WITHIN_S = 5.0
+#: Time for a loop to remove the entities of a node, on a busy machine.
+_NODE_REMOVED_WITHIN_S = 0.005
+_RECREATED_WITHIN_S = 5.0
 
 
 class CreationFailed(Exception):
-    """A node cannot be created. ``node`` is its full name; the text says why."""
+    """A node cannot be created. ``node`` is its full name; the text is the reason."""
 
     def __init__(self, node: str, reason: str) -> None:
         super().__init__(reason)
@@ -51,8 +51,8 @@ class CreationFailed(Exception):
 class NodeSetOptions:
     """How all nodes are run.
 
-    ``transition_timeout_s`` goes before what the system says; ``tracing`` is whether the times of
-    callbacks are taken; ``check_mutation`` whether it is looked for who changes messages.
+    ``transition_timeout_s`` overrides the system's; ``tracing`` records callback timings;
+    ``check_mutation`` checks whether callbacks change messages.
     """
 
     log_level: LogLevel
@@ -67,80 +67,85 @@ class NodeSet:
     def __init__(
         self,
         system: System,
-        listen: Callable[[str], Listener],
+        make_listener: Callable[[Node], NodeListener],
         options: NodeSetOptions,
     ) -> None:
-        """``listen(key)`` is who is told what a node does."""
+        """``make_listener(node)`` returns the listener of a node."""
         self._system = system
-        self._listen = listen
+        self._make_listener = make_listener
         self._options = options
         self._seen_messages = SeenMessages() if options.check_mutation else None
         self._executors = {executor.name.value: executor for executor in system.executors}
         self._delivery = Delivery({})
         self._chains = Chains(system, tracing=options.tracing)
-        self._shared: Shared  # which is known once nodes are created
+        self._process: ProcessContext  # set by create()
         self.nodes: dict[str, RunningNode] = {}
         self.loops: dict[str, Loop] = {}
-        #: The loops with a callback that does not return; nothing can be asked of their nodes.
+        #: The loops with a callback that does not return; their nodes cannot do anything.
         self.hung: set[str] = set()
+        #: The nodes that a plan moves now, by their keys.
+        self.moving: set[str] = set()
+        #: The states that the main thread expects nodes in, by their keys. See settled().
+        self.expected: dict[str, str] = {}
         self._keeps_entities = False
-        #: Where nodes are as far as the main thread knows, which moves them; by their keys.
-        self.left: dict[str, str] = {}
-        #: What Linux refuses to executors and the middleware to topics, each with what would help.
-        self.refusals: list[str] = []
+        #: What Linux or the middleware does not allow, each with a hint.
+        self.warnings: list[str] = []
 
-    def create(self, shared: Shared, begin: Callable[[], None] = lambda: None) -> None:
-        """Create all nodes and start their loops. Raises CreationFailed; nothing is started then.
+    def create(self, process: ProcessContext, before_each: Callable[[], None]) -> None:
+        """Create all nodes, then start their loops; call ``before_each`` before each node.
 
-        A node that cannot be created leaves those before it to be closed. ``begin`` is called
-        before each of them.
+        Raises CreationFailed. Then no loop runs, and the nodes created until then remain.
         """
-        self._shared = shared
+        self._process = process
         self._delivery = Delivery(shared_channels(self._system))
         if self._delivery.refusal is not None:
-            self.refusals.append(
-                f"topics within the process go by DDS, which costs more: {self._delivery.refusal};"
-                " 'compose doctor' says what helps, 'delivery: dds' that it is meant"
+            self.warnings.append(
+                "topics within the process use DDS, which takes more CPU time:"
+                f" {self._delivery.refusal}; see 'compose doctor', or set 'delivery: dds'"
             )
         for node in self._system.nodes:
-            begin()
+            before_each()
             try:
                 self.nodes[node.name.value] = self._make(node)
             except ParameterError as error:
                 raise CreationFailed(node.full_name, str(error)) from error
             except Exception as error:
-                reason = f"it cannot be created: {describe(error)}"
+                reason = f"cannot be created: {describe(error)}"
                 raise CreationFailed(node.full_name, reason) from error
         for name, loop in self.loops.items():
             loop.start()
             if name in self._executors:
-                self.refusals += place(self._executors[name], loop.thread_ids())
+                self.warnings += place(self._executors[name], loop.thread_ids())
 
     def timeout_s(self, name: str) -> float:
-        """Return how long a transition of a node may take."""
+        """Return the time limit of a node's transitions."""
         return self._timeout_s(self.nodes[name].model)
 
     def states(self) -> Mapping[str, PrimaryState]:
-        """Return the states of all nodes that can be moved, by their keys.
+        """Return the states of the nodes that can be moved, by their keys.
 
-        Nodes that are finalized, in mid-transition or on a hung loop are left out.
+        Nodes that are finalized, in a transition, or on a hung loop cannot.
         """
+        states = {name: node.state for name, node in self.nodes.items() if not self.is_lost(name)}
         return {
-            name: _PRIMARY[node.state]
-            for name, node in self.nodes.items()
-            if node.loop.name not in self.hung and node.state in _PRIMARY
+            name: _PRIMARY_STATES[state]
+            for name, state in states.items()
+            if state in _PRIMARY_STATES
         }
 
     def settled(self) -> Mapping[str, PrimaryState]:
-        """Return the states of nodes that nobody else has moved; of others news is on its way."""
+        """Return the states of the nodes that are in their expected state.
+
+        For the others, an event is in the main queue that has not been handled yet.
+        """
         return {
             name: state
             for name, state in self.states().items()
-            if self.left.get(name, state.value) == state.value
+            if self.expected.get(name, state.value) == state.value
         }
 
     def callbacks(self) -> tuple[CallbackFigures, ...]:
-        """Return what the callbacks of all nodes took so far."""
+        """Return the timings of the callbacks of all nodes so far."""
         return tuple(
             figures(node.full_name, callback)
             for node in tuple(self.nodes.values())
@@ -148,19 +153,19 @@ class NodeSet:
         )
 
     def chains(self) -> tuple[ChainFigures, ...]:
-        """Return how long data was on the chains of the system."""
+        """Return the latencies of the chains of the system."""
         return tuple(map(chain_figures, self._chains.statistics))
 
     def is_lost(self, name: str) -> bool:
-        """Say whether nothing can be asked of the node, since its loop hangs."""
+        """Return whether the node's loop hangs, so that the node cannot do anything."""
         return self.nodes[name].loop.name in self.hung
 
     def active(self) -> int:
-        """Return how many nodes are active."""
+        """Return the number of active nodes."""
         return sum(node.state == PrimaryState.ACTIVE.value for node in self.nodes.values())
 
-    def revive(self, name: str) -> None:
-        """Make a finalized node anew, unconfigured: there is no way back from *finalized*.
+    def recreate(self, name: str) -> None:
+        """Replace a finalized node by a new one: no transition leaves *finalized*.
 
         Raises CreationFailed.
         """
@@ -168,35 +173,35 @@ class NodeSet:
         if old.state != FINALIZED:
             return
         try:
-            self.nodes[name] = old.loop.run(partial(self._remake, old), _MADE_ANEW_WITHIN_S)
-            self.left[name] = PrimaryState.UNCONFIGURED.value
+            self.nodes[name] = old.loop.run(partial(self._replace, old), _RECREATED_WITHIN_S)
+            self.expected[name] = PrimaryState.UNCONFIGURED
         except Exception as error:
-            reason = f"it cannot be made anew: {describe(error)}"
+            reason = f"cannot be created again: {describe(error)}"
             raise CreationFailed(old.full_name, reason) from error
 
     def keep_entities(self) -> None:
-        """Let no node give anything back from now on: the process ends, and all goes with it."""
+        """Do not destroy entities from now on: the end of the process does."""
         self._keeps_entities = True
         for node in self.nodes.values():
             node.keep_entities()
 
     def stop_loops(self, end_s: float) -> None:
-        """End the threads of the nodes. What cannot be ended is in ``hung`` then.
+        """Stop the threads of the nodes until ``end_s`` (monotonic); the others are ``hung``.
 
-        They have until ``time.monotonic()`` says ``end_s``: a thread that a busy machine lets wait
-        does not hang. What is known to hang, and what is late, gets a moment.
+        Each gets a minimum of time, also after ``end_s``: on a busy machine, a late thread need not
+        hang.
         """
-        moment_s = _LOOP_ENDS_WITHIN_S + _NODE_IS_LET_GO_WITHIN_S * len(self.nodes)
+        minimum_s = _LOOP_ENDS_WITHIN_S + _NODE_REMOVED_WITHIN_S * len(self.nodes)
         for name, loop in self.loops.items():
             left_s = 0.0 if name in self.hung else end_s - time.monotonic()
-            if not loop.stop(max(moment_s, left_s)):
+            if not loop.stop(max(minimum_s, left_s)):
                 self.hung.add(name)
 
     def destroy(self, end_s: float) -> bool:
-        """Give the nodes back, with the loops stopped, until ``time.monotonic()`` says ``end_s``.
+        """Destroy the nodes until ``end_s`` (monotonic), with their loops stopped.
 
-        False when something is left that only the end of the process removes: Fast DDS takes longer
-        for each endpoint the more there are, seconds for 100 nodes, and a hung loop never ends.
+        Return False if some are left to the end of the process: Fast DDS takes longer for each
+        endpoint the more there are, seconds for 100 nodes, and a hung loop never ends.
         """
         if self._keeps_entities:
             return False
@@ -208,7 +213,7 @@ class NodeSet:
                 self.nodes[name].destroy()
         return complete
 
-    def _remake(self, old: RunningNode) -> RunningNode:
+    def _replace(self, old: RunningNode) -> RunningNode:
         old.destroy()
         return self._make(old.model, old)
 
@@ -216,29 +221,28 @@ class NodeSet:
         executor = self._executor_of(node)
         name = executor.name.value
         if name not in self.loops:
-            self.loops[name] = make_loop(executor, _take_exception)
+            self.loops[name] = make_loop(executor, _log_exception)
         options = NodeOptions(
             chains=self._chains,
             delivery=self._delivery,
-            shared=self._shared,
+            process=self._process,
             seen_messages=self._seen_messages,
             parallel=executor.kind is ExecutorKind.MULTI_THREADED,
             log_level=self._options.log_level,
             transition_timeout_s=self._timeout_s(node),
+            system_is_up=before is not None,
         )
         statistics = (
             Statistics(tracing=self._options.tracing) if before is None else before.statistics
         )
-        return RunningNode(
-            node, self.loops[name], options, self._listen(node.name.value), statistics
-        )
+        return RunningNode(node, self.loops[name], options, self._make_listener(node), statistics)
 
     def _timeout_s(self, node: Node) -> float:
-        before_all = self._options.transition_timeout_s
-        return node.supervision.timeout_ms / 1000.0 if before_all is None else before_all
+        override_s = self._options.transition_timeout_s
+        return node.supervision.timeout_ms / 1000.0 if override_s is None else override_s
 
     def _executor_of(self, node: Node) -> Executor:
-        """Return the executor the node runs on; without one it is ``default``, an event loop."""
+        """Return the executor that runs the node: by default ``default``, an event loop."""
         if node.executor is not None:
             return self._executors[node.executor.value]
         return self._executors.get(DEFAULT_EXECUTOR) or Executor(
@@ -246,7 +250,7 @@ class NodeSet:
         )
 
 
-def _take_exception(what: str, error: BaseException) -> None:
-    """Log what leaves a callback; that a call ended with its node is nothing to tell."""
+def _log_exception(what: str, error: BaseException) -> None:
+    """Log an exception that leaves a callback, unless its node was only deactivated."""
     if not isinstance(error, CallCancelled):
         log_exception(what, error)

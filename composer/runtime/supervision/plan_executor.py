@@ -1,4 +1,4 @@
-"""Carries plans out, and decides nothing: it makes steps, waits, and tells what became of them."""
+"""Executes plans: runs the steps, waits for them, and reports the failed ones. Decides nothing."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from dataclasses import dataclass, field
 
 from composer.plan import Plan, Step
 from composer.runtime.executors.tasks import Future
-from composer.runtime.node.lifecycle import Result
+from composer.runtime.node.lifecycle import TransitionResult
 from composer.runtime.supervision.interruption import running_callbacks
-from composer.runtime.supervision.main_queue import MainQueue
+from composer.runtime.supervision.main_queue import Item, MainQueue
 from composer.runtime.supervision.node_set import NodeSet
 
-#: A transition ends itself in time; only a callback that does not return outlasts it by this.
+#: A transition times out by itself; only a callback that does not return takes this much longer.
 _STUCK_AFTER_S = 1.0
-#: How long an interrupted callback may take to end.
+#: How long an interrupted callback may take to return.
 _INTERRUPTED_WITHIN_S = 0.4
 
 
 @dataclass(frozen=True, slots=True)
 class StepFailed:
-    """A step that did not get where it was to.
+    """A step that failed, and the state that the node is in.
 
-    ``stuck`` is true when it had to be given up, or a callback in its way to be interrupted;
-    ``stack`` is where that was.
+    ``stuck`` is true if the step was abandoned, or a callback was interrupted that blocked it;
+    ``stack`` is where that callback was.
     """
 
     step: Step
@@ -34,217 +34,224 @@ class StepFailed:
     stuck: bool = False
     stack: str = ""
 
+    def __str__(self) -> str:
+        return f"{self.step.full_name}: {self.text}"
+
+    @property
+    def text(self) -> str:
+        """What failed and why, without the name of the node."""
+        return f"{self.step.transition} failed: {self.reason}"
+
 
 @dataclass(frozen=True, slots=True)
 class ExecutionOptions:
-    """How a plan is carried out.
+    """How a plan is executed.
 
-    When ``lenient``, every step that the states allow is made, whatever becomes of the others, and
-    they begin in the order of the plan; else the first failure ends it. When ``stoppable``, a
-    request to stop the system ends it. What is not through when ``time.monotonic()`` says ``end_s``
-    has failed; no step gets longer than ``share_s``.
+    With ``best_effort``, failures do not end the plan: every step that the states allow is run, and
+    steps start in the order of the plan. If ``stoppable``, a request to stop the system ends the
+    plan. Steps that have not ended at ``end_s`` (monotonic) have failed; no step gets longer than
+    ``step_limit_s``.
     """
 
-    lenient: bool = False
+    best_effort: bool = False
     stoppable: bool = True
     end_s: float = math.inf
-    share_s: float = math.inf
+    step_limit_s: float = math.inf
 
 
 @dataclass(slots=True)
-class _Running:
-    """A step under way, how long its loop may not go on, and until when it may take at most.
+class _RunningStep:
+    """A step that runs, and its time limits.
 
-    A loop makes the transitions of its nodes one after the other: ``since_s`` is when it last began
-    the work of one.
+    A loop runs the transitions of its nodes one after the other: ``started_s`` is when it last
+    started one, and the step is late if the loop then starts nothing for ``limit_s``.
     """
 
     step: Step
     loop: str
-    future: Future[Result]
-    since_s: float
-    may_take_s: float
+    future: Future[TransitionResult]
+    started_s: float
+    limit_s: float
     end_s: float
 
     @property
-    def limit_s(self) -> float:
-        """Until when it may take."""
-        return self.since_s + self.may_take_s
+    def late_s(self) -> float:
+        """When the step is late."""
+        return self.started_s + self.limit_s
 
     @property
     def until_s(self) -> float:
-        """When to look what became of it."""
-        return min(self.limit_s, self.end_s)
+        """When the step has to end."""
+        return min(self.late_s, self.end_s)
 
 
 @dataclass(slots=True)
 class _Phase:
-    """A phase that is being carried out."""
+    """A phase that is being executed."""
 
     waiting: list[Step]
-    manner: ExecutionOptions
-    running: list[_Running] = field(default_factory=list)
+    options: ExecutionOptions
+    running: list[_RunningStep] = field(default_factory=list)
     done: set[int] = field(default_factory=set)
     failures: list[StepFailed] = field(default_factory=list)
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing runs, and nothing more will be begun."""
-        return not self.running and (not self.waiting or self.given_up)
+        """Whether nothing runs, and no more steps will be started."""
+        return not self.running and (not self.waiting or self.has_failed)
 
     @property
-    def given_up(self) -> bool:
-        """Whether nothing more is to be begun."""
-        return bool(self.failures) and not self.manner.lenient
+    def has_failed(self) -> bool:
+        """Whether a failure ends the phase."""
+        return bool(self.failures) and not self.options.best_effort
 
     def take_ready(self) -> list[Step]:
-        """Take out the steps that wait for nothing more."""
-        if self.given_up:
+        """Remove and return the steps that can start now."""
+        if self.has_failed:
             return []
         ready: list[Step] = []
-        left: list[Step] = []
+        waiting: list[Step] = []
         for step in self.waiting:
-            in_turn = not (left and self.manner.lenient)
-            fit = in_turn and self.done.issuperset(step.after)
-            (ready if fit else left).append(step)
-        self.waiting = left
+            keeps_order = not (waiting and self.options.best_effort)
+            is_ready = keeps_order and self.done.issuperset(step.after)
+            (ready if is_ready else waiting).append(step)
+        self.waiting = waiting
         return ready
 
 
 class PlanExecutor:
-    """Carries out plans, one at a time, on the main thread."""
+    """Executes plans, one at a time, on the main thread."""
 
     def __init__(
         self,
         node_set: NodeSet,
-        main_queue: MainQueue[object],
-        tell_failed: Callable[[StepFailed], None],
+        main_queue: MainQueue[Item],
+        report_failure: Callable[[StepFailed], None],
     ) -> None:
-        """``tell_failed`` is told of every step that failed, when it did."""
+        """Call ``report_failure`` for each failed step as soon as it has failed."""
         self._node_set = node_set
         self._main_queue = main_queue
-        self._tell_failed = tell_failed
-        #: The nodes that are being moved now, by their keys.
-        self.moving: set[str] = set()
+        self._report_failure = report_failure
 
-    def carry_out(
-        self, plan: Plan, manner: ExecutionOptions | None = None
+    def execute(
+        self, plan: Plan, options: ExecutionOptions | None = None
     ) -> tuple[StepFailed, ...]:
-        """Make the steps of a plan; return those that failed, in the order of their ends."""
-        manner = manner or ExecutionOptions()
+        """Run the steps of a plan; return the failed ones, in the order in which they ended."""
+        options = options or ExecutionOptions()
         failures: list[StepFailed] = []
         for steps in plan.phases:
-            phase = _Phase(list(steps), manner)
-            self._carry_out(phase)
+            phase = _Phase(list(steps), options)
+            self._execute(phase)
             failures += phase.failures
-            if phase.given_up or self._is_called_off(manner):
+            if phase.has_failed or self._is_stopped(options):
                 break
         return tuple(failures)
 
-    def _carry_out(self, phase: _Phase) -> None:
+    def _execute(self, phase: _Phase) -> None:
         while not phase.is_over:
             for step in phase.take_ready():
-                self._begin(step, phase)
+                self._start(step, phase)
             if not phase.running:
                 continue
             self._main_queue.wait(
                 lambda: any(item.future.done() for item in phase.running),
                 min(item.until_s for item in phase.running),
-                stoppable=phase.manner.stoppable,
+                stoppable=phase.options.stoppable,
             )
-            if self._is_called_off(phase.manner):
+            if self._is_stopped(phase.options):
                 break
-            self._note_turns(phase.running)
+            self._update_start_times(phase.running)
             for item in tuple(phase.running):
-                if self._has_had_its_time(item):
+                if self._has_ended(item):
                     self._end(item, phase)
-        self.moving.clear()
+        self._node_set.moving.clear()
 
-    def _note_turns(self, running: list[_Running]) -> None:
-        """Let the time of each begin anew with the last turn on its loop."""
-        turns_s: dict[str, float] = {}
+    def _update_start_times(self, running: list[_RunningStep]) -> None:
+        """Restart the time limit of each step with the last transition that its loop started."""
+        starts_s: dict[str, float] = {}
         for node in self._node_set.nodes.values():
             loop = node.loop.name
-            turns_s[loop] = max(node.turn_s, turns_s.get(loop, 0.0))
+            starts_s[loop] = max(node.transition_started_s, starts_s.get(loop, 0.0))
         for item in running:
-            item.since_s = max(item.since_s, turns_s.get(item.loop, 0.0))
+            item.started_s = max(item.started_s, starts_s.get(item.loop, 0.0))
 
-    def _is_called_off(self, manner: ExecutionOptions) -> bool:
-        return self._main_queue.closing and manner.stoppable
+    def _is_stopped(self, options: ExecutionOptions) -> bool:
+        return self._main_queue.stopping and options.stoppable
 
-    def _has_had_its_time(self, item: _Running) -> bool:
-        return item.future.done() or self._main_queue.hurry or time.monotonic() >= item.until_s
+    def _has_ended(self, item: _RunningStep) -> bool:
+        return item.future.done() or self._main_queue.urgent or time.monotonic() >= item.until_s
 
-    def _begin(self, step: Step, phase: _Phase) -> None:
+    def _start(self, step: Step, phase: _Phase) -> None:
         node = self._node_set.nodes[step.node]
-        manner = phase.manner
+        options = phase.options
         now_s = time.monotonic()
-        if manner.lenient and (
-            self._node_set.is_lost(step.node) or step.transition not in node.legal
-            or now_s >= manner.end_s
-        ):  # fmt: skip
+        if options.best_effort and (
+            self._node_set.is_lost(step.node)
+            or step.transition not in node.lifecycle.available
+            or now_s >= options.end_s
+        ):
             phase.done.add(step.number)
             return
-        may_take_s = min(self._node_set.timeout_s(step.node) + _STUCK_AFTER_S, manner.share_s)
-        self.moving.add(step.node)
-        future = node.loop.run_task(node.change(step.transition))
+        limit_s = min(self._node_set.timeout_s(step.node) + _STUCK_AFTER_S, options.step_limit_s)
+        self._node_set.moving.add(step.node)
+        future = node.loop.run_task(node.lifecycle.change(step.transition))
         future.add_done_callback(lambda _: self._main_queue.wake())
         name = node.loop.name
-        phase.running.append(_Running(step, name, future, now_s, may_take_s, manner.end_s))
+        phase.running.append(_RunningStep(step, name, future, now_s, limit_s, options.end_s))
 
-    def _end(self, item: _Running, phase: _Phase) -> None:
+    def _end(self, item: _RunningStep, phase: _Phase) -> None:
         phase.running.remove(item)
         phase.done.add(item.step.number)
-        self.moving.discard(item.step.node)
-        self._note_where(item)
+        self._node_set.moving.discard(item.step.node)
+        self._update_expected_state(item)
         failure = self._failure(item)
         if failure is not None:
             phase.failures.append(failure)
-            self._tell_failed(failure)
+            self._report_failure(failure)
 
-    def _note_where(self, item: _Running) -> None:
-        """Note where a step has left its node; one that goes on has left it nowhere yet."""
+    def _update_expected_state(self, item: _RunningStep) -> None:
+        """Expect the node in the state that the step ended in; in none while the step runs."""
         if item.future.done() and not item.future.cancelled():
-            self._node_set.left[item.step.node] = item.future.result().state
+            self._node_set.expected[item.step.node] = item.future.result().state
         else:
-            self._node_set.left.pop(item.step.node, None)
+            self._node_set.expected.pop(item.step.node, None)
 
-    def _failure(self, item: _Running) -> StepFailed | None:
-        """Return what went wrong with a step that is done or has had its time."""
+    def _failure(self, item: _RunningStep) -> StepFailed | None:
+        """Return why a step failed that is done or out of time."""
         node = self._node_set.nodes[item.step.node]
         stack = ""
         if not item.future.done():
-            stack = self._free(item)
+            stack = self._unblock(item)
         if not item.future.done():
             if stack:
                 self._node_set.hung.add(node.loop.name)
-            stuck = bool(stack) or self._main_queue.hurry or time.monotonic() >= item.limit_s
-            reason = "it is stuck" if stuck else "there was no time left for it"
+            stuck = bool(stack) or self._main_queue.urgent or time.monotonic() >= item.late_s
+            reason = "stuck" if stuck else "no time left"
             return StepFailed(item.step, reason, node.state, stuck=stuck, stack=stack)
         if item.future.cancelled():
-            return StepFailed(item.step, "its executor stops", node.state)
+            return StepFailed(item.step, "its executor has stopped", node.state)
         result = item.future.result()
         if result.success and not stack:
             return None
-        reason = result.reason or "a callback was in the way for too long"
+        reason = result.reason or "blocked by another callback for too long"
         return StepFailed(item.step, reason, result.state, stuck=bool(stack), stack=stack)
 
-    def _free(self, item: _Running) -> str:
-        """Interrupt the callback that a step hangs in, or waits for; return the stack of that.
+    def _unblock(self, item: _RunningStep) -> str:
+        """Interrupt the callback that a step hangs in or waits for; return the stack of it.
 
-        Before the step's own time is over, that is only what the node itself does.
+        Until the step is late, only callbacks of the node itself are interrupted.
         """
         node = self._node_set.nodes[item.step.node]
         if self._node_set.is_lost(item.step.node):
             return node.loop.where()
-        found = [innermost for innermost, *_ in running_callbacks(node.loop)]
-        own = [callback for callback in found if callback.node((node,)) is node]
-        if not own and time.monotonic() < item.limit_s:
+        running = [innermost for innermost, *_ in running_callbacks(node.loop)]
+        own = [callback for callback in running if callback.node((node,)) is node]
+        if not own and time.monotonic() < item.late_s:
             return ""
         stack = node.loop.where()
-        for callback in own or found:
+        for callback in own or running:
             callback.interrupt()
-        if found:
+        if running:
             until_s = time.monotonic() + _INTERRUPTED_WITHIN_S
             self._main_queue.wait(item.future.done, until_s, stoppable=False)
         return stack

@@ -1,4 +1,4 @@
-"""What is known of a running system at a moment: for the manager node, and whoever asks it."""
+"""The status of a running system: what the manager node publishes and answers."""
 
 from __future__ import annotations
 
@@ -17,19 +17,21 @@ from composer.runtime.metrics.statistics import Statistics
 
 @dataclass(frozen=True, slots=True)
 class NodeStatus:
-    """One node. ``since_s`` is when it came into its state, in seconds since 1970.
+    """The status of one node.
 
-    ``held_down`` is why a failed node is kept down, and empty otherwise; ``wanted`` is the state
-    that it is to be in; ``left_to_manager`` is what is asked of the manager and not of the node
-    (see :class:`composer.model.Introspection`); ``starts_active`` is whether a start of the system
-    makes it active. Rates are in hertz, over the last second, as is ``busy``: the share of a thread
-    that its callbacks took. ``slowest`` is the callback that took longest at once so far, and how
-    long; ``overruns`` are calls over their ``budget_ms``, ``queue_drops`` what full queues pushed
-    out; ``qos_events`` counts what :mod:`composer.runtime.ports.qos_events` tells of.
+    ``desired`` is the state that the supervisor keeps it in; ``since_s`` is when it reached its
+    state, in seconds since 1970. ``held_down`` is why a failed node is held down, else empty.
+    ``starts_active`` is whether a start of the system activates it. ``left_to_manager`` are the
+    services that the manager node has instead (see :class:`composer.model.Introspection`).
+
+    Rates are in hertz over the last second, and so is ``busy``, the share of a thread that its
+    callbacks took. ``slowest`` is the callback with the longest call so far, and its time.
+    ``overruns`` counts calls over their ``budget_ms``, ``queue_drops`` messages and calls that full
+    queues dropped, ``qos_events`` the events of :mod:`composer.runtime.ports.qos_events` by name.
     """
 
     node: str
-    wanted: str
+    desired: str
     starts_active: bool = True
     left_to_manager: tuple[str, ...] = ()
     state: str = "unconfigured"
@@ -52,7 +54,7 @@ class SystemStatus:
     """A system, its process, and its nodes in the order of the bring-up."""
 
     system: str
-    activity: str  # what is being done with it: "starting", "running", "pausing", "stopping" ...
+    activity: str  # "starting", "running", "pausing", "stopping" ...
     nodes: tuple[NodeStatus, ...]
     host: str
     pid: int
@@ -65,13 +67,12 @@ class SystemStatus:
 
     @property
     def is_active(self) -> bool:
-        """Whether every node that a start makes active is active, and no node has failed.
+        """Whether every node that a start activates is active, and no node has failed.
 
-        A node that failed counts also where a start only makes it inactive. A system without any
-        node that is to be active is not.
+        A system without such a node is never active.
         """
-        wanted = [node for node in self.nodes if node.starts_active]
-        return bool(wanted) and not self.failed and all(node.state == "active" for node in wanted)
+        nodes = [node for node in self.nodes if node.starts_active]
+        return bool(nodes) and not self.failed and all(node.state == "active" for node in nodes)
 
     @property
     def summary(self) -> str:
@@ -83,19 +84,19 @@ class SystemStatus:
 
 
 class _Counters(NamedTuple):
-    """What a node had done at a moment of ``time.monotonic()``."""
+    """Counters of a node at a time of ``time.monotonic()``."""
 
     at_s: float
     sent: int
     received: int
     busy_s: float
 
-    def put_into(self, node: NodeStatus, before: _Counters | None) -> NodeStatus:
+    def with_rates(self, node: NodeStatus, before: _Counters | None) -> NodeStatus:
         """Return ``node`` with the rates since ``before``."""
         if before is None or self.at_s <= before.at_s:
             return node
         passed_s = self.at_s - before.at_s
-        # A node that was made anew counts from zero again.
+        # The counters of ports start from zero when a node is configured again.
         return replace(
             node,
             sent_hz=max(0, self.sent - before.sent) / passed_s,
@@ -105,10 +106,10 @@ class _Counters(NamedTuple):
 
 
 class Status:
-    """Where everything that happens to nodes is written down, from any thread."""
+    """The current status of the system and its nodes. Thread-safe."""
 
     def __init__(self, system: System, order: tuple[str, ...]) -> None:
-        """``order`` has the keys of all nodes, in the order of the bring-up."""
+        """``order`` are the keys of all nodes, in the order of the bring-up."""
         self._lock = threading.Lock()
         self._changed: Callable[[], None] = lambda: None
         self._statistics: Mapping[str, Statistics] = {}
@@ -137,49 +138,49 @@ class Status:
         }
 
     def on_change(self, changed: Callable[[], None]) -> None:
-        """Call ``changed`` after each change, on the thread that made it."""
+        """Call ``changed`` after each change, on the thread of the change."""
         self._changed = changed
 
     @property
     def without_nodes(self) -> SystemStatus:
-        """The system and its process: a snapshot for who asks nothing about nodes."""
+        """The status of the system and its process, without its nodes."""
         return self._status
 
     def snapshot(self) -> SystemStatus:
-        """Return everything as it is now."""
+        """Return the status now."""
         with self._lock:
-            nodes = tuple(self._measured(name, node) for name, node in self._nodes.items())
+            nodes = tuple(self._with_counters(name, node) for name, node in self._nodes.items())
             return replace(self._status, nodes=nodes)
 
     def set_activity(self, activity: str) -> None:
-        """Say what is being done with the system."""
+        """Set the activity of the system."""
         with self._lock:
             self._status = replace(self._status, activity=activity)
         self._changed()
 
-    def set_wanted(self, wanted: Mapping[str, str], held_down: Mapping[str, str]) -> None:
-        """Say where the nodes are to be, and which failed ones are held down, by their keys."""
+    def set_desired(self, desired: Mapping[str, str], held_down: Mapping[str, str]) -> None:
+        """Set the desired states, and why failed nodes are held down, by the keys of nodes."""
         with self._lock:
             for name, node in self._nodes.items():
                 self._nodes[name] = replace(
                     node,
-                    wanted=wanted.get(name, node.wanted),
+                    desired=desired.get(name, node.desired),
                     held_down=held_down.get(name, ""),
                 )
         self._changed()
 
     def set_state(self, name: str, state: str) -> None:
-        """Say that a node has come to rest in a state."""
+        """Set the state of a node."""
         self._change(name, state=state, since_s=time.time())
 
-    def see_states(self, states: Mapping[str, str]) -> None:
-        """Take over the states that nodes are seen in, of which some may be transitions."""
+    def update_states(self, states: Mapping[str, str]) -> None:
+        """Set observed states, which may also be transition states."""
         for name, state in states.items():
             if self._nodes[name].state != state:
                 self.set_state(name, state)
 
     def set_error(self, name: str, text: str) -> None:
-        """Say what went wrong with a node last."""
+        """Set the last error of a node."""
         self._change(name, last_error=text)
 
     def count_restart(self, name: str) -> None:
@@ -190,32 +191,29 @@ class Status:
         self._changed()
 
     def measure(self, statistics: Mapping[str, Statistics]) -> None:
-        """Take down the counters of the nodes: rates are those since the last time.
-
-        What is made of them is worked out for who asks.
-        """
+        """Read the counters of the nodes; rates are those between the last two calls."""
         now_s = time.monotonic()
         with self._lock:
             self._statistics = statistics
             self._counters_before = self._counters
             self._counters = {
-                name: _Counters(now_s, counted.sent, counted.received, counted.busy_s)
-                for name, counted in statistics.items()
+                name: _Counters(now_s, counters.sent, counters.received, counters.busy_s)
+                for name, counters in statistics.items()
             }
 
-    def _measured(self, name: str, node: NodeStatus) -> NodeStatus:
-        counted = self._statistics.get(name)
-        if counted is None:
+    def _with_counters(self, name: str, node: NodeStatus) -> NodeStatus:
+        counters = self._statistics.get(name)
+        if counters is None:
             return node
         node = replace(
             node,
-            errors=counted.errors,
-            slowest=counted.slowest,
-            overruns=counted.overruns,
-            queue_drops=counted.queue_drops,
-            qos_events=dict(counted.qos_events),
+            errors=counters.errors,
+            slowest=counters.slowest,
+            overruns=counters.overruns,
+            queue_drops=counters.queue_drops,
+            qos_events=dict(counters.qos_events),
         )
-        return self._counters[name].put_into(node, self._counters_before.get(name))
+        return self._counters[name].with_rates(node, self._counters_before.get(name))
 
     def _change(self, name: str, **changes: object) -> None:
         with self._lock:

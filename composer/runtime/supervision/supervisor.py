@@ -1,16 +1,15 @@
-"""Keeps a system up: brings it up as a whole or not at all, deals with faults, obeys commands.
+"""Keeps a system in its desired state: handles faults, external transitions and restarts.
 
-What is to be done is decided in :mod:`composer.plan`; here it is done, on the main thread, one
-thing after the other.
+:mod:`composer.plan` decides what to do. The supervisor does it, on the main thread, one event at a
+time, and owns the desired state and the clock of the restarts that are part of it.
 """
 
 from __future__ import annotations
 
-import heapq
 import math
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from composer.model import OnFailure, PrimaryState, System
 from composer.model.dependencies import dependents
@@ -20,48 +19,48 @@ from composer.plan import (
     Fault,
     FaultKind,
     Plan,
+    Restart,
     Step,
     decide,
     desired_states,
     plan_transitions,
     reconcile,
 )
+from composer.runtime.node.lifecycle import FINALIZED
 from composer.runtime.supervision.events import (
     NodeFailed,
     NodeTransitionFailed,
+    Reporter,
     Restarted,
     RolledBack,
     RollingBack,
     Stuck,
 )
-from composer.runtime.supervision.health_monitor import Hanging, LoopRecovered
-from composer.runtime.supervision.main_queue import MainQueue
-from composer.runtime.supervision.node_set import FINALIZED, CreationFailed, NodeSet
+from composer.runtime.supervision.main_queue import (
+    CallbackHanging,
+    Command,
+    ExternalTransition,
+    Item,
+    LoopRecovered,
+    MainQueue,
+)
+from composer.runtime.supervision.node_set import CreationFailed, NodeSet
 from composer.runtime.supervision.plan_executor import ExecutionOptions, PlanExecutor, StepFailed
-from composer.runtime.supervision.reporter import Reporter
 from composer.runtime.supervision.status import Status
 
-_PRIMARY = {state.value: state for state in PrimaryState}
-_DOWN = (PrimaryState.UNCONFIGURED.value, FINALIZED)
-_LENIENT = ExecutionOptions(lenient=True)
-
-
-@dataclass(frozen=True, slots=True)
-class ExternalTransition:
-    """Somebody outside has taken a node to another state. ``node`` is a key, ``state`` a label."""
-
-    node: str
-    state: str
+_PRIMARY_STATES = {state.value: state for state in PrimaryState}
+_DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
+_BEST_EFFORT = ExecutionOptions(best_effort=True)
 
 
 class Supervisor:
-    """What has to be kept up, and what was done about it so far."""
+    """The desired state of a system, and the reactions to everything that deviates from it."""
 
     def __init__(
         self,
         system: System,
         node_set: NodeSet,
-        main_queue: MainQueue[object],
+        main_queue: MainQueue[Item],
         status: Status,
         reporter: Reporter,
     ) -> None:
@@ -70,242 +69,231 @@ class Supervisor:
         self._main_queue = main_queue
         self._status = status
         self._reporter = reporter
-        self._plan_executor = PlanExecutor(node_set, main_queue, self._tell_failed)
-        self._upkeep = DesiredState(dict.fromkeys(node_set.nodes, PrimaryState.UNCONFIGURED))
-        self._due: list[tuple[float, str, int]] = []  # when to restart which node, what attempt
-        self._stranded: dict[str, set[str]] = {}  # by hung loop: nodes that did nothing wrong
-
-    @property
-    def moving(self) -> set[str]:
-        """The nodes that are being moved now; where they come to rest is no news."""
-        return self._plan_executor.moving
+        self._plan_executor = PlanExecutor(node_set, main_queue, self._report_failed_step)
+        self._desired = DesiredState(dict.fromkeys(node_set.nodes, PrimaryState.UNCONFIGURED))
+        self._abandoned: dict[str, set[str]] = {}  # by hung loop: the nodes that did not fail
 
     @property
     def goals(self) -> Mapping[str, PrimaryState]:
-        """Where the nodes are wanted, by their keys."""
-        return self._upkeep.goals
+        """The desired states of the nodes, by their keys."""
+        return self._desired.goals
 
     @property
     def has_failed_nodes(self) -> bool:
-        """Whether a node is held down, or gave the system up."""
-        return bool(self._upkeep.down)
+        """Whether a node is held down, or ended the system."""
+        return bool(self._desired.down)
 
     # --- the whole system
 
-    def want(self, goals: Mapping[str, PrimaryState], *, forget: bool = False) -> None:
-        """Say where nodes are wanted from now on; with ``forget``, failures are history."""
-        self._upkeep = self._upkeep.with_goals(goals)
-        if forget:
-            self._upkeep = DesiredState(self._upkeep.goals)
-            self._due.clear()
-        self._show()
+    def set_goals(
+        self, goals: Mapping[str, PrimaryState], *, forget_failures: bool = False
+    ) -> None:
+        """Change the desired states of some nodes."""
+        self._desired = self._desired.with_goals(goals)
+        if forget_failures:
+            self._desired = DesiredState(self._desired.goals)
+        self._publish_desired()
 
     def bring_up(self, plan: Plan, within_s: float = math.inf) -> str | None:
-        """Carry out a plan as a whole or not at all; return why it failed, or None.
-
-        What it had done by then is undone in reverse.
-        """
+        """Execute a plan, all or nothing; return why it failed and was rolled back, or None."""
         before = self._node_set.states()
         end_s = time.monotonic() + within_s
-        failures = self._plan_executor.carry_out(plan, ExecutionOptions(end_s=end_s))
+        failures = self._plan_executor.execute(plan, ExecutionOptions(end_s=end_s))
         if not failures:
             return None
-        step = failures[0].step
-        reason = f"it did not {step.transition}: {failures[0].reason}"
+        step, reason = failures[0].step, failures[0].text
         if time.monotonic() >= end_s:
-            reason = f"it did not {step.transition} in time: {within_s:g} s are over"
+            reason = f"{step.transition} failed: bring-up timed out after {within_s:g} s"
         self._roll_back(before, step.full_name, reason)
         return f"{step.full_name}: {reason}"
 
-    def mend(self, why: str) -> tuple[StepFailed, ...]:
-        """Take every node to where it is wanted now; failures on the way become faults."""
-        return self._reach(self._upkeep, self._node_set.states(), why)
+    def reconcile(self, cause: str) -> tuple[StepFailed, ...]:
+        """Take every node to its desired state; failures on the way become faults."""
+        return self._reach(self._desired, self._node_set.states(), cause)
 
-    def _mend_settled(self, why: str = "") -> tuple[StepFailed, ...]:
-        """Do the same with all nodes but those that have just failed or been moved, too.
-
-        They would be brought up again before anybody has dealt with that.
-        """
-        return self._reach(self._upkeep, self._node_set.settled(), why)
+    def _reconcile_settled(self, cause: str = "") -> tuple[StepFailed, ...]:
+        """Reconcile, but without nodes that have an event in the queue: that is handled first."""
+        return self._reach(self._desired, self._node_set.settled(), cause)
 
     def _reach(
-        self, upkeep: DesiredState, states: Mapping[str, PrimaryState], why: str
+        self, desired: DesiredState, states: Mapping[str, PrimaryState], cause: str
     ) -> tuple[StepFailed, ...]:
-        plan = reconcile(self._system, upkeep, states, why)
-        failures = self._plan_executor.carry_out(plan, _LENIENT)
+        plan = reconcile(self._system, desired, states, cause)
+        failures = self._plan_executor.execute(plan, _BEST_EFFORT)
         for failure in failures:
-            if failure.step.node not in self._upkeep.down:
-                self._main_queue.put(_fault_of(failure))
-        self._show()
+            if failure.step.node not in self._desired.down:
+                self._main_queue.put(Fault(failure.step.node, FaultKind.STEP, failure.text))
+        self._publish_desired()
         return failures
 
-    def tear_down(self, steps: Plan, end_s: float, share_s: float) -> bool:
-        """Take everything down, whatever becomes of it; return whether nothing failed."""
-        manner = ExecutionOptions(lenient=True, stoppable=False, end_s=end_s, share_s=share_s)
-        return not self._plan_executor.carry_out(steps, manner)
+    def tear_down(self, plan: Plan, end_s: float, step_limit_s: float) -> bool:
+        """Execute a plan as far as possible; return whether nothing failed."""
+        options = ExecutionOptions(
+            best_effort=True, stoppable=False, end_s=end_s, step_limit_s=step_limit_s
+        )
+        return not self._plan_executor.execute(plan, options)
 
     def _roll_back(self, before: Mapping[str, PrimaryState], node: str, reason: str) -> None:
-        tell = self._reporter.tell
-        tell(RollingBack(self._reporter.elapsed_s, node, reason))
+        report = self._reporter.report
+        report(RollingBack(self._reporter.elapsed_s, node, reason))
         causes = dict.fromkeys(self._node_set.nodes, f"{node} failed")
         plan = plan_transitions(self._system, self._node_set.states(), before, causes)
-        self._plan_executor.carry_out(plan, _LENIENT)
+        self._plan_executor.execute(plan, _BEST_EFFORT)
         undone = tuple(dict.fromkeys(step.full_name for step in plan.steps))
-        tell(RolledBack(self._reporter.elapsed_s, undone))
+        report(RolledBack(self._reporter.elapsed_s, undone))
 
-    # --- what happens to nodes
+    # --- events
 
-    def next_restart_s(self) -> float | None:
-        """Return when ``time.monotonic()`` says that a node is to be restarted; None: none is."""
-        return self._due[0][0] if self._due else None
+    def run(self, run_command: Callable[[Command], None], end_s: float = math.inf) -> None:
+        """Handle events and due restarts until a stop is requested, or until ``end_s``."""
+        while not self._main_queue.stopping and time.monotonic() < end_s:
+            restart = self._desired.next_restart
+            if restart is not None and time.monotonic() >= restart.due_s:
+                self._restart(restart)
+                continue
+            due_s = math.inf if restart is None else restart.due_s
+            match self._main_queue.get(min(end_s, due_s)):
+                case Fault() as fault:
+                    self._on_fault(fault)
+                case ExternalTransition() as transition:
+                    self._on_external_transition(transition)
+                case CallbackHanging() as hanging:
+                    self._on_callback_hanging(hanging)
+                case LoopRecovered() as recovered:
+                    self._on_loop_recovered(recovered)
+                case Command() as command:
+                    run_command(command)
 
-    def restart_due(self) -> None:
-        """Restart the node whose wait is over first."""
-        _, name, attempt = heapq.heappop(self._due)
-        if name not in self._upkeep.down:
-            return  # somebody else has brought it up
-        now_s = time.monotonic()
-        self._upkeep = self._upkeep.restart(name, now_s)
+    def _restart(self, restart: Restart) -> None:
+        name = restart.node
+        self._desired = self._desired.restart(name, time.monotonic())
         self._status.count_restart(name)
         try:
-            self._node_set.revive(name)
+            self._node_set.recreate(name)
         except CreationFailed as error:
-            self.take_fault(Fault(name, FaultKind.TRANSITION, str(error), now_s))
+            self._on_fault(Fault(name, FaultKind.TRANSITION, str(error)))
             return
         full_name = self._node_set.nodes[name].full_name
-        if (
-            not self._mend_settled(f"restart {attempt} of {full_name}")
-            and not self._main_queue.closing
-        ):
-            self._reporter.tell(Restarted(self._reporter.elapsed_s, full_name, attempt))
+        failures = self._reconcile_settled(f"restart {restart.attempt} of {full_name}")
+        if not failures and not self._main_queue.stopping:
+            self._reporter.report(Restarted(self._reporter.elapsed_s, full_name, restart.attempt))
 
-    def take_fault(self, fault: Fault) -> None:
-        """Do what is to be done about a failed node."""
-        self._node_set.left[fault.node] = self._node_set.nodes[fault.node].state
-        verdict = decide(self._system, self._upkeep, fault)
-        if verdict is None or self._is_overtaken(fault):
-            return
+    def _on_fault(self, fault: Fault) -> None:
+        """Take a failed node down, and restart it, isolate it, or end the system."""
         node = self._node_set.nodes[fault.node]
+        self._node_set.expected[fault.node] = node.state
+        decision = decide(self._system, self._desired, fault, time.monotonic())
+        if decision is None or self._is_outdated(fault):
+            return
         self._status.set_error(fault.node, fault.text)
-        self._reporter.tell(
-            NodeFailed(
-                self._reporter.elapsed_s, node.full_name, fault.text, self._consequence(verdict)
-            )
+        consequence = _consequence(decision)
+        self._reporter.report(
+            NodeFailed(self._reporter.elapsed_s, node.full_name, fault.text, consequence)
         )
-        self._upkeep = self._upkeep.fail(fault)
+        self._desired = self._desired.fail(fault)
         if fault.kind is FaultKind.LOST:
-            node.give_up()
-            self._strand(fault.node)
-        if verdict.action is OnFailure.SHUTDOWN:
-            self._show()
-            self._main_queue.ask(f"{node.full_name} failed: {verdict.reason}")
+            node.lifecycle.fail_request()
+            self._abandon_loop(fault.node)
+        if decision.action is OnFailure.SHUTDOWN:
+            self._publish_desired()
+            self._main_queue.request_stop(f"{node.full_name} failed: {decision.reason}")
             return
-        self._mend_settled()
-        self._force_down(fault.node)
+        self._reconcile_settled()
+        self._shut_down_unless_down(fault.node)
         if self._node_set.is_lost(fault.node) and fault.kind is not FaultKind.LOST:
-            self._upkeep = self._upkeep.release(fault.node)
-            self.take_fault(replace(fault, kind=FaultKind.LOST))
-        elif verdict.action is OnFailure.RESTART:
-            due_s = time.monotonic() + verdict.wait_s
-            heapq.heappush(self._due, (due_s, fault.node, verdict.attempt))
+            self._desired = self._desired.release(fault.node)
+            self._on_fault(replace(fault, kind=FaultKind.LOST))
+        elif decision.action is OnFailure.RESTART:
+            due_s = time.monotonic() + decision.wait_s
+            restart = Restart(fault.node, decision.attempt, due_s)
+            self._desired = self._desired.schedule(restart)
 
-    def take_move(self, moved: ExternalTransition) -> None:
-        """Accept that somebody outside wants a node elsewhere.
+    def _on_external_transition(self, transition: ExternalTransition) -> None:
+        """Accept the new state of a node as the desired one, and adapt its dependents.
 
-        Only dependents are moved in consequence: transitions of others may still be queued.
+        Other nodes are not moved: their external transitions may still be in the queue.
         """
-        if self._node_set.nodes[moved.node].state != moved.state:
-            return  # it has gone on since, and that is news of its own
-        self._node_set.left[moved.node] = moved.state
+        name = transition.node
+        if self._node_set.nodes[name].state != transition.state:
+            return  # outdated: another event follows
+        self._node_set.expected[name] = transition.state
         states = self._node_set.states()
-        state = _PRIMARY.get(moved.state, PrimaryState.UNCONFIGURED)
-        self._upkeep = self._upkeep.release(moved.node).with_goals({moved.node: state})
-        needing = dependents(self._system, moved.node)
-        still = {name: at for name, at in states.items() if name not in needing}
-        self._reach(self._upkeep.with_goals(still), states, f"{moved.node} was moved by hand")
+        state = _PRIMARY_STATES.get(transition.state, PrimaryState.UNCONFIGURED)
+        self._desired = self._desired.release(name).with_goals({name: state})
+        moved = dependents(self._system, name)
+        unmoved = {other: at for other, at in states.items() if other not in moved}
+        self._reach(self._desired.with_goals(unmoved), states, f"external transition of {name}")
 
-    def take_hanging(self, hanging: Hanging) -> None:
-        """Tell of a callback that takes too long, and is being interrupted."""
+    def _on_callback_hanging(self, hanging: CallbackHanging) -> None:
+        """Report a callback that takes too long; the health monitor interrupts it."""
         full_name = self._node_set.nodes[hanging.node].full_name
-        what = f"return from {hanging.callback} within {1000.0 * hanging.limit_s:g} ms"
-        self._reporter.tell(Stuck(self._reporter.elapsed_s, full_name, what, hanging.stack))
+        action = f"return from {hanging.callback} within {1000.0 * hanging.limit_s:g} ms"
+        self._reporter.report(Stuck(self._reporter.elapsed_s, full_name, action, hanging.stack))
 
-    def take_return(self, returned: LoopRecovered) -> None:
-        """Go on with the nodes of a loop that had been given up."""
-        if returned.loop not in self._node_set.hung:
+    def _on_loop_recovered(self, recovered: LoopRecovered) -> None:
+        """Reconcile the nodes of a loop that was abandoned."""
+        if recovered.loop not in self._node_set.hung:
             return
-        self._node_set.hung.discard(returned.loop)
-        for name in self._stranded.pop(returned.loop, ()):
-            self._upkeep = self._upkeep.release(name)
-        self._mend_settled(f"executor '{returned.loop}' goes on")
+        self._node_set.hung.discard(recovered.loop)
+        for name in self._abandoned.pop(recovered.loop, ()):
+            self._desired = self._desired.release(name)
+        self._reconcile_settled(f"executor '{recovered.loop}' runs again")
 
-    def _is_overtaken(self, fault: Fault) -> bool:
-        """Say whether somebody has taken the node elsewhere since it failed."""
+    def _is_outdated(self, fault: Fault) -> bool:
+        """Return whether a transition has changed the node's state since it failed."""
         state = self._node_set.nodes[fault.node].state
         match fault.kind:
             case FaultKind.TRANSITION:
                 return state not in _DOWN
             case FaultKind.SILENCE | FaultKind.ERRORS:
-                return state != PrimaryState.ACTIVE.value
+                return state != PrimaryState.ACTIVE
             case _:
                 return False
 
-    def _consequence(self, verdict: Decision) -> str:
-        match verdict.action:
-            case OnFailure.RESTART:
-                return f"restart {verdict.attempt} in {verdict.wait_s:g} s"
-            case OnFailure.ISOLATE:
-                return "it is isolated"
-            case OnFailure.SHUTDOWN:
-                return "the system is given up"
-
-    def _strand(self, culprit: str) -> None:
-        """Give up the loop of a node, and with it all other nodes it runs."""
-        loop = self._node_set.nodes[culprit].loop.name
+    def _abandon_loop(self, hanging: str) -> None:
+        """Mark the loop of a hanging node as hung, and its other nodes as failed."""
+        loop = self._node_set.nodes[hanging].loop.name
         self._node_set.hung.add(loop)
-        full_name = self._node_set.nodes[culprit].full_name
-        stranded = self._stranded.setdefault(loop, set())
+        full_name = self._node_set.nodes[hanging].full_name
+        abandoned = self._abandoned.setdefault(loop, set())
         for name, node in self._node_set.nodes.items():
-            if node.loop.name == loop and name not in self._upkeep.down:
-                stranded.add(name)
+            if node.loop.name == loop and name not in self._desired.down:
+                abandoned.add(name)
                 text = f"its executor hangs in {full_name}"
-                fault = Fault(name, FaultKind.LOST, text, time.monotonic())
-                self._upkeep = self._upkeep.fail(fault)
+                self._desired = self._desired.fail(Fault(name, FaultKind.LOST, text))
                 self._status.set_error(name, text)
 
-    def _force_down(self, name: str) -> None:
-        """Shut down a failed node that refuses to go any other way.
-
-        One that somebody else has taken up by now does not refuse.
-        """
+    def _shut_down_unless_down(self, name: str) -> None:
+        """Shut down a failed node that could not be cleaned up, unless it was moved externally."""
         node = self._node_set.nodes[name]
-        if (
-            self._node_set.settled().get(name, PrimaryState.UNCONFIGURED)
-            is PrimaryState.UNCONFIGURED
-        ):
-            return
-        step = Step(1, "shutdown", name, node.full_name, "it would not go down")
-        self._plan_executor.carry_out(Plan((step,)), _LENIENT)
+        down = PrimaryState.UNCONFIGURED
+        if self._node_set.settled().get(name, down) is not down:
+            step = Step(1, "shutdown", name, node.full_name, "cannot be cleaned up")
+            self._plan_executor.execute(Plan((step,)), _BEST_EFFORT)
 
-    def _tell_failed(self, failure: StepFailed) -> None:
+    def _report_failed_step(self, failure: StepFailed) -> None:
         step = failure.step
         at_s = self._reporter.elapsed_s
         if failure.stuck:
-            event = Stuck(at_s, step.full_name, step.transition, failure.stack)
-            self._reporter.tell(event)
+            self._reporter.report(Stuck(at_s, step.full_name, step.transition, failure.stack))
         else:
-            self._reporter.tell(
+            self._reporter.report(
                 NodeTransitionFailed(
                     at_s, step.full_name, step.transition, failure.state, failure.reason
                 )
             )
 
-    def _show(self) -> None:
-        goals = desired_states(self._system, self._upkeep)
+    def _publish_desired(self) -> None:
+        goals = desired_states(self._system, self._desired)
         states = {name: state.value for name, state in goals.items()}
-        self._status.set_wanted(states, self._upkeep.down)
+        self._status.set_desired(states, self._desired.down)
 
 
-def _fault_of(failure: StepFailed) -> Fault:
-    text = f"it did not {failure.step.transition}: {failure.reason}"
-    return Fault(failure.step.node, FaultKind.STEP, text, time.monotonic())
+def _consequence(decision: Decision) -> str:
+    match decision.action:
+        case OnFailure.RESTART:
+            return f"restart {decision.attempt} in {decision.wait_s:g} s"
+        case OnFailure.ISOLATE:
+            return "isolating it"
+        case OnFailure.SHUTDOWN:
+            return "shutting down the system"

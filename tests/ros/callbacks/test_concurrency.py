@@ -44,7 +44,7 @@ def test_messages_wait_for_a_handler_that_awaits_and_the_oldest_makes_room(
         source.publish(Int64(data=0))
         system.wait_for_log("begin 0")
         node = system.node("slow")
-        waiting = node._assembly.subscriptions["input"]._mailbox._messages
+        waiting = node._entities.subscriptions["input"]._mailbox._messages
         for number in range(1, 5):
             source.publish(Int64(data=number))
             wait_until(lambda n=number: len(waiting) + node.statistics.dropped == n)
@@ -106,7 +106,7 @@ def test_what_comes_while_a_node_rests_does_not_wait_for_it(tmp_path: Path, kind
     """
     with running(text, tmp_path, resting=module) as system:
         source, sink = (system.node(name) for name in ("source", "sink"))
-        output = source._assembly.senders["output"]
+        output = source._entities.senders["output"]
         output.publish(Int64(data=0))
         system.wait_for_log("begin 0")
         system.change("sink", "deactivate")
@@ -154,7 +154,7 @@ def test_reentrant_callbacks_run_at_once_on_several_threads(tmp_path: Path) -> N
             self.log.info(f"met {message.data}")
     """
     with running(text, tmp_path, overlapping=module) as system:
-        output = system.node("source")._assembly.senders["output"]
+        output = system.node("source")._entities.senders["output"]
         output.publish(Int64(data=0))
         output.publish(Int64(data=1))
         for number in range(2):

@@ -38,6 +38,6 @@ def test_a_late_listener_of_rosout_gets_the_log(tmp_path: Path, peer: Peer) -> N
 def test_what_is_below_the_level_is_not_logged(tmp_path: Path) -> None:
     with running(LOUD, tmp_path, options=HostOptions(log_level=LogLevel.WARN)) as system:
         system.wait_for_log("a warning")
-    assert [str(event).partition("] ")[2] for event in system.told(Logged)] == [
+    assert [str(event).partition("] ")[2] for event in system.reported(Logged)] == [
         "[WARN] [robot.loud] a warning"
     ]

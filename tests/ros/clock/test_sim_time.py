@@ -46,7 +46,7 @@ def wait_for_ticks(system: RunningSystem, *times_s: float) -> None:
 
 def wait_for_timer(system: RunningSystem) -> None:
     """Wait until the timer in simulated time waits: what jumps before that it does not see."""
-    clock = system.node("a")._core.clock
+    clock = system.node("a")._context.clock
     wait_until(lambda: clock._calls._waiting, "a timer that waits")
 
 
@@ -81,7 +81,7 @@ def test_timers_stand_start_pause_and_jump_with_the_clock(
         wait_for_ticks(system, 1000.1, 1100.1, 1100.2, 7.1)
         let_real_time_pass(system)
         assert len(ticks(system)) == 4
-        assert system.told(CallbackFailed) == []
+        assert system.reported(CallbackFailed) == []
 
 
 @pytest.mark.parametrize("factor", [1.0, 10.0])
@@ -164,7 +164,7 @@ def test_a_node_that_is_deactivated_waits_no_more(tmp_path: Path, peer: Peer, ki
         assert peer.change("/a", "activate")
         let_real_time_pass(system)
         assert "awake" not in system.log_text()
-        assert system.told(CallbackFailed) == []
+        assert system.reported(CallbackFailed) == []
 
 
 @pytest.mark.parametrize("kind", KINDS)

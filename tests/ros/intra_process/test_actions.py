@@ -84,7 +84,7 @@ def go(system: RunningSystem, max_velocity: float) -> Any:
     client = system.node("client")
     client._behavior.feedback.clear()
     client._behavior.sent = None
-    client._core.spawn(client._behavior.go(max_velocity))
+    client._context.spawn(client._behavior.go(max_velocity))
     return client._behavior
 
 
@@ -110,7 +110,7 @@ def test_every_outcome_of_a_goal_is_the_same_either_way(
 
         go(system, 0.0)
         wait_until(lambda: client.feedback and client.sent)  # feedback may be the first to come
-        system.node("client")._core.spawn(client.turn_back())
+        system.node("client")._context.spawn(client.turn_back())
         wait_until(lambda: len(client.outcomes) == 3)
         assert client.outcomes[-1] == ("canceled", "turned back")
 
@@ -129,7 +129,7 @@ def test_every_outcome_of_a_goal_is_the_same_either_way(
         system.change("client", "deactivate")
         wait_until(lambda: len(client.outcomes) == 6)
         assert client.outcomes[-1] == "CallCancelled"
-        goals = system.node("server")._assembly.action_servers["go"]._goals
+        goals = system.node("server")._entities.action_servers["go"]._goals
         wait_until(lambda: not goals, "the end of the goal nobody waits for")
 
 

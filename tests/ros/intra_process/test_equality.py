@@ -120,7 +120,7 @@ def test_a_connection_may_ask_for_copies_or_for_dds(tmp_path: Path) -> None:
     options = HostOptions(log_level=LogLevel.DEBUG)
     with running(COPIED, tmp_path, options=options, table=MODULE) as system:
         source = system.node("source")
-        publishers = source._assembly.senders
+        publishers = source._entities.senders
         sinks = {name: system.behavior(name) for name in ("shared", "copied", "by_dds")}
 
         def publish_and_change() -> None:
@@ -132,9 +132,9 @@ def test_a_connection_may_ask_for_copies_or_for_dds(tmp_path: Path) -> None:
         source.loop.run(publish_and_change)
         wait_until(lambda: all(sink.heard for sink in sinks.values()))
         heard = {name: [item.data for item in sink.heard] for name, sink in sinks.items()}
-    said = [line for line in system.log() if "uses DDS alone" in line]
+    said = [line for line in system.log() if "uses DDS only" in line]
     assert said == [
-        f"{end} uses DDS alone: 'delivery: dds' says so"
+        f"{end} uses DDS only: 'delivery: dds' says so"
         for end in ("publisher 'by_dds'", "subscription 'input'")
     ]
     assert heard == {"shared": [2], "copied": [1], "by_dds": [1]}

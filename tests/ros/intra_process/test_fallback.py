@@ -159,7 +159,7 @@ def test_every_message_comes_once_whatever_the_middleware_returns(
         assert [json.loads(line.partition(f"[{reader}] ")[2]) for line in said] == [everything]
     assert outside.wrong == []
     warned = [line for line in system.lines if "topics within the process go by DDS" in line]
-    by_dds = [line for line in system.lines if "uses DDS alone" in line]
+    by_dds = [line for line in system.lines if "uses DDS only" in line]
     if middleware is None:
         assert (warned, by_dds) == ([], [])
     else:

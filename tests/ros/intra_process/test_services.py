@@ -83,7 +83,7 @@ REFUSED = (False, "/server is inactive, not active")
 
 def ask(system: RunningSystem, data: bool = True, timeout_ms: float | None = None) -> None:
     client = system.node("client")
-    client._core.spawn(client._behavior.ask(data, timeout_ms))
+    client._context.spawn(client._behavior.ask(data, timeout_ms))
 
 
 def outcomes(system: RunningSystem, count: int) -> list[Any]:
@@ -155,13 +155,13 @@ def test_calls_of_one_moment_end_each_in_its_time(tmp_path: Path) -> None:
         text.replace("asking:Server}", "asking:Server, reentrant: true}"), tmp_path, asking=MODULE
     ) as system:
         client = system.node("client")
-        client._core.spawn(client._behavior.ask_at_once((90.0, 30.0, 60.0)))
+        client._context.spawn(client._behavior.ask_at_once((90.0, 30.0, 60.0)))
         told = outcomes(system, 3)
         assert told == [
             ("CallTimeout", limit, f"service '/ask' did not answer within {limit:g} ms")
             for limit in (90.0, 30.0, 60.0)
         ]
-        wait_until(lambda: not client._core.gate.pending._futures, "nothing is waited for")
+        wait_until(lambda: not client._context.gate.pending._futures, "nothing is waited for")
 
 
 @pytest.mark.parametrize("delivery", ["auto", "dds"])
@@ -196,7 +196,7 @@ def test_a_copied_request_is_what_it_was_when_it_was_sent(tmp_path: Path) -> Non
     text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto") + COPIED
     with running(text, tmp_path, asking=MODULE) as system:
         client, server = (system.node(name) for name in ("client", "server"))
-        client._core.spawn(client._behavior.ask_and_change())
+        client._context.spawn(client._behavior.ask_and_change())
         wait_until(lambda: client._behavior.answers)
         assert [request.data for request in server._behavior.asked] == [True]
         server._behavior.answers[0].message = "changed afterwards"

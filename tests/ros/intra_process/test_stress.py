@@ -235,7 +235,7 @@ class Stress:
     def _is_alone(self) -> bool:
         """Say whether the publishers of the stream have matched nobody but the three inside."""
         nodes = [self._system.node(name) for name in WRITERS]
-        ports = [node._assembly.publishers["stream"] for node in nodes]
+        ports = [node._entities.publishers["stream"] for node in nodes]
         return all(port._publisher.get_subscription_count() == 3 for port in ports)
 
     def _sent_by(self, name: str) -> dict[int, int]:

@@ -45,7 +45,7 @@ def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -
 
     The middleware counts first, and tells then.
     """
-    port = system.node("source")._assembly.publishers["numbers"]
+    port = system.node("source")._entities.publishers["numbers"]
     outlet = port.sender
 
     def knows() -> bool:
@@ -101,7 +101,7 @@ def test_every_outsider_is_seen_to_come(
     options = HostOptions(log_level=LogLevel(level))
     with running(apart, tmp_path, options=options, counting=MODULE) as system:
         source = system.node("source")
-        publisher = source._assembly.publishers["numbers"]._publisher
+        publisher = source._entities.publishers["numbers"]._publisher
         for turn in range(5):
             send(system, 10)
             before = publisher.get_subscription_count()
@@ -112,7 +112,7 @@ def test_every_outsider_is_seen_to_come(
             assert [take(subscription) for _ in range(10)] == list(range(first, first + 10))
             node.destroy_subscription(subscription)
             # Or its end would hide that the next one begins.
-            wait_until(lambda: source._core.node.count_subscribers("/apart/numbers") == 2)
+            wait_until(lambda: source._context.node.count_subscribers("/apart/numbers") == 2)
         near = system.behavior("near")
         wait_until(lambda: numbers(near.heard) == list(range(100)))
     node.destroy_node()
@@ -235,7 +235,7 @@ def test_a_publisher_that_is_not_active_reaches_nobody_inside(tmp_path: Path) ->
 def test_a_look_that_is_overtaken_does_not_hide_who_has_come(tmp_path: Path) -> None:
     """Two threads publish when somebody matches: the one looks before that, the other after it."""
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
-        port = system.node("source")._assembly.publishers["numbers"]
+        port = system.node("source")._entities.publishers["numbers"]
         outlet = port.sender
         overtaking = threading.Thread(target=outlet._look_outside)
 
@@ -255,7 +255,7 @@ def test_a_look_that_is_overtaken_does_not_hide_who_has_come(tmp_path: Path) -> 
 def test_who_joins_inside_during_a_look_is_not_taken_for_the_one_outside(tmp_path: Path) -> None:
     """It is counted who has matched before somebody joins, and who is of the process after it."""
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
-        outlet = system.node("source")._assembly.publishers["numbers"].sender
+        outlet = system.node("source")._entities.publishers["numbers"].sender
         near, far = outlet._inlets
         outlet.leave(far)
         joining, is_checked = threading.Thread(target=outlet.join, args=(far,)), threading.Event()

@@ -1,4 +1,4 @@
-"""Nodes that have given up endpoints for tools, and the manager that answers for them."""
+"""Nodes without endpoints for tools, and the proxy services of the manager node."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def publishers_of(peer: Peer, topic: str) -> set[str]:
     return {info.node_name for info in peer.node.get_publishers_info_by_topic(topic)}
 
 
-def test_what_is_given_up_is_never_created(system: RunningSystem, peer: Peer) -> None:
+def test_disabled_endpoints_are_not_created(system: RunningSystem, peer: Peer) -> None:
     known = peer.node.get_fully_qualified_node_names
     wait_until(lambda: {"/whole", TALKER} <= set(known()), "both nodes")
     peer.listen(Log, "/rosout")
@@ -89,42 +89,40 @@ def test_what_is_given_up_is_never_created(system: RunningSystem, peer: Peer) ->
     assert {"here I am", "so am I"} <= set(system.log())
 
 
-def test_the_manager_answers_for_them_with_standard_services(
-    system: RunningSystem, peer: Peer
-) -> None:
-    def ask(kind: Any, name: str, **fields: Any) -> Any:
+def test_proxy_services_have_standard_types(system: RunningSystem, peer: Peer) -> None:
+    def call(kind: Any, name: str, **fields: Any) -> Any:
         return peer.call(kind, f"/lean/manager/{name}", kind.Request(**fields))
 
-    listed = ask(ListParameters, "list_parameters").result
+    listed = call(ListParameters, "list_parameters").result
     assert set(listed.names) > OWN
     assert listed.prefixes == [TALKER]
-    names = [f"{TALKER}.speed", "/whole.size", "/nobody.speed", f"{TALKER}.nothing"]
-    values = ask(GetParameters, "get_parameters", names=names).values
+    names = [f"{TALKER}.speed", "/whole.size", "/missing.speed", f"{TALKER}.missing"]
+    values = call(GetParameters, "get_parameters", names=names).values
     assert [value.type for value in values] == [3, 2, 0, 0]
-    assert list(ask(GetParameterTypes, "get_parameter_types", names=names).types) == [3, 2, 0, 0]
-    described = ask(DescribeParameters, "describe_parameters", names=names).descriptors
+    assert list(call(GetParameterTypes, "get_parameter_types", names=names).types) == [3, 2, 0, 0]
+    described = call(DescribeParameters, "describe_parameters", names=names).descriptors
     assert [item.name for item in described] == names
     assert described[0].floating_point_range[0].to_value == 5.0
     changes = [
         Parameter(f"{TALKER}.speed", value=2.5).to_parameter_msg(),
         Parameter(f"{TALKER}.label", value="there").to_parameter_msg(),
-        Parameter("/nobody.speed", value=2.5).to_parameter_msg(),
+        Parameter("/missing.speed", value=2.5).to_parameter_msg(),
     ]
-    results = ask(SetParameters, "set_parameters", parameters=changes).results
+    results = call(SetParameters, "set_parameters", parameters=changes).results
     assert [result.successful for result in results] == [True, True, False]
-    mixed = ask(SetParametersAtomically, "set_parameters_atomically", parameters=changes).result
+    mixed = call(SetParametersAtomically, "set_parameters_atomically", parameters=changes).result
     assert not mixed.successful
-    assert "/nobody" in mixed.reason
-    alone = ask(SetParametersAtomically, "set_parameters_atomically", parameters=changes[:2])
+    assert "/missing" in mixed.reason
+    alone = call(SetParametersAtomically, "set_parameters_atomically", parameters=changes[:2])
     assert alone.result.successful
-    for label, success in (("/nobody activate", False), (f"{TALKER} activate", False)):
+    for label, success in (("/missing activate", False), (f"{TALKER} activate", False)):
         request = ChangeState.Request()
         request.transition.label = label
         answer = peer.call(ChangeState, "/lean/manager/change_state", request)
         assert answer.success is success
 
 
-def test_commands_ask_the_manager_without_being_told(session: Session) -> None:
+def test_commands_use_the_proxy_services(session: Session) -> None:
     control = Control(session, Deadline(20.0))
     assert control.find("talker") == TALKER
     assert set(control.nodes()) >= {TALKER, "/whole"}
@@ -151,28 +149,28 @@ def test_parameters_are_those_of_the_node(session: Session) -> None:
     assert "/lean/manager" not in listed
 
 
-def test_an_observer_sees_states_and_parameters(session: Session) -> None:
-    def seen(name: str) -> NodeSeen:
+def test_an_observer_reads_states_and_parameters(session: Session) -> None:
+    def observed(name: str) -> NodeSeen:
         node = snapshot.node(name)
         assert node is not None
         return node
 
     with Observer(session) as observer:
         snapshot = observer.look(Deadline(20.0))
-    assert (seen(TALKER).state, seen("/whole").state) == ("active", "active")
+    assert (observed(TALKER).state, observed("/whole").state) == ("active", "active")
     speed = Parameters(session, Deadline(20.0), TALKER).values(["speed"])
-    assert (seen(TALKER).parameters or {})["speed"] == speed["speed"] > 1.0
-    assert (seen("/whole").parameters or {})["size"] == 3
-    assert not [name for name in seen("/lean/manager").parameters or {} if "speed" in name]
+    assert (observed(TALKER).parameters or {})["speed"] == speed["speed"] > 1.0
+    assert (observed("/whole").parameters or {})["size"] == 3
+    assert not [name for name in observed("/lean/manager").parameters or {} if "speed" in name]
 
 
-def test_a_whole_node_has_what_any_lifecycle_node_has_and_nothing_twice(
+def test_a_node_with_all_endpoints_has_those_of_a_lifecycle_node(
     system: RunningSystem, peer: Peer
 ) -> None:
     plain = LifecycleNode("plain", context=peer.context)
 
     def endpoints(name: str) -> dict[str, Counter[str]]:
-        """What the node has by kinds, its own name left out, each with how often it is there."""
+        """Count the endpoints of a node by kind, with the name of the node replaced."""
         node = peer.node
         publishers = [
             topic
@@ -201,18 +199,20 @@ def test_a_whole_node_has_what_any_lifecycle_node_has_and_nothing_twice(
         plain.destroy_node()
 
 
-def test_nobody_has_to_know_whom_a_command_asks(system: RunningSystem) -> None:
-    def said(*arguments: str) -> str:
+def test_commands_work_the_same_with_proxy_services(system: RunningSystem) -> None:
+    def output_of(*arguments: str) -> str:
         command = [*COMPOSE, *arguments]
         done = subprocess.run(command, capture_output=True, check=False, text=True, timeout=30.0)
         assert done.returncode == 0, done.stderr
         return done.stdout
 
-    assert said("lifecycle", "set", "talker", "deactivate") == f"{TALKER}: active -> inactive\n"
-    (told,) = json.loads(said("ps", "--json"))["systems"]
-    states = {node["node"]: node["state"] for node in told["nodes"]}
+    assert (
+        output_of("lifecycle", "set", "talker", "deactivate") == f"{TALKER}: active -> inactive\n"
+    )
+    (listed,) = json.loads(output_of("ps", "--json"))["systems"]
+    states = {node["node"]: node["state"] for node in listed["nodes"]}
     assert states == {TALKER: "inactive", "/whole": "active"}
-    said("lifecycle", "set", "--system", "lean", "--to", "active")
-    said("param", "set", "talker", "speed", "3.5")
-    assert "3.5" in said("param", "get", "talker", "speed")
+    output_of("lifecycle", "set", "--system", "lean", "--to", "active")
+    output_of("param", "set", "talker", "speed", "3.5")
+    assert "3.5" in output_of("param", "get", "talker", "speed")
     assert system.node("talker").state == "active"

@@ -1,4 +1,4 @@
-"""A behaviour's file is imported once, whoever wants it at the same time."""
+"""A behavior's file is imported once, even by several threads at the same time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from composer.runtime.node.behavior_loader import behavior_class
 from composer.source import Located, SourceFile, Span
 
 
-def test_nodes_of_several_loops_get_the_whole_module(tmp_path: Path) -> None:
+def test_threads_that_import_a_module_at_the_same_time_share_it(tmp_path: Path) -> None:
     module = "import time\ntime.sleep(0.1)\nclass Late:\n    pass\n"
     tmp_path.joinpath("late.py").write_text(module, encoding="utf-8")
     span = Span(SourceFile("system.yaml", ""), 1, 1, 1)

@@ -1,4 +1,4 @@
-"""The lifecycle tells the truth: every transition ends, every request is answered."""
+"""Every transition ends in a primary state, and every request gets a response."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Subject(Behavior):
 """
 
 
-def test_ros_tools_see_every_state_and_transition(tmp_path: Path, peer: Peer) -> None:
+def test_services_and_events_report_every_state_and_transition(tmp_path: Path, peer: Peer) -> None:
     with running(SUBJECT, tmp_path, subject=QUIET) as system:
         events = peer.listen(TransitionEvent, "/subject/transition_event")
         wait_until(lambda: peer.node.count_publishers("/subject/transition_event"))
@@ -73,7 +73,7 @@ def test_ros_tools_see_every_state_and_transition(tmp_path: Path, peer: Peer) ->
 
 
 @pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
-def test_illegal_requests_are_refused_and_change_nothing(
+def test_invalid_requests_are_refused_and_change_nothing(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:
     text = f"""
@@ -91,7 +91,7 @@ def test_illegal_requests_are_refused_and_change_nothing(
             assert not peer.change("/subject", transition)
             assert peer.state("/subject") == "active"
         assert (
-            "'activate' is refused: the node is active; legal now: deactivate, shutdown"
+            "refused 'activate': the node is active; available transitions: deactivate, shutdown"
             in system.log()
         )
         assert peer.change("/subject", Transition.TRANSITION_ACTIVE_SHUTDOWN)
@@ -99,7 +99,7 @@ def test_illegal_requests_are_refused_and_change_nothing(
         assert not peer.change("/subject", "shutdown")
 
 
-def test_what_interrupts_a_transition_too_late_leaves_no_coroutine_behind(
+def test_a_late_interrupt_of_a_transition_leaves_no_coroutine_behind(
     tmp_path: Path,
     peer: Peer,
     monkeypatch: pytest.MonkeyPatch,
@@ -107,18 +107,18 @@ def test_what_interrupts_a_transition_too_late_leaves_no_coroutine_behind(
 ) -> None:
     failing = QUIET.replace("pass", "def on_configure(self):\n        raise ValueError('no map')")
     gc.collect()
-    recwarn.clear()  # what other tests have left behind is not told here
+    recwarn.clear()  # warnings about earlier tests
     with running(SUBJECT, tmp_path, subject=failing) as system:
         node = system.node("subject")
         loop = node.loop
         run_task = loop.run_task
 
-        def strike(work: Coroutine[Any, Any, Any]) -> Any:
+        def interrupt(work: Coroutine[Any, Any, Any]) -> Any:
             if node.state == "errorprocessing":
                 raise CallbackInterrupted
             return run_task(work)
 
-        monkeypatch.setattr(loop, "run_task", strike)
+        monkeypatch.setattr(loop, "run_task", interrupt)
         assert not peer.change("/subject", "configure")
         assert peer.state("/subject") == "finalized"
         gc.collect()
@@ -135,7 +135,7 @@ OUTCOMES = [
     ("raise SystemExit(1)", "error"),
     ("raise KeyboardInterrupt", "error"),
 ]
-#: transition -> (how to get there, state after success, after a refusal, after an error)
+#: transition -> (transitions before it, state after success, after a refusal, after an error)
 TRANSITIONS = {
     "configure": ([], "inactive", "unconfigured", "unconfigured"),
     "activate": (["configure"], "active", "inactive", "unconfigured"),
@@ -145,13 +145,13 @@ TRANSITIONS = {
 }
 
 
-def was_told(events: list[TransitionEvent], state: str) -> bool:
+def has_event(events: list[TransitionEvent], state: str) -> bool:
     return bool(events) and events[-1].goal_state.label == state
 
 
 @pytest.mark.parametrize("prefix", ["", "async "])
 @pytest.mark.parametrize("transition", TRANSITIONS)
-def test_whatever_a_handler_does_the_node_ends_in_a_primary_state(
+def test_every_outcome_of_a_handler_leads_to_a_primary_state(
     tmp_path: Path, peer: Peer, transition: str, prefix: str
 ) -> None:
     before, *ends = TRANSITIONS[transition]
@@ -173,7 +173,7 @@ def test_whatever_a_handler_does_the_node_ends_in_a_primary_state(
         events = peer.listen(TransitionEvent, "/subject/transition_event")
         for number, (body, outcome) in enumerate(OUTCOMES):
             if transition == "shutdown" and outcome != "error":
-                continue  # what ends in finalized cannot be tried again
+                continue  # no transition leaves finalized
             for step in before:
                 assert peer.change("/subject", step)
             assert peer.set_parameter("/subject", "outcome", number) == ""
@@ -181,17 +181,17 @@ def test_whatever_a_handler_does_the_node_ends_in_a_primary_state(
             assert answer is (outcome == "success"), body
             end = ends[("success", "failure", "error").index(outcome)]
             assert peer.state("/subject") == end, body
-            wait_until(partial(was_told, events, end), f"the event of {end}")
+            wait_until(partial(has_event, events, end), f"the event of {end}")
             assert peer.set_parameter("/subject", "outcome", -1) == ""
             for step in {"inactive": ["cleanup"], "active": ["deactivate", "cleanup"]}.get(end, []):
                 assert peer.change("/subject", step)
-            assert peer.call(Trigger, "/trigger").success, "the other node goes on"
+            assert peer.call(Trigger, "/trigger").success, "the other node still works"
     log = system.log_text()
     assert f"on_{transition}: ValueError: broken\nTraceback" in log
     assert f"on_{transition}: WrongReturn: on_{transition} returned 'nonsense'" in log
     assert "cause: SystemExit" in log
     if transition != "shutdown":
-        assert f"on_{transition} refuses: not now" in log
+        assert f"on_{transition} refused the transition: not now" in log
 
 
 def test_an_error_in_on_error_finalizes_the_node(tmp_path: Path, peer: Peer) -> None:
@@ -206,12 +206,12 @@ def test_an_error_in_on_error_finalizes_the_node(tmp_path: Path, peer: Peer) -> 
         assert not peer.change("/subject", "configure")
         assert peer.state("/subject") == "finalized"
         assert peer.call(Trigger, "/trigger").success
-        wait_until(lambda: system.told(NodeFailed), "the failure, before the end is asked for")
+        wait_until(lambda: system.reported(NodeFailed), "the failure, before the stop")
     assert "on_error: RuntimeError: second, after first" in system.log_text()
     assert system.end().exit_code == 1
 
 
-def test_requests_in_mid_transition_are_refused(tmp_path: Path, peer: Peer) -> None:
+def test_requests_during_a_transition_are_refused(tmp_path: Path, peer: Peer) -> None:
     module = """
     from composer.behavior import Behavior
 
@@ -225,18 +225,21 @@ def test_requests_in_mid_transition_are_refused(tmp_path: Path, peer: Peer) -> N
     with running(text, tmp_path, subject=module) as system:
         client = peer.client(ChangeState, "/subject/change_state")
         request = ChangeState.Request(transition=Transition(label="configure"))
-        under_way = client.call_async(request)
+        pending = client.call_async(request)
         system.wait_for_log("begin")
         assert peer.state("/subject") == "configuring"
         assert not finished(client.call_async(request)).success
-        assert not under_way.done(), "refused at once"
+        assert not pending.done(), "refused at once"
         assert peer.set_parameter("/subject", "may_end", True) == ""
-        assert finished(under_way).success
+        assert finished(pending).success
         assert peer.state("/subject") == "inactive"
-    assert "'configure' is refused: the node is configuring; legal now: none" in system.log_text()
+    assert (
+        "refused 'configure': the node is configuring; available transitions: none"
+        in system.log_text()
+    )
 
 
-def test_a_handler_that_awaits_for_ever_is_an_error(tmp_path: Path, peer: Peer) -> None:
+def test_a_handler_that_never_ends_is_an_error(tmp_path: Path, peer: Peer) -> None:
     module = """
     from composer.behavior import Behavior
     from composer.runtime.executors.tasks import Future
@@ -249,11 +252,11 @@ def test_a_handler_that_awaits_for_ever_is_an_error(tmp_path: Path, peer: Peer) 
     with running(text, tmp_path, subject=module) as system:
         assert not peer.change("/subject", "configure")
         assert peer.state("/subject") == "unconfigured"
-    assert "on_configure: TransitionTimeout: not through after 0.2 s" in system.log_text()
+    assert "on_configure: TransitionTimeout: timed out after 0.2 s" in system.log_text()
 
 
 def test_cycles_leave_nothing_behind(tmp_path: Path, peer: Peer) -> None:
-    """Counted from inside; what the process and the graph show is in test_lifecycle_process."""
+    """Count entities; test_lifecycle_process checks the process and the ROS graph."""
     text = """
     system: cycles
     nodes:
@@ -283,4 +286,4 @@ def test_cycles_leave_nothing_behind(tmp_path: Path, peer: Peer) -> None:
                 assert peer.change("/cycled", transition)
             assert entities() == full
         assert empty <= full - 6
-        assert not node._core.tasks
+        assert not node._context.tasks

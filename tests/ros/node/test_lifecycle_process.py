@@ -1,4 +1,4 @@
-"""The lifecycle of a node asked for from another process: any request, very many, very often."""
+"""Lifecycle requests from another process: invalid, many, and repeated."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ nodes:
     services: {alive: {type: std_srvs/srv/Trigger, external: true, respond: {success: true}}}
 """
 SERVICES = "service list --include-hidden --show-types"
-#: What an outsider is shown of all that there is, and of the node.
+#: Commands that list the ROS graph and the node.
 LISTS = (
     "topic list --include-hidden --show-types",
     SERVICES,
@@ -47,7 +47,7 @@ LISTS = (
 )
 PORTS = ("input", "output", "trigger", "ask", "serve", "send")
 CYCLE = ("configure", "activate", "deactivate", "cleanup")
-#: Of memory that may be held in the end, so that it is 10 MB at the most after a thousand cycles.
+#: The allowed growth of memory: at most 10 MB after a thousand cycles.
 KILOBYTES_AT_ALL, KILOBYTES_PER_CYCLE = 2000, 8
 
 
@@ -61,14 +61,14 @@ def running(folder: Path) -> Iterator[RunningSystem]:
 
 
 class Subject:
-    """The node, as one client sees it."""
+    """The node, through its services."""
 
     def __init__(self, peer: Peer) -> None:
         self._change = peer.client(ChangeState, "/subject/change_state")
         self._state = peer.client(GetState, "/subject/get_state")
 
-    def change(self, wanted: str | int) -> bool:
-        request = ChangeState.Request(transition=transition_of(wanted))
+    def change(self, transition: str | int) -> bool:
+        request = ChangeState.Request(transition=transition_of(transition))
         return bool(finished(self._change.call_async(request)).success)
 
     @property
@@ -77,34 +77,34 @@ class Subject:
 
 
 class Client:
-    """A node that asks for one transition after the other."""
+    """A node that requests one transition after the other."""
 
     def __init__(self, peer: Peer, requests: tuple[str | int, ...], first: int) -> None:
         self.answers: list[bool] = []
         self._requests = itertools.islice(itertools.cycle(requests), first, first + 125)
         node = peer.join(f"client_{first}")
-        # With Fast DDS each client gets the answers to all of them, and keeps ten by default.
+        # With Fast DDS, each client receives all responses, and keeps ten by default.
         self._client = node.create_client(
             ChangeState, "/subject/change_state", qos_profile=QoSProfile(depth=1000)
         )
         wait_until(self._client.service_is_ready)
 
-    def ask(self) -> None:
+    def send(self) -> None:
         for wanted in self._requests:
             request = ChangeState.Request(transition=transition_of(wanted))
-            self._client.call_async(request).add_done_callback(self._take)
+            self._client.call_async(request).add_done_callback(self._on_response)
             return
 
-    def _take(self, future: Any) -> None:
+    def _on_response(self, future: Any) -> None:
         self.answers.append(bool(future.result().success))
-        self.ask()
+        self.send()
 
 
 def transition_of(wanted: str | int) -> Transition:
     return Transition(label=wanted) if isinstance(wanted, str) else Transition(id=wanted)
 
 
-def test_any_request_is_answered_however_many_there_are(tmp_path: Path, peer: Peer) -> None:
+def test_all_requests_get_a_response(tmp_path: Path, peer: Peer) -> None:
     """Wrong ids, wrong states, and a thousand requests from eight nodes at once."""
     illegal = (
         0, 8, 99, 255, "nonsense", "transition_success", "transition_error", "destroy",
@@ -121,7 +121,7 @@ def test_any_request_is_answered_however_many_there_are(tmp_path: Path, peer: Pe
         requests = (*CYCLE, "nonsense", 99, 0, Transition.TRANSITION_DESTROY)
         clients = [Client(peer, requests, first) for first in range(8)]
         for client in clients:
-            client.ask()
+            client.send()
         wait_until(lambda: all(len(client.answers) == 125 for client in clients), "the answers")
         answers = [answer for client in clients for answer in client.answers]
         assert any(answers)
@@ -129,12 +129,12 @@ def test_any_request_is_answered_however_many_there_are(tmp_path: Path, peer: Pe
         assert peer.call(Trigger, "/alive").success
         assert system.stop()[0] == 0
     stopping = next(place for place, line in enumerate(system.lines) if "stopping:" in line)
-    told = [line for line in system.lines[:stopping] if "[compose] /subject" in line]
-    assert sum(answers) == len(told), "every success is a change of state, and no other is"
+    reported = [line for line in system.lines[:stopping] if "[compose] /subject" in line]
+    assert sum(answers) == len(reported), "each success is a change of state, and vice versa"
 
 
 class Usage:
-    """What the process of a system holds, and what of it the ROS graph shows."""
+    """The resources of the process of a system, and its endpoints in the ROS graph."""
 
     def __init__(self, system: RunningSystem, peer: Peer) -> None:
         self._process = Path("/proc", str(system.process.pid))
@@ -149,28 +149,28 @@ class Usage:
 
     @property
     def open_files(self) -> Counter[str]:
-        """What every file descriptor leads to."""
-        found = Counter[str]()
+        """Count the targets of the open file descriptors."""
+        targets = Counter[str]()
         for descriptor in (self._process / "fd").iterdir():
-            with suppress(FileNotFoundError):  # closed meanwhile
-                found[str(descriptor.readlink())] += 1
-        return found
+            with suppress(FileNotFoundError):  # closed in the meantime
+                targets[str(descriptor.readlink())] += 1
+        return targets
 
     @property
     def graph(self) -> set[str]:
-        """Every topic and service that is known."""
+        """The known topics and services."""
         node = self._peer.node
         known = (*node.get_topic_names_and_types(), *node.get_service_names_and_types())
         return {name for name, _ in known}
 
     @property
     def ports(self) -> set[str]:
-        """What of it the node makes when it is configured."""
+        """Those of them that the node creates when it is configured."""
         return {name for name in self.graph if name.split("/")[1] in PORTS}
 
 
-def lists_of_an_outsider() -> dict[str, str]:
-    """What somebody sees who has just come: he knows nothing of what was there before."""
+def lists_of_a_new_process() -> dict[str, str]:
+    """Return the lists in new processes, which know nothing of earlier endpoints."""
     processes = {words: commands.start(*words.split()) for words in LISTS}
     return {words: commands.finished(process) for words, process in processes.items()}
 
@@ -187,23 +187,22 @@ def test_cycles_leave_nothing_behind(tmp_path: Path, peer: Peer, cycles: int) ->
                 for transition in CYCLE:
                     assert subject.change(transition), transition
 
-        cycle(20)  # what is made once, and what an allocator keeps
+        cycle(20)  # what is created once, and what an allocator keeps
         wait_until(lambda: "/alive" in usage.graph and not usage.ports, "no ports")
         kilobytes, files = usage.resident_kilobytes, usage.open_files
         cycle(cycles)
         grown = usage.resident_kilobytes - kilobytes
         print(f"{cycles} cycles: {grown} kB more, {files} became {usage.open_files}")
         assert grown < KILOBYTES_AT_ALL + KILOBYTES_PER_CYCLE * cycles
-        # What a frame or a cycle of references keeps for a moment is not lost; it may be among
-        # what was open before, too.
+        # A frame or a reference cycle may keep a file open for a moment, also before the cycles.
         wait_until(lambda: usage.open_files <= files, "no more open files")
         wait_until(lambda: not usage.ports, "no ports again")
-        worn = lists_of_an_outsider()
+        worn = lists_of_a_new_process()
         assert subject.change("configure")
-        wait_until(lambda: len(usage.ports) > 10, "it has ports again")
+        wait_until(lambda: len(usage.ports) > 10, "ports")
         assert system.stop()[0] == 0
     with running(tmp_path) as system:
-        fresh = lists_of_an_outsider()
+        fresh = lists_of_a_new_process()
         assert "/alive" in fresh[SERVICES]
         assert "/trigger" not in fresh[SERVICES]
         assert worn == fresh

@@ -1,4 +1,4 @@
-"""Transitions that hang for good, asked for from another process, on every kind of executor."""
+"""Transitions that hang forever, on every kind of executor."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from tests.ros.support.system_process import RunningSystem
 FAILURES = {
     "events": "on_activate does not return",
     "single_threaded": "on_activate does not return",
-    # Several threads can see a transition to its end, though the handler never comes to one.
-    "multi_threaded": "activate ended in an error: TransitionTimeout: not through after 1 s",
+    # Another thread ends the transition, although the handler never returns.
+    "multi_threaded": "activate ended in an error: TransitionTimeout: timed out after 1 s",
 }
 KINDS = tuple(FAILURES)
 SYSTEM = """
@@ -44,7 +44,7 @@ from composer.behavior import Behavior
 
 class Stuck(Behavior):
     def on_activate(self):
-        time.sleep(60.0)  # in C: nothing of Python's can interrupt it
+        time.sleep(60.0)  # in C, which Python cannot interrupt
 """
 
 
@@ -57,7 +57,7 @@ def path(tmp_path: Path) -> Path:
     return file
 
 
-def test_who_asks_gets_an_answer_and_the_others_go_on(path: Path, peer: Peer) -> None:
+def test_a_request_is_answered_and_other_nodes_continue(path: Path, peer: Peer) -> None:
     request = ChangeState.Request(transition=Transition(label="activate"))
     with RunningSystem(str(path)) as system:
         system.wait_for("1 of 4 nodes active")
@@ -65,14 +65,12 @@ def test_who_asks_gets_an_answer_and_the_others_go_on(path: Path, peer: Peer) ->
         answers = [client.call_async(request) for client in clients]
         for kind in KINDS:
             system.wait_for(rf"/{kind} is stuck and did not return from on_activate within 3000 ms")
-            system.wait_for(rf"/{kind} failed: {FAILURES[kind]}; it is isolated")
+            system.wait_for(rf"/{kind} failed: {FAILURES[kind]}; isolating it")
         assert not any(finished(answer).success for answer in answers)
-        wait_until(
-            lambda: system.output.count("time.sleep(60.0)") >= 3, "the stacks, which say where"
-        )
+        wait_until(lambda: system.output.count("time.sleep(60.0)") >= 3, "the stacks")
         assert peer.call(Trigger, "/alive").success
         down = "/events is down: on_activate does not return"
-        # Who asked is answered, and the failure told, before it is dealt with.
+        # The response and the report of the failure come before its handling.
         wait_until(lambda: down in peer.call(Trigger, "/robot/manager/is_active").message, down)
 
         began_s = time.monotonic()
@@ -86,8 +84,8 @@ def test_who_asks_gets_an_answer_and_the_others_go_on(path: Path, peer: Peer) ->
         assert re.search(rf"^/{kind} +{state} ", system.output, re.MULTILINE), kind
 
 
-def test_who_waits_for_a_turn_on_a_busy_executor_is_not_stuck(tmp_path: Path) -> None:
-    """Each takes a part of its time; the last has to wait for longer than all of it."""
+def test_a_transition_that_waits_for_a_busy_executor_is_not_stuck(tmp_path: Path) -> None:
+    """Each takes a part of its time limit; the last one waits longer than its limit."""
     path = tmp_path / "slow.yaml"
     nodes = "".join(f"  n{number}: {{behavior: slow:Slow}}\n" for number in range(12))
     path.write_text(f"system: slow\nlifecycle: {{timeout_ms: 1000}}\nnodes:\n{nodes}", "utf-8")
@@ -96,7 +94,7 @@ def test_who_waits_for_a_turn_on_a_busy_executor_is_not_stuck(tmp_path: Path) ->
 
     class Slow:
         def on_configure(self):
-            time.sleep(0.2)  # a fifth of what it may take
+            time.sleep(0.2)  # a fifth of its limit
     """
     path.with_suffix(".py").write_text(dedent(slow), encoding="utf-8")
     with RunningSystem(str(path)) as system:

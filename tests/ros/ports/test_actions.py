@@ -72,7 +72,7 @@ def test_a_declared_action_gives_feedback_and_a_result(
 ) -> None:
     with running(SERVER.replace("KIND", kind), tmp_path) as system:
         navigator = Navigator(peer)
-        server = system.node("server")._core.node
+        server = system.node("server")._context.node
         wait_until(lambda: server.count_subscribers("/navigate/_action/feedback"), "who listens")
         handle = navigator.send(3.0)
         # With the result rclpy's client forgets the feedback that it has not taken yet.
@@ -300,7 +300,7 @@ def test_goals_are_canceled_when_the_node_that_sent_them_leaves_active(
     with running(CLIENT.replace("TARGET", "1.0"), tmp_path, handled=PATIENT) as system:
         system.wait_for_log("begin 1.0")
         assert peer.change("/client", "deactivate")
-        server = system.node("server")._assembly.action_servers["navigate"]
+        server = system.node("server")._entities.action_servers["navigate"]
         wait_until(lambda: not server._goals, "the goal has ended")
         assert peer.state("/server") == "active"
         assert system.summary("/client").errors == 0

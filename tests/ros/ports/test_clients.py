@@ -33,7 +33,7 @@ def declared(on_failure: bool) -> str:
 
 def activate_once_the_server_is_known(system: RunningSystem) -> None:
     """Find the server first: that may take longer than the only call may."""
-    client = system.node("asker")._assembly.clients["trigger"]
+    client = system.node("asker")._entities.clients["trigger"]
     wait_until(client._has_server, "the server")
     system.change("asker", "activate")
 
@@ -125,7 +125,7 @@ def test_calls_and_sleeps_end_when_the_node_leaves_active(
     with running(CALLER.replace("KIND", kind), tmp_path, caller=MODULE) as system:
         system.wait_for_log("asking")
         system.wait_for_log("resting")
-        core = system.node("caller")._core
+        core = system.node("caller")._context
         wait_until(lambda: len(core.gate.pending._futures) == 2, "both wait")
         assert peer.change("/caller", "deactivate")
         assert peer.state("/caller") == "inactive"
@@ -162,5 +162,5 @@ def test_what_is_wrong_in_a_call_is_told_at_once(tmp_path: Path) -> None:
     assert system.log() == [
         "client 'trigger' takes a Trigger.Request, not str",
         "/caller is configuring, not active",
-        "no client 'triger'; there is: trigger",
+        "no client 'triger'; available: trigger",
     ]

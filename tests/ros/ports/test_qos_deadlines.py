@@ -119,7 +119,7 @@ def test_a_deadline_that_somebody_outside_misses_is_told_with_his_name(
     with running(LISTENER, tmp_path) as system:
         qos = QoSProfile(depth=10, deadline=Duration(nanoseconds=200_000_000))
         publisher = peer.publisher(String, "/beat", qos)
-        node = system.node("listener")._core.node
+        node = system.node("listener")._context.node
         wait_until(lambda: publishers(node, "/beat") == [peer.node.get_name()], "its name")
         publisher.publish(String())
         system.wait_for_log("heard")

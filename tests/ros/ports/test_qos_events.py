@@ -27,7 +27,7 @@ def counts(system: RunningSystem, node: str) -> dict[str, int]:
 
 def publishers(system: RunningSystem, name: str, topic: str) -> list[str]:
     """Return the names of those who publish, as a node of the system knows them."""
-    node = system.node(name)._core.node
+    node = system.node(name)._context.node
     return [end.node_name for end in node.get_publishers_info_by_topic(topic)]
 
 
@@ -51,7 +51,7 @@ def test_outsiders_with_another_qos_are_named_with_the_policy(
 ) -> None:
     with running(ENDS.format(kind=kind), tmp_path) as system:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        known = system.node("a")._core.node.get_node_names
+        known = system.node("a")._context.node.get_node_names
         wait_until(lambda: peer.node.get_name() in known(), "the peer's name")
         peer.node.create_publisher(String, "/input", BEST_EFFORT)
         peer.node.create_subscription(String, "/output", lambda _: None, latched)

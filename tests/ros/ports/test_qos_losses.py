@@ -84,7 +84,7 @@ def test_a_publisher_that_falls_silent_is_told_and_one_that_leaves_is_not(
         leaving = peer.publisher(String, "/alive", qos)
         with hand_written("hand_written_flood.py", "500", "0") as flood:
             system.wait_for_log("heard")
-            node = system.node("listener")._core.node
+            node = system.node("listener")._context.node
             wait_until(lambda: "flood" in node.get_node_names(), "its name")
             peer.node.destroy_publisher(leaving)
             flood.kill()
@@ -127,7 +127,7 @@ def test_nothing_is_watched_later_than_from_the_start(tmp_path: Path) -> None:
     # To begin to watch asks for a status, too. rclpy's handlers were watched once their node's loop
     # had found them, when messages could be lost already: once in hundreds of runs it froze.
     with running(RESTLESS, tmp_path) as system:
-        subscriptions = list(system.node("listener")._core.node.subscriptions)
+        subscriptions = list(system.node("listener")._context.node.subscriptions)
         assert [ends.topic_name for ends in subscriptions] == ["/big", "/alive"]
         assert [ends.event_handlers for ends in subscriptions] == [[], []]
 

@@ -124,7 +124,7 @@ def test_requests_that_are_under_way_when_the_node_leaves_active_are_refused(
         first = client.call_async(Trigger.Request())
         system.wait_for_log("begun")
         waiting = client.call_async(Trigger.Request())
-        port = system.node("handled")._assembly.services["deferred"]
+        port = system.node("handled")._entities.services["deferred"]
         wait_until(lambda: len(port._open) == 2)
         assert peer.change("/handled", "deactivate")
         answers = [finished(first), finished(waiting)]

@@ -168,6 +168,6 @@ def test_a_parameter_without_a_value_keeps_the_system_from_starting(tmp_path: Pa
     system = RunningSystem(system_of(text, tmp_path), HostOptions(), None)
     assert system.end().exit_code == 1
     assert system.log() == []
-    assert [event.reason for event in system.told(RollingBack)] == [
+    assert [event.reason for event in system.reported(RollingBack)] == [
         "parameter 'speed' is required and has no value"
     ]

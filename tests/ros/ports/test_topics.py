@@ -68,7 +68,7 @@ def test_what_is_latched_while_inactive_comes_with_the_activation(
         source = peer.publisher(String, "/mode", latched)
         source.publish(String(data="old"))
         source.publish(String(data="ready"))
-        port = system.node("listener")._assembly.subscriptions["mode"]
+        port = system.node("listener")._entities.subscriptions["mode"]
         wait_until(lambda: [message.data for _, message in tuple(port._latched)] == ["ready"])
         assert system.log() == []
         assert peer.change("/listener", "activate")
@@ -151,7 +151,7 @@ class Talker(dict):  # any class will do
 def test_ports_are_attributes_of_what_a_behavior_has(tmp_path: Path) -> None:
     with running(PORTS, tmp_path, talker=PORTS_MODULE) as system:
         names = ["", "__entries", "_hidden", "class", "no identifier", "plain"]
-        assert system.log() == [*names, f"no publisher 'plan'; there is: {', '.join(names)}"]
+        assert system.log() == [*names, f"no publisher 'plan'; available: {', '.join(names)}"]
 
 
 FAULTY = """

@@ -1,4 +1,4 @@
-"""Our processes are met at once, and know when somebody is left to be met."""
+"""Processes discover each other at once, and know whether participants are missing."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from composer.runtime.process.dds_participants import count_participants
 from tests.ros.support.commands import PYTHON
 from tests.ros.support.in_process import Peer, wait_until
 
-#: Who is not met at once is met 1 to 3 s later; without the profile that is every second one. So
-#: many joins and such a share tell that from a machine that stood still during some of them.
+#: A participant that is not discovered at once is discovered 1 to 3 s later; without the profile,
+#: that is every second one. The share allows for delays on a busy machine.
 JOINS, ENOUGH = 16, 12
 AT_ONCE_S = 0.9
-#: Their lease is 4 s, others have 20 s.
+#: The lease of a command is 4 s, the default is 20 s.
 FORGOTTEN_WITHIN_S = 10.0
-#: Enough to come in several packets.
+#: Enough for several packets.
 TOPICS = [f"/flood/topic_{number}" for number in range(250)]
 JOIN = f"""
 import json, time
@@ -39,8 +39,8 @@ for _ in range({JOINS}):
         missing.append(sum(topic not in found for topic in {TOPICS}))
 print(json.dumps([took_s, missing]))
 """
-#: What a command has open: UDP ports, and shared memory of Fast DDS.
-LOOK = """
+#: Print the UDP ports and the shared memory of Fast DDS that a command uses.
+PRINT_TRANSPORTS = """
 import json, os, re
 from pathlib import Path
 from composer.runtime.process.environment import prepare_environment
@@ -58,25 +58,25 @@ with Session() as session:
 """
 
 
-def test_the_nodes_of_tests_keep_out_of_shared_memory(peer: Peer) -> None:
-    """Beside a process that was killed they would crash or hang now and then when destroyed."""
+def test_nodes_of_tests_do_not_use_shared_memory(peer: Peer) -> None:
+    """Next to a killed process, they would occasionally crash or hang when destroyed."""
     assert peer.node.get_node_names()
     assert "/dev/shm/fast" not in Path("/proc/self/maps").read_text(encoding="utf-8")
 
 
-def test_a_process_that_joins_is_met_at_once_with_all_its_topics(peer: Peer) -> None:
+def test_a_new_process_discovers_others_with_all_topics_at_once(peer: Peer) -> None:
     for topic in TOPICS:
         peer.node.create_publisher(Empty, topic, 1)
     done = subprocess.run(
         [*PYTHON, "-c", JOIN], check=True, capture_output=True, text=True, timeout=50.0
     )
-    assert "XML" not in done.stderr + done.stdout  # Fast DDS says so if it cannot read the profile
+    assert "XML" not in done.stderr + done.stdout  # printed if the profile is invalid
     took_s, missing = json.loads(done.stdout.splitlines()[-1])
     assert sum(join_s < AT_ONCE_S for join_s in took_s) >= ENOUGH, took_s
     assert missing.count(0) >= ENOUGH, missing
 
 
-def test_each_participant_on_this_computer_is_counted(peer: Peer) -> None:
+def test_each_participant_on_this_host_is_counted(peer: Peer) -> None:
     domain_id = int(os.environ["ROS_DOMAIN_ID"])
     before = count_participants(domain_id)
     assert before >= 1
@@ -85,14 +85,14 @@ def test_each_participant_on_this_computer_is_counted(peer: Peer) -> None:
         assert count_participants(domain_id) == before + 1
     finally:
         another.close()
-    wait_until(lambda: count_participants(domain_id) == before, "it left")
+    wait_until(lambda: count_participants(domain_id) == before, "its end")
 
 
-def test_a_command_meets_others_without_shared_memory_and_stays_on_this_computer(
+def test_a_command_discovers_others_on_this_host_without_shared_memory(
     peer: Peer,
 ) -> None:
     done = subprocess.run(
-        [*PYTHON, "-c", LOOK], check=True, capture_output=True, text=True, timeout=50.0
+        [*PYTHON, "-c", PRINT_TRANSPORTS], check=True, capture_output=True, text=True, timeout=50.0
     )
     others, ports, shared = json.loads(done.stdout.splitlines()[-1])
     assert [peer.node.get_name(), peer.node.get_namespace()] in others
@@ -102,13 +102,15 @@ def test_a_command_meets_others_without_shared_memory_and_stays_on_this_computer
     assert multicast not in ports
 
 
-def test_a_command_is_soon_forgotten(peer: Peer) -> None:
+def test_a_command_is_forgotten_soon(peer: Peer) -> None:
     def participants() -> int:
         return len(peer.node.get_publishers_info_by_topic("ros_discovery_info", no_mangle=True))
 
     before = participants()
-    for _ in range(3):  # most of their goodbyes are lost
-        subprocess.run([*PYTHON, "-c", LOOK], check=True, capture_output=True, timeout=50.0)
+    for _ in range(3):  # most of their goodbye messages are lost
+        subprocess.run(
+            [*PYTHON, "-c", PRINT_TRANSPORTS], check=True, capture_output=True, timeout=50.0
+        )
     ended_s = time.monotonic()
-    wait_until(lambda: participants() <= before, "they are gone")
+    wait_until(lambda: participants() <= before, "their end")
     assert time.monotonic() - ended_s < FORGOTTEN_WITHIN_S

@@ -1,4 +1,4 @@
-"""With our profile Fast DDS does for a message to another process what it has to, no more."""
+"""With the default profile, Fast DDS wakes no extra thread for each message."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tests.ros.support.commands import PYTHON
 from tests.ros.support.loops import peer
 
 MESSAGES = 4000
-#: Publishes to another process and prints how often Fast DDS's thread for timers slept meanwhile.
+#: Publish to another process, and print how often the timer thread of Fast DDS slept meanwhile.
 PUBLISH = f"""
 import json, os, sys, time
 from pathlib import Path
@@ -18,7 +18,7 @@ prepare_environment()
 import rclpy
 from std_msgs.msg import String
 
-def slept():
+def sleeps():
     tasks = [task for task in Path("/proc/self/task").iterdir()
              if (task / "comm").read_text().startswith("dds.ev")]
     assert len(tasks) == 1, tasks
@@ -30,14 +30,14 @@ node = rclpy.create_node("publisher")
 publisher = node.create_publisher(String, sys.argv[1], 10)
 until_s = time.monotonic() + 15.0
 while not publisher.get_subscription_count() and time.monotonic() < until_s:
-    time.sleep(0.01)  # between two looks
-before, began_s = slept(), time.monotonic()
+    time.sleep(0.01)  # poll
+before, began_s = sleeps(), time.monotonic()
 for number in range({MESSAGES}):
     publisher.publish(String(data=str(number)))
     next_s = time.monotonic() + 0.0002
     while time.monotonic() < next_s:
         pass
-print(json.dumps([slept() - before, time.monotonic() - began_s]), flush=True)
+print(json.dumps([sleeps() - before, time.monotonic() - began_s]), flush=True)
 os._exit(0)
 """
 
@@ -51,7 +51,7 @@ def test_no_thread_wakes_after_each_message() -> None:
             text=True,
             timeout=40.0,
         )
-    assert "XML" not in done.stderr + done.stdout  # Fast DDS says so if it cannot read the profile
+    assert "XML" not in done.stderr + done.stdout  # printed if the profile is invalid
     slept, took_s = json.loads(done.stdout.splitlines()[-1])
-    # Some times in 4 ms; by default twice for each message, 5000 of which go out in a second.
+    # A few times in 4 ms; by default twice for each of the 5000 messages in a second.
     assert 0 < slept < 2000.0 * took_s

@@ -1,4 +1,4 @@
-"""A large system leaves the ROS graph in one go, and nothing of it is left behind."""
+"""A large system leaves the ROS graph at once, and nothing of it remains."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from tests.ros.support.commands import COMPOSE
 from tests.ros.support.in_process import PATIENCE_S, Peer, running, wait_until
 
 NODES = 24
-#: Others give up on a participant that says nothing after so long.
-MISSED_ANYWAY_S = 20.0
-TRIES = 3
+#: The lease of a participant, after which others remove it.
+LEASE_S = 20.0
+ATTEMPTS = 3
 COUNT = f"{NODES} of {NODES} nodes active"
 
 
 def large_system() -> str:
-    """Return a system in which each node answers, sends, listens, and says when it goes."""
+    """Return a system whose nodes have a publisher, a subscription and a service each."""
     nodes = {
         f"node_{index:02}": {
             "publishers": {"output": {"type": "std_msgs/msg/String", "external": True}},
@@ -38,7 +38,7 @@ def large_system() -> str:
                     "respond": {"success": True},
                 }
             },
-            "on_cleanup": {"log": "tidied up"},
+            "on_cleanup": {"log": "cleaned up"},
         }
         for index in range(NODES)
     }
@@ -47,43 +47,43 @@ def large_system() -> str:
 
 
 @pytest.mark.timeout(200)
-def test_a_large_system_is_gone_for_others_as_soon_as_it_ends(tmp_path: Path, peer: Peer) -> None:
+def test_a_large_system_leaves_the_graph_as_soon_as_it_ends(tmp_path: Path, peer: Peer) -> None:
     path = tmp_path / "large.yaml"
     path.write_text(large_system(), encoding="utf-8")
-    # Nobody acknowledges a goodbye, so a busy machine may lose one; a killed process says none.
-    assert any(is_gone_at_once(path, peer) for _ in range(TRIES))
+    # A goodbye message is not acknowledged, so a busy machine may lose one.
+    assert any(is_gone_at_once(path, peer) for _ in range(ATTEMPTS))
 
 
 def is_gone_at_once(path: Path, peer: Peer) -> bool:
-    """Run the system, end it, and say whether the peer heard of that before it had to miss it."""
+    """Run and stop the system; return whether the peer noticed before the lease ended."""
     before = set(SHARED_MEMORY.iterdir())
     command = [*COMPOSE, "run", str(path)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
-        said = []
+        output = []
         for line in process.stderr:
-            said.append(line)
+            output.append(line)
             if COUNT in line:
                 break
         client = peer.client(Trigger, "/node_07/answer")
         ours = shared_memory_of(process.pid) - before
         process.send_signal(signal.SIGINT)
-        said += process.stderr.readlines()
+        output += process.stderr.readlines()
         code = process.wait(PATIENCE_S)
-    text = "".join(said)
+    text = "".join(output)
     assert code == 0, text
-    assert text.count("tidied up") == NODES
+    assert text.count("cleaned up") == NODES
     assert text.index("/node_23 finalized") < text.index("/node_00 finalized")
     assert ours
     assert not [path for path in ours if path.exists()]
     ended_s = time.monotonic()
     while client.service_is_ready() or "node_07" in peer.node.get_node_names():
-        assert time.monotonic() - ended_s < 2 * MISSED_ANYWAY_S
+        assert time.monotonic() - ended_s < 2 * LEASE_S
         time.sleep(0.01)
-    return time.monotonic() - ended_s < MISSED_ANYWAY_S / 2
+    return time.monotonic() - ended_s < LEASE_S / 2
 
 
-def test_a_state_can_be_asked_for_while_the_node_is_destroyed(tmp_path: Path) -> None:
+def test_a_state_can_be_read_while_the_node_is_destroyed(tmp_path: Path) -> None:
     nodes = {f"node_{index}": {} for index in range(10)}
     text = yaml.safe_dump({"system": "small", "nodes": nodes})
     states: set[str] = set()
@@ -91,24 +91,24 @@ def test_a_state_can_be_asked_for_while_the_node_is_destroyed(tmp_path: Path) ->
     with running(text, tmp_path) as system:
         node_set = system.host._node_set
 
-        def look() -> None:
+        def poll() -> None:
             while not over.wait(0.001):
                 states.update(node.state for node in tuple(node_set.nodes.values()))
 
-        looking = threading.Thread(target=look)
-        looking.start()
+        poller = threading.Thread(target=poll)
+        poller.start()
         outcome = system.stop()
-        wait_until(lambda: "finalized" in states, "it still looks")
+        wait_until(lambda: "finalized" in states, "the final state")
         over.set()
-        looking.join(PATIENCE_S)
+        poller.join(PATIENCE_S)
     assert (outcome.exit_code, outcome.hung) == (0, False)
     assert {node.state for node in node_set.nodes.values()} == {"finalized"}
 
 
 def shared_memory_of(pid: int) -> set[Path]:
-    """Return Fast DDS's files in shared memory that a process uses, but for those of ports.
+    """Return Fast DDS's files in shared memory that a process uses, except for ports.
 
-    A port is open as long as anybody writes to it.
+    A port remains while another process writes to it.
     """
     text = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8")
     return set(map(Path, re.findall(rf"{SHARED_MEMORY}/fastrtps_[0-9a-f]+\b", text)))

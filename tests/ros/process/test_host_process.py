@@ -1,4 +1,4 @@
-"""A running system as a process: signals, exit codes, the environment, and what is left behind."""
+"""A running system as a process: signals, exit codes, the environment, leftovers."""
 
 from __future__ import annotations
 
@@ -22,32 +22,29 @@ PATIENCE_S = 20.0
 
 
 class Running:
-    """A ``compose run`` in a process of its own. What it says is read from a file."""
+    """A ``compose run`` in a process of its own, with its output in a file."""
 
-    def __init__(self, process: subprocess.Popen[bytes], said: Path) -> None:
+    def __init__(self, process: subprocess.Popen[bytes], output: Path) -> None:
         self.process = process
-        self._said = said
+        self._output = output
 
     def text(self) -> str:
-        return self._said.read_text(encoding="utf-8")
+        return self._output.read_text(encoding="utf-8")
 
     def wait_for(self, part: str) -> None:
         until_s = time.monotonic() + PATIENCE_S
         while True:
-            has_ended = self.process.poll() is not None  # and has said all, if so
+            has_ended = self.process.poll() is not None  # then the output is complete
             if part in self.text():
                 return
             assert not has_ended, f"ended: {self.text()}"
             assert time.monotonic() < until_s, f"no '{part}' in {self.text()}"
             time.sleep(0.002)
 
-    def end(self, *, impatient: bool = False) -> tuple[int, float]:
-        """Wait for the end; return the exit code and how long that took.
-
-        The impatient press Ctrl-C again and again.
-        """
+    def end(self, *, repeat_signal: bool = False) -> tuple[int, float]:
+        """Wait for the end, maybe with repeated Ctrl-C; return the exit code and the duration."""
         began_s = time.monotonic()
-        while impatient and time.monotonic() < began_s + PATIENCE_S:
+        while repeat_signal and time.monotonic() < began_s + PATIENCE_S:
             with suppress(subprocess.TimeoutExpired):
                 self.process.wait(0.15)
                 break
@@ -58,8 +55,8 @@ class Running:
 
 @contextmanager
 def compose_run(folder: Path, *arguments: object, **environment: str) -> Iterator[Running]:
-    said = folder / "said.txt"
-    with said.open("wb") as output:
+    path = folder / "output.txt"
+    with path.open("wb") as output:
         process = subprocess.Popen(
             [*COMPOSE, "run", *map(str, arguments)],
             stdin=subprocess.DEVNULL,
@@ -68,7 +65,7 @@ def compose_run(folder: Path, *arguments: object, **environment: str) -> Iterato
             env={**os.environ, **environment},
         )
     try:
-        yield Running(process, said)
+        yield Running(process, path)
     finally:
         process.kill()
         process.wait()
@@ -115,9 +112,9 @@ class Hanging(Behavior):
 """
 
 
-@pytest.mark.parametrize("is_impatient", [False, True])
+@pytest.mark.parametrize("repeat_signal", [False, True])
 def test_a_process_with_a_hanging_callback_ends_in_time(
-    tmp_path: Path, *, is_impatient: bool
+    tmp_path: Path, *, repeat_signal: bool
 ) -> None:
     path = tmp_path / "hanging.yaml"
     path.write_text(HANGING, encoding="utf-8")
@@ -126,7 +123,7 @@ def test_a_process_with_a_hanging_callback_ends_in_time(
         run.wait_for("[hanging] hanging")
         run.process.send_signal(signal.SIGINT)
         run.wait_for("stopping: SIGINT")
-        code, took_s = run.end(impatient=is_impatient)
+        code, took_s = run.end(repeat_signal=repeat_signal)
     assert code == 1, run.text()
     assert took_s < end_limit_s()
     assert "/hanging is stuck and did not deactivate in" in run.text()
@@ -136,7 +133,7 @@ def test_a_process_with_a_hanging_callback_ends_in_time(
 @pytest.mark.parametrize(
     ("variables", "words"),
     [
-        ({"ROS_DOMAIN_ID": "-1"}, "ROS_DOMAIN_ID is '-1', which is no domain id"),
+        ({"ROS_DOMAIN_ID": "-1"}, "ROS_DOMAIN_ID is '-1', which is not a domain id"),
         (
             {
                 "ROS_SECURITY_ENABLE": "true",
@@ -148,7 +145,7 @@ def test_a_process_with_a_hanging_callback_ends_in_time(
         ({"RMW_IMPLEMENTATION": "rmw_nonsense"}, "installed: rmw_fastrtps_cpp"),
     ],
 )
-def test_an_environment_that_cannot_be_is_refused(
+def test_an_invalid_environment_is_refused(
     tmp_path: Path, variables: dict[str, str], words: str
 ) -> None:
     system = systems_folder() / "minimal.yaml"
@@ -160,8 +157,8 @@ def test_an_environment_that_cannot_be_is_refused(
     assert "internal error" not in run.text()
 
 
-def half_made_ports(domain_id: int) -> Iterator[Path]:
-    """Leave what a process leaves that is killed while it makes a port in shared memory.
+def incomplete_ports(domain_id: int) -> Iterator[Path]:
+    """Create what remains of a process that is killed while it creates a port in shared memory.
 
     The numbers: DDS Interoperability Protocol, 9.6.1.1, metatraffic and user data by unicast.
     """
@@ -173,25 +170,25 @@ def half_made_ports(domain_id: int) -> Iterator[Path]:
             yield port
 
 
-def test_the_same_signal_twice_at_once_is_no_hurry(tmp_path: Path) -> None:
+def test_the_same_signal_twice_at_once_counts_once(tmp_path: Path) -> None:
     with compose_run(tmp_path, pipeline()) as run:
         run.wait_for("3 of 3 nodes active")
         run.process.send_signal(signal.SIGINT)
-        run.process.send_signal(signal.SIGINT)  # as make, timeout or a launcher would forward it
+        run.process.send_signal(signal.SIGINT)  # as forwarded by make, timeout or a launcher
         code, _ = run.end()
     assert code == 0, run.text()
     assert "stuck" not in run.text()
 
 
-def test_what_a_killed_process_left_half_made_hangs_nobody(
+def test_incomplete_shared_memory_of_a_killed_process_does_not_hang_a_system(
     tmp_path: Path, ros_domain_id: int
 ) -> None:
-    left = tuple(half_made_ports(ros_domain_id))
+    left = tuple(incomplete_ports(ros_domain_id))
     try:
         with compose_run(tmp_path, pipeline(), "--for", 0.1) as run:
             code, _ = run.end()
         assert code == 0, run.text()
-        # Whether one that is left hangs a participant depends on which it opens.
+        # Whether one that remains hangs a participant depends on which ports it opens.
         assert not [port for port in left if port.exists()]
     finally:
         for port in left:

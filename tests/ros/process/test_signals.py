@@ -1,4 +1,4 @@
-"""Signals at random moments of the life of the pipeline: in order, in time, and nothing is left."""
+"""Signals at random moments in the life of the pipeline."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ import pytest
 from tests.ros.support.in_process import end_limit_s
 from tests.ros.support.system_process import RunningSystem
 
-#: What begins each part of the pipeline's life that a signal may meet.
+#: The lines that start each part of the pipeline's life.
 MOMENTS = ("inactive$", "sensor_simulator active$", "3 of 3 nodes active")
-#: What is torn down first.
+#: The order of the tear-down.
 ORDER = ("/control/motor_controller", "/planning/planner", "/perception/sensor_simulator")
 
 
 def end_at(moment: str, delay_s: float, number: signal.Signals) -> float:
-    """Run the pipeline, send a signal so long after a moment of its life; return how long it took.
+    """Run the pipeline, send a signal ``delay_s`` after a moment of its life.
 
-    The end is to be in time, in order and without a trace, and the exit code to be honest.
+    Check that the end is in time and in order and leaves no processes; return how long it took.
     """
     with RunningSystem("systems/pipeline.yaml", "--for", "30") as system:
         system.wait_for(moment)
@@ -45,7 +45,7 @@ def end_at(moment: str, delay_s: float, number: signal.Signals) -> float:
 
 
 def check_order(lines: list[str], state: str, case: str) -> None:
-    """Hold the tear-down against the order of the dependencies."""
+    """Check that the tear-down follows the order of the dependencies."""
     stopping = next(place for place, line in enumerate(lines) if "stopping:" in line)
     down = [
         found[1] for line in lines[stopping:] if (found := re.search(rf"\] (/\S+) {state}$", line))
@@ -56,10 +56,10 @@ def check_order(lines: list[str], state: str, case: str) -> None:
 
 
 def children_of(pid: int) -> str:
-    """Return the processes that a process has started and that could outlive it."""
+    """Return the child processes of a process."""
     children = ""
     for task in Path("/proc", str(pid), "task").iterdir():
-        with suppress(FileNotFoundError, ProcessLookupError):  # a thread that has ended meanwhile
+        with suppress(FileNotFoundError, ProcessLookupError):  # the thread has ended
             children += task.joinpath("children").read_text()
     return children
 

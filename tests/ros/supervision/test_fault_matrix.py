@@ -1,8 +1,7 @@
-"""Every fault in every callback: what becomes of the node, what is told, and who does not notice.
+"""Every fault in every callback: the node's state, its log, and the nodes that are not affected.
 
-The nodes run in a process of their own; all that happens is asked for from here. Those that hang
-have an executor each. What shares the executor of a node that hangs stands still until the watch
-has interrupted it: that is what executors are for.
+The nodes run in a process of their own; this test requests everything that happens. Each hanging
+node has an executor of its own: other nodes of its executor are blocked until it is interrupted.
 """
 
 from __future__ import annotations
@@ -37,8 +36,8 @@ from tests.ros.support.faulty_system import (
 from tests.ros.support.in_process import Peer, finished, wait_until
 from tests.ros.support.system_process import RunningSystem
 
-#: Where each transition begins and, when all is well, ends.
-WAYS = {
+#: The start and goal state of each transition.
+GOALS = {
     "configure": ("unconfigured", "inactive"),
     "activate": ("inactive", "active"),
     "deactivate": ("active", "inactive"),
@@ -46,7 +45,7 @@ WAYS = {
     "shutdown": ("inactive", "finalized"),
     "error": ("unconfigured", "unconfigured"),
 }
-#: From one primary state a step nearer to another.
+#: The next transition from one primary state to another.
 STEPS = {
     ("unconfigured", "inactive"): "configure",
     ("unconfigured", "active"): "configure",
@@ -55,15 +54,15 @@ STEPS = {
     ("active", "unconfigured"): "deactivate",
     ("inactive", "unconfigured"): "cleanup",
 }
-CONTROL = "/control"  # the namespace of the same system where nothing fails
-ENOUGH_BEATS = 80  # that one beat more or less is well below the 5 %
+CONTROL = "/control"  # the namespace of the same system without faults
+ENOUGH_BEATS = 80  # so that one beat is well below the 5 %
 RAISED, EXITED = "ValueError: broken", "SystemExit: out"
 NONSENSE = "returned 'nonsense'"
 
 
 @dataclass(frozen=True)
 class Expected:
-    """The answer to whoever asked, the state after that, and a line of the node's log."""
+    """The response, the state after it, and a line of the node's log."""
 
     answer: object
     state: str
@@ -71,9 +70,9 @@ class Expected:
 
 
 def expected(place: str, fault: str) -> Expected:
-    """The table."""
+    """Return the row of the table."""
     if place in TRANSITIONS:
-        well = WAYS[place][1]
+        well = GOALS[place][1]
         failed = "finalized" if place == "error" else "unconfigured"
         log = {"raise": RAISED, "once": RAISED, "exit": EXITED, "nonsense": NONSENSE}
         if fault == "none":
@@ -96,7 +95,7 @@ def expected(place: str, fault: str) -> Expected:
 
 
 class Subject:
-    """One faulty node, seen from outside."""
+    """One faulty node, through its ROS interfaces."""
 
     def __init__(self, peer: Peer, name: str) -> None:
         self.name = name
@@ -121,18 +120,18 @@ class Subject:
 
     @property
     def state(self) -> str:
-        # What was sent to a node that was just being made anew is asked for once more.
-        asked: list[Any] = []
+        # Retry: a request is lost if the node is being created again.
+        requests: list[Any] = []
 
-        def is_answered() -> bool:
-            if not asked or time.monotonic() > asked_s + len(asked):
-                asked.append(self._state.call_async(GetState.Request()))
-            return any(future.done() for future in asked)
+        def has_response() -> bool:
+            if not requests or time.monotonic() > started_s + len(requests):
+                requests.append(self._state.call_async(GetState.Request()))
+            return any(future.done() for future in requests)
 
-        asked_s = time.monotonic()
-        wait_until(is_answered, f"the state of {self.name}")
-        answer = next(future.result() for future in asked if future.done())
-        return str(answer.current_state.label)
+        started_s = time.monotonic()
+        wait_until(has_response, f"the state of {self.name}")
+        response = next(future.result() for future in requests if future.done())
+        return str(response.current_state.label)
 
     def set_fault(self, fault: str) -> None:
         message = Parameter("fault", value=fault).to_parameter_msg()
@@ -144,12 +143,12 @@ class Subject:
         return self._change.call_async(request)
 
     def go_to(self, goal: str) -> None:
-        """Take the node to a state, by legal transitions."""
+        """Take the node to a state."""
         while (state := self.state) != goal:
             assert finished(self.change(STEPS[state, goal])).success, (self.name, state, goal)
 
-    def begin(self, place: str) -> Any:
-        """Have the callback called; return what the answer will come with."""
+    def trigger(self, place: str) -> Any:
+        """Trigger the callback; return the future of the response, if there is one."""
         if place in TRANSITIONS:
             return self.change("configure" if place == "error" else place)
         if place == "ask":
@@ -159,37 +158,36 @@ class Subject:
             return self._peer.run(goal.get_result_async)
         if place == "input":
             self._input.publish(String())
-        return None  # the timer is called anyway, and so is what hears of changed parameters
+        return None  # the timer is called anyway, and so is on_parameters
 
 
-def answer_of(place: str, begun: Any) -> object:
-    if begun is None:
+def answer_of(place: str, future: Any) -> object:
+    if future is None:
         return None
-    answer = finished(begun)
+    answer = finished(future)
     if place == "ask":
         return answer.success, answer.message
     return answer.status if place == "drive" else answer.success
 
 
 class Metronomes:
-    """How often the node beats that must not notice, and its like where nothing fails.
+    """Compares the beats of a node that must not be affected with those in the other system.
 
-    Both are counted over the same times: what else the machine does meets both. What makes whole
-    nodes anew is not looked at: Fast DDS needs tens of milliseconds for each, and nothing else in
-    Python runs meanwhile.
+    Both are counted at the same time, so that the load of the machine affects both. Times in which
+    nodes are created again are excluded: Fast DDS blocks Python for tens of milliseconds for each.
     """
 
     def __init__(self, peer: Peer) -> None:
         self._beats = {"/beat": 0, f"{CONTROL}/beat": 0}
-        self._heard = set[str]()
+        self._received = set[str]()
         self._counts = False
         for topic in self._beats:
-            peer.node.create_subscription(Int64, topic, partial(self._take, topic), 10)
-        wait_until(lambda: len(self._heard) == len(self._beats), "both beat")
+            peer.node.create_subscription(Int64, topic, partial(self._on_beat, topic), 10)
+        wait_until(lambda: len(self._received) == len(self._beats), "beats of both")
 
     @contextmanager
     def counted(self) -> Iterator[None]:
-        """Count during the block, and a while longer where it is short."""
+        """Count during the block, and until there are enough beats."""
         enough = self._beats[f"{CONTROL}/beat"] + ENOUGH_BEATS
         self._counts = True
         yield
@@ -198,20 +196,20 @@ class Metronomes:
 
     @property
     def ratio(self) -> float:
-        """How often it has beaten for each beat where nothing fails."""
+        """The number of beats per beat of the system without faults."""
         return self._beats["/beat"] / self._beats[f"{CONTROL}/beat"]
 
-    def _take(self, topic: str, _: Int64) -> None:
-        self._heard.add(topic)
+    def _on_beat(self, topic: str, _: Int64) -> None:
+        self._received.add(topic)
         if self._counts:
             self._beats[topic] += 1
 
 
-def check(system: RunningSystem, subject: Subject, place: str, fault: str, begun: Any) -> None:
-    """Hold what came of a fault against the table."""
+def check(system: RunningSystem, subject: Subject, place: str, fault: str, future: Any) -> None:
+    """Check the effects of a fault against the table."""
     row = expected(place, fault)
     where = f"{subject.name}: {place} {fault}"
-    assert answer_of(place, begun) == row.answer, where
+    assert answer_of(place, future) == row.answer, where
     system.wait_for(rf"\[{subject.name}\] {place} acts$")
     if row.log is not None:
         system.wait_for(rf"\[{subject.name}\] on_{place}: .*{re.escape(row.log)}")
@@ -219,38 +217,38 @@ def check(system: RunningSystem, subject: Subject, place: str, fault: str, begun
 
 
 def fail(system: RunningSystem, subject: Subject, place: str) -> None:
-    """Have one callback of a node fail as the node's name says, and see what becomes of it."""
-    subject.go_to(WAYS[place][0] if place in WAYS else "active")
+    """Make one callback of a node fail as the node's name says, and check the effects."""
+    subject.go_to(GOALS[place][0] if place in GOALS else "active")
     subject.set_fault(f"{place} {subject.name}")
-    check(system, subject, place, subject.name, subject.begin(place))
+    check(system, subject, place, subject.name, subject.trigger(place))
     if subject.name == "once" and place != "error":
         retry(system, subject, place)
     subject.set_fault("")
 
 
 def retry(system: RunningSystem, subject: Subject, place: str) -> None:
-    """What failed once works the next time."""
-    start = WAYS[place][0] if place in WAYS else "active"
+    """Check that a callback that has failed once works the next time."""
+    start = GOALS[place][0] if place in GOALS else "active"
     subject.set_fault("")
     subject.go_to(start)
     subject.set_fault(f"{place} once")
-    answer = answer_of(place, subject.begin(place))
+    answer = answer_of(place, subject.trigger(place))
     system.wait_for(rf"\[once\] {place} works again$")
     well = {"ask": (True, ""), "drive": GoalStatus.STATUS_SUCCEEDED}
     assert answer == well.get(place, True if place in TRANSITIONS else None), place
-    wait_until(lambda: subject.state == (WAYS[place][1] if place in WAYS else "active"))
+    wait_until(lambda: subject.state == (GOALS[place][1] if place in GOALS else "active"))
 
 
 def hang(system: RunningSystem, hanging: Mapping[str, Subject]) -> None:
-    """Have a callback of each node hang, all at the same time."""
+    """Make a callback of each node hang, all at the same time."""
     for place, subject in hanging.items():
-        subject.go_to(WAYS[place][0] if place in WAYS else "active")
-    begun = {}
+        subject.go_to(GOALS[place][0] if place in GOALS else "active")
+    futures = {}
     for place, subject in hanging.items():
         subject.set_fault(f"{place} hang")
-        begun[place] = subject.begin(place)
+        futures[place] = subject.trigger(place)
     for place, subject in hanging.items():
-        check(system, subject, place, "hang", begun[place])
+        check(system, subject, place, "hang", futures[place])
         system.wait_for(rf"/hang_{place} is stuck and did not return from on_{place} within")
 
 
@@ -275,7 +273,7 @@ def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
             for place in (*CALLBACKS, "configure", "activate", "deactivate", "cleanup", "error"):
                 for subject in subjects:
                     fail(system, subject, place)
-        start_all(peer)  # those whose on_error failed are made anew
+        start_all(peer)  # creates the finalized nodes again
         with metronomes.counted():
             for subject in subjects:
                 fail(system, subject, "shutdown")
@@ -287,7 +285,7 @@ def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
                 subject.set_fault("")
         start_all(peer)
         assert {subject.state for subject in (*subjects, *hanging.values())} == {"active"}
-        assert system.stop()[0] == 0, "all that failed has been mended"
+        assert system.stop()[0] == 0, "all failed nodes have recovered"
     for place in PLACES:
-        told = system.lines.index(system.wait_for(rf"\[raise\] on_{place}: {RAISED}"))
-        assert system.lines[told + 1] == "Traceback (most recent call last):", place
+        line = system.lines.index(system.wait_for(rf"\[raise\] on_{place}: {RAISED}"))
+        assert system.lines[line + 1] == "Traceback (most recent call last):", place

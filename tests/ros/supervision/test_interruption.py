@@ -1,4 +1,4 @@
-"""What interrupts a callback strikes what its user has written, and nothing else."""
+"""Interrupts of callbacks are raised in code of the user only."""
 
 from __future__ import annotations
 
@@ -23,52 +23,50 @@ nodes:
     executor: own
     behavior: chatter:Chatter
     parameters: {fault: ""}
-    publishers: {said: {type: std_msgs/msg/String}}
+    publishers: {chat: {type: std_msgs/msg/String}}
     timers: {tick: {period_ms: 10}}
     lifecycle: {watch: {callback_ms: 50}}
   relay:
     executor: own
     subscriptions:
-      said: {type: std_msgs/msg/String, external: true, publish: {heard: {data: "{message.data}"}}}
-    publishers: {heard: {type: std_msgs/msg/String, external: true}}
+      chat: {type: std_msgs/msg/String, external: true, publish: {echo: {data: "{message.data}"}}}
+    publishers: {echo: {type: std_msgs/msg/String, external: true}}
 """
 MODULE = """
 from composer.behavior import Behavior
 
 class Chatter(Behavior):
     def on_tick(self):
-        message = self.publishers.said.message_type(data="on and on")
+        message = self.publishers.chat.message_type(data="on and on")
         while self.parameters.fault:
-            self.publishers.said.publish(message)
+            self.publishers.chat.publish(message)
 
     def on_deactivate(self):
-        self.publishers.said.publish(self.publishers.said.message_type(data="a last word"))
+        self.publishers.chat.publish(self.publishers.chat.message_type(data="a last word"))
 """
 
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
-def test_what_is_called_of_ours_is_not_struck_but_the_user_who_calls_it(
+def test_an_interrupt_is_raised_in_the_user_code_that_calls_the_composer(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:
-    """The publisher that is called without end delivers to another node within the call."""
+    """The publisher in the endless loop delivers to another node within the call."""
     with running(CHATTER.replace("KIND", kind), tmp_path, chatter=MODULE) as system:
-        heard = peer.listen(String, "/heard")
-        said = peer.publisher(String, "/said")
+        echo = peer.listen(String, "/echo")
+        chat = peer.publisher(String, "/chat")
         assert peer.set_parameter("/chatter", "fault", "yes") == ""
-        wait_until(lambda: system.told(NodeFailed), "the failure")
-        assert system.told(NodeFailed)[0].reason == "on_tick took longer than 50 ms"
-        assert "return from on_tick within 50 ms" in str(system.told(Stuck)[0])
+        wait_until(lambda: system.reported(NodeFailed), "the failure")
+        assert system.reported(NodeFailed)[0].reason == "on_tick took longer than 50 ms"
+        assert "return from on_tick within 50 ms" in str(system.reported(Stuck)[0])
         traceback = system.wait_for_log("CallbackInterrupted")
         frames = re.findall(r'File ".*?([^/"]+)", line \d+, in (\w+)', system.log_text())
-        # A lookup of a publisher or a parameter changes nothing, and may be struck as well.
+        # Lookups of publishers and parameters have no side effects and may be interrupted.
         where = [frame for frame in frames if frame[1] != "__getattr__"]
         assert where[-1] == ("chatter.py", "on_tick"), traceback
-        wait_until(
-            lambda: heard and heard[-1].data == "a last word", "it is asked to end, and may speak"
-        )
-        # Its neighbour hears the next who speaks.
-        said.publish(String(data="your turn"))
-        wait_until(lambda: heard[-1].data == "your turn", "the relay goes on")
+        wait_until(lambda: echo and echo[-1].data == "a last word", "the message of on_deactivate")
+        # The other node of the executor still receives messages.
+        chat.publish(String(data="your turn"))
+        wait_until(lambda: echo[-1].data == "your turn", "the relay still works")
 
 
 NESTED = """
@@ -79,12 +77,12 @@ nodes:
   caller:
     executor: own
     behavior: nested:Caller
-    publishers: {said: {type: std_msgs/msg/String}}
+    publishers: {chat: {type: std_msgs/msg/String}}
     timers: {tick: {period_ms: 20}}
     lifecycle: {watch: {callback_ms: 500}}
   relay:
     executor: own
-    subscriptions: {said: {type: std_msgs/msg/String, publish: {passed: {data: "{message.data}"}}}}
+    subscriptions: {chat: {type: std_msgs/msg/String, publish: {passed: {data: "{message.data}"}}}}
     publishers: {passed: {type: std_msgs/msg/String}}
     lifecycle: {watch: {callback_ms: 500}}
   hanging:
@@ -98,7 +96,7 @@ from composer.behavior import Behavior
 
 class Caller(Behavior):
     def on_tick(self):
-        self.publishers.said.publish(self.publishers.said.message_type(data="go"))
+        self.publishers.chat.publish(self.publishers.chat.message_type(data="go"))
 
 class Hanging(Behavior):
     def on_passed(self, message):
@@ -107,26 +105,26 @@ class Hanging(Behavior):
 """
 
 
-def test_those_who_wait_for_a_callback_that_hangs_do_not_hang_themselves(tmp_path: Path) -> None:
-    """It runs within a reaction, which runs within a callback; both could wait half as long."""
+def test_callbacks_that_wait_for_a_hanging_callback_are_not_interrupted(tmp_path: Path) -> None:
+    """It runs within a reaction within a callback, which have half of its time limit."""
     with running(NESTED, tmp_path, nested=CALLER_AND_HANGING) as system:
-        wait_until(lambda: "/hanging unconfigured" in system.states(), "it is isolated")
-        failed = [(event.node, event.reason) for event in system.told(NodeFailed)]
+        wait_until(lambda: "/hanging unconfigured" in system.states(), "the isolation")
+        failed = [(event.node, event.reason) for event in system.reported(NodeFailed)]
         assert failed == [("/hanging", "on_passed took longer than 1000 ms")]
         assert system.states("/caller")[-1] == "/caller active"
         assert system.states("/relay")[-1] == "/relay active"
 
 
-#: So often do threads take turns that whatever may come in between does.
-OFTEN = "import sys; sys.setswitchinterval({interval_s}); from composer.cli import main; main()"
+#: Threads switch so often that all interleavings happen.
+PROGRAM = "import sys; sys.setswitchinterval({interval_s}); from composer.cli import main; main()"
 
 
-def test_nodes_of_many_threads_come_up_whatever_comes_in_between(tmp_path: Path) -> None:
+def test_nodes_on_many_threads_come_up_with_frequent_thread_switches(tmp_path: Path) -> None:
     path = write_faulty_system(tmp_path)
     text = path.read_text(encoding="utf-8")
     patient = text.replace("_ms: 300", "_ms: 20000").replace("_ms: 2500", "_ms: 20000")
     path.write_text(patient, encoding="utf-8")
-    program = (sys.executable, "-c", OFTEN.format(interval_s=1e-5))
+    program = (sys.executable, "-c", PROGRAM.format(interval_s=1e-5))
     with RunningSystem(str(path), "--autostart", "active", program=program) as system:
         system.wait_for("17 of 17 nodes active after")
         assert "ERROR" not in system.output

@@ -1,4 +1,4 @@
-"""A system of nodes that fail in every way in every callback, and one that must not notice."""
+"""A system with nodes for every kind of fault, and one that must not be affected."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from textwrap import dedent
 TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown", "error")
 CALLBACKS = ("tick", "input", "ask", "drive", "parameters")
 PLACES = (*TRANSITIONS, *CALLBACKS)
-#: What a callback does; each but ``hang`` has a node of its own.
+#: What a callback does; each except ``hang`` has a node.
 FAULTS = ("raise", "none", "nonsense", "exit", "once")
-#: Hanging nodes have an executor each: what runs on the same one as they do stands still.
+#: Hanging nodes have an executor each, which they block.
 HANGING = tuple(f"hang_{place}" for place in PLACES)
 SYSTEM = """
 system: faulty
@@ -18,7 +18,7 @@ lifecycle: {on_failure: isolate}
 executors: {calm: {kind: events}, EXECUTORS}
 nodes:
   metronome:
-    executor: calm  # making and destroying endpoints takes its time where it is done
+    executor: calm  # creating and destroying endpoints takes time on an executor
     publishers: {beat: {type: std_msgs/msg/Int64, external: true}}
     timers: {beat: {period_ms: 100, publish: {beat: {data: "{count}"}}}}
 """
@@ -42,7 +42,7 @@ DONE = set()
 
 
 class Faulty(Behavior):
-    """Does in one callback what the parameter ``fault`` says: ``activate raise``."""
+    """Fails in one callback as the parameter ``fault`` says: ``activate raise``."""
 
     def act(self, place, good=None):
         faulty, _, fault = self.parameters.fault.partition(" ")
@@ -63,7 +63,7 @@ class Faulty(Behavior):
         if fault == "none":
             return None
         while fault == "hang":
-            time.sleep(0.01)  # it is to hang, not to wear out the machine
+            time.sleep(0.01)  # hang without using the CPU
         if (self.name, place, "works") not in DONE:
             DONE.add((self.name, place, "works"))
             self.log.info(f"{place} works again")
@@ -107,7 +107,7 @@ class Faulty(Behavior):
 
 
 def write_faulty_system(folder: Path) -> Path:
-    """Write the system and its behaviour; return the path of the system."""
+    """Write the system and its behavior; return the path of the system."""
     executors = ", ".join(f"{name}: {{kind: events}}" for name in HANGING)
     nodes = [NODE.replace("NAME", name).replace("    EXECUTOR\n", "") for name in FAULTS]
     nodes += [

@@ -106,12 +106,12 @@ class RunningSystem:
         except BaseException as error:
             self._outcome.set_exception(error)
 
-    def told(self, kind: type[E]) -> list[E]:
+    def reported(self, kind: type[E]) -> list[E]:
         return [event for event in tuple(self.events) if isinstance(event, kind)]
 
     def states(self, node: str | None = None) -> list[str]:
         """Where nodes came to rest, in order: ``/talker active``."""
-        changes = [str(event) for event in self.told(StateChanged)]
+        changes = [str(event) for event in self.reported(StateChanged)]
         return changes if node is None else [text for text in changes if text.startswith(node)]
 
     def node(self, name: str) -> RunningNode:
@@ -127,18 +127,18 @@ class RunningSystem:
         running_node = self.node(node)
         for transition in transitions:
             # Told when all is done: the state is there before entities are given back.
-            made = running_node.loop.run_task(running_node.change(transition))
+            made = running_node.loop.run_task(running_node.lifecycle.change(transition))
             goal = _GOALS[transition]
             wait_until(made.done, f"{node} {goal}")
             assert running_node.state == goal
 
     def wait_for_listener(self, node: str, publisher: str) -> None:
         """Wait until a publisher knows who listens outside: what it sends before is lost."""
-        port: Any = self.node(node)._assembly.publishers[publisher]
+        port: Any = self.node(node)._entities.publishers[publisher]
         wait_until(port._publisher.get_subscription_count, f"a listener to {publisher} of {node}")
 
     def log(self) -> list[str]:
-        return [event.message for event in self.told(Logged)]
+        return [event.message for event in self.reported(Logged)]
 
     def log_text(self) -> str:
         return "\n".join(self.log())
@@ -180,7 +180,7 @@ def running(
     options = options or HostOptions(stop_within_s=_ENDS_WITHIN_S)
     system = RunningSystem(system_of(text, folder, **modules), options, autostart)
     try:
-        wait_until(lambda: system.told(BroughtUp) or not system._thread.is_alive(), "bring-up")
+        wait_until(lambda: system.reported(BroughtUp) or not system._thread.is_alive(), "bring-up")
         yield system
     finally:
         system.stop()

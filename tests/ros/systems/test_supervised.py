@@ -17,14 +17,14 @@ IN_ORDER = (
     r"/sensor unconfigured$",
     r"/sensor active$",
     r"/planner active$",
-    r"/sensor is up again, restart 1$",
+    r"/sensor is up again after restart 1$",
     r"\[planner\] planning with scan 1?\d$",
 )
 
 
 def test_a_silent_sensor_is_restarted_and_the_planner_waits(outsider: Outsider) -> None:
     with RunningSystem("systems/supervised.yaml") as system:
-        up_again = system.lines.index(system.wait_for("/sensor is up again, restart 1$"))
+        up_again = system.lines.index(system.wait_for("/sensor is up again after restart 1$"))
         outsider.spin_until(
             lambda: any(re.search(IN_ORDER[-1], line) for line in system.lines[up_again:])
         )

@@ -20,17 +20,17 @@ def bad(findings: list[Finding]) -> list[tuple[str, str]]:
 @pytest.mark.parametrize(
     ("environment", "level", "message"),
     [
-        ({"ROS_DOMAIN_ID": "x"}, "error", "which is no domain id"),
+        ({"ROS_DOMAIN_ID": "x"}, "error", "which is not a domain id"),
         ({"ROS_DOMAIN_ID": "150"}, "warning", "other programs may be given its ports"),
         ({"ROS_DISTRO": "humble"}, "warning", "made for jazzy"),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, "warning", "no other process is found"),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, "note", "other computers are not"),
-        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOKALHOST"}, "error", "is no discovery range"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOKALHOST"}, "error", "is not a discovery range"),
         ({"ROS_LOCALHOST_ONLY": "1"}, "warning", "deprecated"),
         ({"ROS_DISCOVERY_SERVER": "10.0.0.1:11811"}, "note", "10.0.0.1:11811"),
         ({"FASTDDS_DEFAULT_PROFILES_FILE": "/gone.xml"}, "error", "which is no file"),
         ({"AMENT_PREFIX_PATH": "/gone/install"}, "warning", "'/gone/install'"),
-        ({"ROS_SECURITY_ENABLE": "true"}, "error", "names no keystore"),
+        ({"ROS_SECURITY_ENABLE": "true"}, "error", "ROS_SECURITY_KEYSTORE is not set"),
     ],
 )
 def test_a_variable_that_is_not_well_is_told(

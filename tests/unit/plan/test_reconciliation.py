@@ -10,6 +10,7 @@ from composer.plan import (
     DesiredState,
     Fault,
     FaultKind,
+    Restart,
     decide,
     desired_states,
     reconcile,
@@ -18,6 +19,7 @@ from tests.unit.support.resolving import system_of
 
 ACTIVE = PrimaryState.ACTIVE
 LETTERS = {"u": PrimaryState.UNCONFIGURED, "i": PrimaryState.INACTIVE, "a": ACTIVE}
+NOW_S = 100.0
 NAMES = ("sensor", "planner", "motor", "logger", "camera")
 
 
@@ -40,8 +42,8 @@ def states(letters: str) -> dict[str, PrimaryState]:
     return {name: LETTERS[letter] for name, letter in zip(NAMES, letters, strict=True)}
 
 
-def fault(node: str, at_s: float = 100.0, kind: FaultKind = FaultKind.SILENCE) -> Fault:
-    return Fault(node, kind, "silent for 300 ms", at_s)
+def fault(node: str, kind: FaultKind = FaultKind.SILENCE) -> Fault:
+    return Fault(node, kind, "silent for 300 ms")
 
 
 @pytest.mark.parametrize(
@@ -83,7 +85,7 @@ UP = [
 def test_dependents_pause_before_a_restart_and_resume_behind_it() -> None:
     system = robot()
     desired = DesiredState(states("aaaaa"))
-    decision = decide(system, desired, fault("sensor"))
+    decision = decide(system, desired, fault("sensor"), NOW_S)
     assert decision == Decision(OnFailure.RESTART, "silent for 300 ms", wait_s=0.5, attempt=1)
 
     desired = desired.fail(fault("sensor"))
@@ -122,9 +124,9 @@ def test_nobody_is_sent_up_before_what_somebody_keeps_low_by_hand() -> None:
 
 def test_a_second_fault_of_a_node_that_is_held_down_is_none() -> None:
     desired = DesiredState(states("aaaaa")).fail(fault("sensor"))
-    assert decide(robot(), desired, fault("sensor")) is None
-    assert decide(robot(), desired, fault("camera")) is not None
-    assert decide(robot(), desired, fault("nobody")) is None
+    assert decide(robot(), desired, fault("sensor"), NOW_S) is None
+    assert decide(robot(), desired, fault("camera"), NOW_S) is not None
+    assert decide(robot(), desired, fault("nobody"), NOW_S) is None
 
 
 def test_two_nodes_that_fail_one_after_the_other_come_back_one_after_the_other() -> None:
@@ -153,6 +155,17 @@ def test_two_nodes_that_fail_one_after_the_other_come_back_one_after_the_other()
     ]
 
 
+def test_restarts_are_due_in_the_order_of_their_times() -> None:
+    late, soon = Restart("sensor", 1, due_s=102.0), Restart("planner", 1, due_s=101.0)
+    desired = DesiredState(states("aaaaa")).fail(fault("sensor")).fail(fault("planner"))
+    assert desired.next_restart is None
+    desired = desired.schedule(late).schedule(soon)
+    assert desired.next_restart == soon
+    desired = desired.restart("planner", at_s=101.0)
+    assert desired.next_restart == late
+    assert desired.release("sensor").next_restart is None, "an external transition came first"
+
+
 BUDGET = "{on_failure: restart, restart: {max_attempts: 3, window_ms: 10000, backoff_ms: 100}}"
 
 
@@ -171,7 +184,7 @@ def test_the_budget(
     restarts: tuple[float, ...], action: OnFailure, wait_s: float, attempt: int
 ) -> None:
     desired = DesiredState(states("aaaaa"), restarts={"sensor": restarts})
-    decision = decide(robot(BUDGET), desired, fault("sensor"))
+    decision = decide(robot(BUDGET), desired, fault("sensor"), NOW_S)
     assert decision is not None
     assert (decision.action, decision.wait_s, decision.attempt) == (action, wait_s, attempt)
     if action is OnFailure.SHUTDOWN:
@@ -192,7 +205,7 @@ def test_the_budget(
 )  # fmt: skip
 def test_policies(policy: str, kind: FaultKind, action: OnFailure, reason: str) -> None:
     system = robot(f"{{on_failure: {policy}}}")
-    decision = decide(system, DesiredState(states("aaaaa")), fault("sensor", kind=kind))
+    decision = decide(system, DesiredState(states("aaaaa")), fault("sensor", kind=kind), NOW_S)
     assert decision is not None
     assert (decision.action, decision.reason) == (action, reason)
 

@@ -39,14 +39,18 @@ def test_what_ros_understands_is_left_alone(environment: dict[str, str]) -> None
         ({"ROS_DOMAIN_ID": "-1"}, "ROS_DOMAIN_ID is '-1'", "from 0 to 232"),
         ({"ROS_DOMAIN_ID": "x"}, "ROS_DOMAIN_ID is 'x'", "from 0 to 232"),
         ({"ROS_DOMAIN_ID": "233"}, "ROS_DOMAIN_ID is '233'", "from 0 to 232"),
-        ({"ROS_DOMAIN_ID": "\N{SUPERSCRIPT TWO}"}, "no domain id", "from 0 to 232"),
+        ({"ROS_DOMAIN_ID": "\N{SUPERSCRIPT TWO}"}, "is not a domain id", "from 0 to 232"),
         (
             {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOTS"},
-            "no discovery range",
+            "is not a discovery range",
             "did you mean LOCALHOST?",
         ),
-        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "BOGUS"}, "no discovery range", "valid values: SUBNET"),
-        ({"ROS_SECURITY_ENABLE": "true"}, "names no keystore", "create_keystore"),
+        (
+            {"ROS_AUTOMATIC_DISCOVERY_RANGE": "BOGUS"},
+            "is not a discovery range",
+            "valid values: SUBNET",
+        ),
+        ({"ROS_SECURITY_ENABLE": "true"}, "ROS_SECURITY_KEYSTORE is not set", "create_keystore"),
         (
             {**SECURE, "ROS_SECURITY_STRATEGY": "Permissive"},
             "would run unsecured",
@@ -68,7 +72,7 @@ def test_a_folder_for_logs_that_cannot_be_is_refused(tmp_path: Path, below: str)
     (tmp_path / "file").touch(mode=0o644)
     folder = str(tmp_path / "file" / below)
     check_environment({"ROS_LOG_DIR": str(tmp_path / "new" / "folder")})
-    with pytest.raises(StartRefused, match="ROS writes its logs to") as refusal:
+    with pytest.raises(StartRefused, match="ROS cannot write its logs to") as refusal:
         check_environment({"ROS_LOG_DIR": folder})
     assert folder in str(refusal.value)
     assert "ROS_LOG_DIR" in refusal.value.hint

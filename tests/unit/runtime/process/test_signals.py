@@ -18,16 +18,16 @@ from composer.runtime.process.signals import stop_signals
 
 main_queue = MainQueue()
 sender = subprocess.Popen([sys.executable, "-c", '''{SENDER}'''], stdin=subprocess.PIPE)
-with stop_signals(main_queue.ask, main_queue.bell, ends_process=True):
+with stop_signals(main_queue.request_stop, main_queue.wakeup, ends_process=True):
     for _ in range({ROUNDS}):
         os.write(sender.stdin.fileno(), b"!")
         until_s = time.perf_counter() + random.uniform(0.0, 100e-6)  # the signal is on its way
         while time.perf_counter() < until_s:
             pass
-        while not main_queue.closing:
-            main_queue.take()
-        print(main_queue.reason)
-        main_queue.reason = None
+        while not main_queue.stopping:
+            main_queue.get()
+        print(main_queue.stop_reason)
+        main_queue.stop_reason = None
 """
 
 

@@ -16,8 +16,8 @@ def test_items_come_in_the_order_they_were_put() -> None:
     main_queue: MainQueue[int] = MainQueue()
     for number in range(3):
         main_queue.put(number)
-    assert [main_queue.take(), main_queue.take(), main_queue.take()] == [0, 1, 2]
-    assert main_queue.take(time.monotonic()) is None
+    assert [main_queue.get(), main_queue.get(), main_queue.get()] == [0, 1, 2]
+    assert main_queue.get(time.monotonic()) is None
 
 
 def test_what_comes_while_something_else_is_waited_for_is_kept() -> None:
@@ -26,34 +26,34 @@ def test_what_comes_while_something_else_is_waited_for_is_kept() -> None:
     done = []
     threading.Thread(target=lambda: (done.append(True), main_queue.wake())).start()
     assert main_queue.wait(lambda: bool(done), time.monotonic() + 20.0, stoppable=True)
-    assert main_queue.take(time.monotonic()) == "later"
+    assert main_queue.get(time.monotonic()) == "later"
 
 
 def test_a_wait_ends_in_time() -> None:
     main_queue: MainQueue[str] = MainQueue()
     began_s = time.monotonic()
     assert not main_queue.wait(lambda: False, began_s + 0.05, stoppable=True)
-    assert main_queue.take(began_s + 0.1) is None
+    assert main_queue.get(began_s + 0.1) is None
     assert 0.1 <= time.monotonic() - began_s < 10.0
 
 
 def test_a_request_to_stop_ends_what_may_be_stopped_and_a_second_one_hurries(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "_TOGETHER_S", 60.0)
+    monkeypatch.setattr(module, "_SAME_REQUEST_S", 60.0)
     main_queue: MainQueue[str] = MainQueue()
     main_queue.put("never dealt with")
-    main_queue.ask("SIGINT")
-    assert main_queue.closing
-    assert main_queue.take() is None
+    main_queue.request_stop("SIGINT")
+    assert main_queue.stopping
+    assert main_queue.get() is None
     assert not main_queue.wait(lambda: False, time.monotonic() + 60.0, stoppable=True)
-    main_queue.ask("SIGINT")  # forwarded by somebody who got the same one
-    assert (main_queue.reason, main_queue.hurry) == ("SIGINT", False)
-    monkeypatch.setattr(module, "_TOGETHER_S", 0.1)
+    main_queue.request_stop("SIGINT")  # forwarded by somebody who got the same one
+    assert (main_queue.stop_reason, main_queue.urgent) == ("SIGINT", False)
+    monkeypatch.setattr(module, "_SAME_REQUEST_S", 0.1)
     until_s = time.monotonic() + 20.0
-    while not main_queue.hurry and time.monotonic() < until_s:
-        main_queue.ask("SIGTERM")
-    assert (main_queue.reason, main_queue.hurry) == ("SIGINT", True)
+    while not main_queue.urgent and time.monotonic() < until_s:
+        main_queue.request_stop("SIGTERM")
+    assert (main_queue.stop_reason, main_queue.urgent) == ("SIGINT", True)
     began_s = time.monotonic()
     assert not main_queue.wait(lambda: False, began_s + 60.0, stoppable=False)
     assert time.monotonic() - began_s < 10.0
@@ -63,5 +63,5 @@ def test_a_request_to_stop_ends_what_may_be_stopped_and_a_second_one_hurries(
 def test_an_end_may_be_years_away(left_s: float) -> None:
     main_queue: MainQueue[str] = MainQueue()
     main_queue.wake()
-    assert main_queue.bell.wait(time.monotonic() + left_s)
-    assert not main_queue.bell.wait(time.monotonic() + 0.01)
+    assert main_queue.wakeup.wait(time.monotonic() + left_s)
+    assert not main_queue.wakeup.wait(time.monotonic() + 0.01)
