@@ -1,4 +1,4 @@
-"""What every test gets: a DDS domain of its own, and honest skips without ROS."""
+"""Fixtures and hooks of all tests: a separate ROS domain, and skips without ROS."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from composer.runtime.process.dds_participants import count_participants
 TESTS_WITH_ROS = Path(__file__).parent / "ros"
 PROFILE_OF_FAST_DDS = Path(__file__).with_name("udp_on_this_computer.xml")
 NO_ROS = "rclpy cannot be imported"
-# Domain 0 is where people's robots are; above 101 the ports meet Linux' ephemeral ones.
+# Domain 0 is used by other systems; ports of IDs above 101 collide with ephemeral ports.
 DOMAIN_IDS = range(1, 102)
 
-# How long an example takes says how busy the machine is, and what it imports for the first time.
+# The duration of an example depends on the load of the machine and on first-time imports.
 settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("unhurried")
 
@@ -34,26 +34,25 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update-golden",
         action="store_true",
-        help="write what the golden tests get as what they expect; read the difference then",
+        help="update the expected output of the golden tests",
     )
-    parser.addoption("--soak", action="store_true", help="run what takes many minutes, too")
+    parser.addoption("--soak", action="store_true", help="also run tests that take many minutes")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    # Hundreds of commands would compile the composer hundreds of times where nobody may keep what
-    # they compile.
+    # Without a bytecode cache, each of hundreds of commands would compile the composer.
     if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
         folder = tempfile.TemporaryDirectory(prefix="bytecode-")
         config.add_cleanup(folder.cleanup)
         os.environ["PYTHONPYCACHEPREFIX"] = folder.name
-    # What is started in the background of a script ignores SIGINT, and so would all that the
-    # tests start: nobody could see whether they end at Ctrl-C.
+    # Background jobs of scripts ignore SIGINT, and child processes inherit this: restore the
+    # default, so that tests can use Ctrl-C.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _may_skip() -> bool:
-    """Tell whether tests with ROS may be left out: never in CI, where green must mean tested."""
+    """Return whether tests with ROS may be skipped without ROS, which CI does not allow."""
     return importlib.util.find_spec("rclpy") is None and os.environ.get("CI") != "true"
 
 
@@ -73,14 +72,14 @@ def pytest_pycollect_makemodule(
 
 
 def pytest_collection_finish() -> None:
-    """Have the garbage collector look no more at thousands of tests and what they import."""
+    """Exclude the collected tests and their imports from garbage collection."""
     gc.collect()
     gc.freeze()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if not config.getoption("--soak"):
-        _leave_out(config, items, "soak")
+        _deselect(config, items, "soak")
     may_skip = _may_skip()
     for item in items:
         if item.path.is_relative_to(TESTS_WITH_ROS):
@@ -89,34 +88,33 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.skip(reason=NO_ROS))
 
 
-def _leave_out(config: pytest.Config, items: list[pytest.Item], marker: str) -> None:
-    left_out = [item for item in items if item.get_closest_marker(marker)]
-    if left_out:
-        config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if item not in left_out]
+def _deselect(config: pytest.Config, items: list[pytest.Item], marker: str) -> None:
+    deselected = [item for item in items if item.get_closest_marker(marker)]
+    if deselected:
+        config.hook.pytest_deselected(items=deselected)
+        items[:] = [item for item in items if item not in deselected]
 
 
-#: Where tests of this process have been.
+#: Domain IDs that the current test has used.
 _visited: set[int] = set()
 
 
 def pytest_runtest_logfinish() -> None:
-    """Have what a test has left in cycles of references leave the ROS graph, and free its sockets.
+    """Collect reference cycles, so that their nodes leave the ROS graph and release sockets.
 
-    A lifecycle node of rclpy is one, with its participant; so is whatever an exception was raised
-    in. This is the first moment at which nobody holds what the fixtures have made.
+    Lifecycle nodes of rclpy and tracebacks contain reference cycles. Fixtures hold their objects
+    until here.
     """
     if any(count_participants(domain_id) for domain_id in _visited):
         gc.collect()
     _visited.clear()
 
 
-def _hold_domain_id() -> tuple[int, TextIO]:
-    """Take the domain id that has been free longest, of those no other test process here has.
+def _lock_domain_id() -> tuple[int, TextIO]:
+    """Lock the least recently used domain ID without participants and return it.
 
-    So what a killed process has left on the network does not meet the next tests. Neither do
-    nodes that hang in one of the test processes: where anybody is, nobody is sent. The lock lasts
-    as long as the returned file is open, however the process ends.
+    Leftovers of killed processes and nodes of blocked test processes thus do not affect other
+    tests. The lock is held until the returned file is closed or the process exits.
     """
     locks = Path(tempfile.gettempdir()) / f"ros2-composer-domain-ids-{os.getuid()}"
     locks.mkdir(exist_ok=True)
@@ -138,12 +136,12 @@ def _hold_domain_id() -> tuple[int, TextIO]:
         os.utime(lock.fileno())
         _visited.add(domain_id)
         return domain_id, lock
-    pytest.exit(f"all {len(DOMAIN_IDS)} domain ids are taken by other processes", 3)
+    pytest.exit(f"all {len(DOMAIN_IDS)} domain IDs are used by other processes", 3)
 
 
 @contextmanager
-def _environment_given_back() -> Iterator[None]:
-    """Undo what changes; never all of it, for what still runs in this process may look."""
+def _restored_environment() -> Iterator[None]:
+    """Restore changed variables only, since other threads may read the environment."""
     before = dict(os.environ)
     yield
     for name in os.environ.keys() - before.keys():
@@ -155,44 +153,44 @@ def _environment_given_back() -> Iterator[None]:
 
 @contextmanager
 def _domain() -> Iterator[int]:
-    """Have a domain id, set for this process and for every process it starts.
+    """Set a domain ID for this process and its child processes.
 
-    Nobody on another computer is met, and there is no shared memory. What a host of this process
-    chooses meanwhile goes with the domain.
+    Discovery is limited to this computer, and shared memory is disabled. Environment variables
+    that a host sets in this process are restored at the end.
     """
-    domain_id, lock = _hold_domain_id()
-    with _environment_given_back(), pytest.MonkeyPatch.context() as environment, lock:
+    domain_id, lock = _lock_domain_id()
+    with _restored_environment(), pytest.MonkeyPatch.context() as environment, lock:
         environment.setenv("ROS_DOMAIN_ID", str(domain_id))
-        # Shared memory is that of all domains, and outlives killed processes. A participant that
-        # is destroyed right after one was killed may crash there, or wait for ever: Fast DDS locks
-        # what its own listener is about to replace (SharedMemManager::Listener::close).
+        # Shared memory spans all domains and outlives killed processes. Destroying a participant
+        # right after another one was killed can crash or deadlock: Fast DDS locks a mutex that its
+        # own listener is about to replace (SharedMemManager::Listener::close).
         environment.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(PROFILE_OF_FAST_DDS))
         environment.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SYSTEM_DEFAULT")
-        if "AMENT_PREFIX_PATH" not in os.environ:  # the wheels do not set it, a sourced ROS does
+        if "AMENT_PREFIX_PATH" not in os.environ:  # set by a sourced ROS, but not by the wheels
             environment.setenv("AMENT_PREFIX_PATH", sys.prefix)
         yield domain_id
-        os.utime(lock.fileno())  # free from now on
+        os.utime(lock.fileno())  # start of its idle time
 
 
 @pytest.fixture(scope="session")
 def in_a_domain() -> Callable[[], AbstractContextManager[int]]:
-    """What holds a domain id for the length of a block."""
+    """Return a context manager that locks a domain ID."""
     return _domain
 
 
 @pytest.fixture(scope="module")
 def shared_domain_id() -> Iterator[int]:
-    """The domain id of all tests of a module, for what they share."""
+    """The domain ID that all tests of a module share."""
     with _domain() as domain_id:
         yield domain_id
 
 
 @pytest.fixture(autouse=True)
 def ros_domain_id(request: pytest.FixtureRequest) -> Iterator[int]:
-    """The domain id of this test.
+    """The domain ID of this test.
 
-    Its own: an endpoint of the test before that is still known would be counted, and a service of
-    which half is known is not ready. Where tests share what runs, it is that of their module.
+    Each test has its own, since stale discovery data of a previous test would affect it. Tests of
+    a module that share nodes share the domain ID, too.
     """
     if "shared_domain_id" in request.fixturenames:
         yield request.getfixturevalue("shared_domain_id")
