@@ -1,7 +1,7 @@
-"""Text to located tree: YAML 1.2, read under limits that hold for any bytes whatever.
+"""Parse YAML 1.2 into a located tree, within limits that hold for any input.
 
-Nothing here raises for what is in a file: it becomes a diagnostic with its place. A tree comes
-back whenever there is one, also beside diagnostics, so that later stages can say what they find.
+Errors in a file become diagnostics with a location, never exceptions. A tree is returned whenever
+possible, also together with diagnostics, so that later stages can report theirs.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import yaml
 from composer.diagnostics import Diagnostic
 from composer.document.builder import Stopped, TreeBuilder, too_many_values
 from composer.document.characters import check_text
-from composer.document.events import excess, parse_events
+from composer.document.events import first_excess_value, parse_events
 from composer.document.files import decode, read_bytes, too_large
 from composer.document.limits import MAX_BYTES
 from composer.document.rules import KEY_WITHOUT_VALUE, NOT_A_MAP
 from composer.source import SourceFile, Span
 from composer.tree import Mapping, Scalar, Tree, describe
 
-#: What is larger is a system that nobody else reads.
-_KEPT_BYTES = 32_768
-_WHAT_A_FILE_IS = "begin with 'system: <name>' or 'node: <name>'"
+#: Larger files are systems, which are parsed once anyway.
+_MAX_CACHED_BYTES = 32_768
+_FIRST_KEY_HINT = "begin with 'system: <name>' or 'node: <name>'"
 
 __all__ = ["parse_bytes", "parse_document", "read_document"]
 
@@ -43,16 +43,16 @@ def read_document(
 
 
 def parse_bytes(data: bytes, shown: str) -> tuple[Mapping | None, SourceFile, list[Diagnostic]]:
-    """Read what came from somewhere else, such as standard input; ``shown`` is its name."""
+    """Parse the content of a file or of standard input; ``shown`` is its name."""
     if len(data) > MAX_BYTES:
         source = SourceFile(shown)
         return None, source, [too_large(source)]
-    parse = _parsed_before if len(data) <= _KEPT_BYTES else _parsed
+    parse = _parse_cached if len(data) <= _MAX_CACHED_BYTES else _parse
     tree, source, diagnostics = parse(data, shown)
     return tree, source, list(diagnostics)
 
 
-def _parsed(data: bytes, shown: str) -> tuple[Mapping | None, SourceFile, tuple[Diagnostic, ...]]:
+def _parse(data: bytes, shown: str) -> tuple[Mapping | None, SourceFile, tuple[Diagnostic, ...]]:
     source, diagnostics = decode(data, shown)
     if diagnostics:
         return None, source, tuple(diagnostics)
@@ -60,12 +60,12 @@ def _parsed(data: bytes, shown: str) -> tuple[Mapping | None, SourceFile, tuple[
     return tree, source, tuple(diagnostics)
 
 
-#: A node type is parsed once, and not for each system that uses it.
-_parsed_before = lru_cache(maxsize=64)(_parsed)
+#: A node type is parsed once, not for each system that uses it.
+_parse_cached = lru_cache(maxsize=64)(_parse)
 
 
 def parse_document(source: SourceFile) -> tuple[Mapping | None, list[Diagnostic]]:
-    """Return the tree of a text, and what is wrong with it as YAML."""
+    """Return the tree of a text and the diagnostics of its YAML."""
     if len(source.text) > MAX_BYTES:
         return None, [too_large(source)]
     diagnostics = check_text(source)
@@ -73,23 +73,23 @@ def parse_document(source: SourceFile) -> tuple[Mapping | None, list[Diagnostic]
         return None, diagnostics
     builder = TreeBuilder(source)
     try:
-        surplus = excess(source.text)
+        surplus = first_excess_value(source.text)
         if surplus is not None:
             return None, [too_many_values(source, surplus)]
         with closing(parse_events(source.text)) as stream:
             for event in stream:
-                builder.take(event)
+                builder.handle(event)
     except Stopped as stopped:
         return None, [*builder.diagnostics, stopped.diagnostic]
     except (yaml.YAMLError, ValueError) as error:
-        from composer.document.syntax_errors import explain  # noqa: PLC0415 - for files that are wrong
+        from composer.document.syntax_errors import explain  # noqa: PLC0415 - only for invalid files
 
         return None, _with_syntax(builder.diagnostics, explain(error, source, builder.open_bracket))
     return _root(builder.root, builder.diagnostics, source)
 
 
 def _with_syntax(diagnostics: list[Diagnostic], syntax: Diagnostic) -> list[Diagnostic]:
-    """Add the parser's diagnostic, unless text in braces before it is what confused the parser."""
+    """Add the parser's diagnostic, unless it only follows from text in braces before it."""
     confused = any(
         diagnostic.rule is KEY_WITHOUT_VALUE and diagnostic.primary.line == syntax.primary.line
         for diagnostic in diagnostics
@@ -103,9 +103,9 @@ def _root(
     if isinstance(tree, Mapping):
         return tree, diagnostics
     if tree is None or (isinstance(tree, Scalar) and tree.value is None):
-        message, span, hint = "this file is empty", Span(source, 1, 1), _WHAT_A_FILE_IS
+        message, span, hint = "this file is empty", Span(source, 1, 1), _FIRST_KEY_HINT
     else:
         message, span, hint = f"expected keys and values, found {describe(tree)}", tree.span, None
         if isinstance(tree, Scalar) and ":" in str(tree.value):
-            hint = "put a space behind the colon"
-    return None, [*diagnostics, Diagnostic(NOT_A_MAP, message, span, hint=hint or _WHAT_A_FILE_IS)]
+            hint = "put a space after the colon"
+    return None, [*diagnostics, Diagnostic(NOT_A_MAP, message, span, hint=hint or _FIRST_KEY_HINT)]

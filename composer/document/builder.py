@@ -1,4 +1,4 @@
-"""YAML events to a located tree, under limits, without recursion."""
+"""Build a located tree from YAML events, within limits and without recursion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from composer.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, d
 
 
 class Stopped(Exception):
-    """Nothing more can be read; the diagnostic says why."""
+    """Parsing cannot continue; ``diagnostic`` says why."""
 
     def __init__(self, diagnostic: Diagnostic) -> None:
         super().__init__(diagnostic.message)
@@ -26,7 +26,7 @@ class Stopped(Exception):
 
 @dataclass(frozen=True, slots=True)
 class _Anchored:
-    """What an anchor marks, and what repeating it costs."""
+    """The value of an anchor, and the size that each alias adds."""
 
     tree: Tree
     values: int
@@ -35,7 +35,7 @@ class _Anchored:
 
 @dataclass(slots=True)
 class _Open:
-    """A map or list whose end has not been reached."""
+    """A map or list that is not complete yet."""
 
     start: Span
     is_map: bool
@@ -44,7 +44,7 @@ class _Open:
     items: list[Tree] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
     keys: dict[str, Scalar] = field(default_factory=dict)
-    key: Scalar | None = None  # None while a value is awaited: a refused key, its value is dropped
+    key: Scalar | None = None  # None for an invalid key, whose value is dropped
     awaits_value: bool = False
     text_in_braces: Scalar | None = None
     values: int = 1
@@ -62,39 +62,39 @@ class _Open:
 
 
 class TreeBuilder:
-    """Takes the events of one document; ``root`` is the tree once its end is reached."""
+    """Handles the events of one document; ``root`` is the tree after the last one."""
 
     def __init__(self, source: SourceFile) -> None:
         self.root: Tree | None = None
         self.diagnostics: list[Diagnostic] = []
         self._source = source
         self._open: list[_Open] = []
-        self._anchors: dict[str, _Anchored | None] = {}  # None while what they mark is being read
+        self._anchors: dict[str, _Anchored | None] = {}  # None while the value is being read
         self._values = 0
 
     @property
     def open_bracket(self) -> Span | None:
-        """Where the innermost '[' or '{' stands that has not been closed."""
+        """The location of the innermost '[' or '{' that has not been closed."""
         return next((part.start for part in reversed(self._open) if part.is_flow), None)
 
-    def take(self, event: yaml.Event) -> None:
-        """Go on by one event. Raises Stopped."""
+    def handle(self, event: yaml.Event) -> None:
+        """Handle the next event. Raises Stopped."""
         match event:
             case yaml.ScalarEvent():
-                self._take_scalar(event)
+                self._on_scalar(event)
             case yaml.MappingStartEvent() | yaml.SequenceStartEvent():
-                self._take_start(event)
+                self._on_start(event)
             case yaml.MappingEndEvent() | yaml.SequenceEndEvent():
-                self._take_end()
+                self._on_end()
             case yaml.AliasEvent():
-                self._take_alias(event)
+                self._on_alias(event)
             case yaml.DocumentStartEvent() if self.root is not None:
                 span = span_at(self._source, event.start_mark, 3)
-                message = "a second document begins here"
-                hint = "keep one system or node type in a file"
+                message = "a second document starts here"
+                hint = "put each system or node type into its own file"
                 raise Stopped(Diagnostic(rules.SEVERAL_DOCUMENTS, message, span, hint=hint))
 
-    def _take_scalar(self, event: yaml.ScalarEvent) -> None:
+    def _on_scalar(self, event: yaml.ScalarEvent) -> None:
         self._count(1, event.start_mark)
         scalar = self._scalar(event)
         if event.anchor is not None:
@@ -109,47 +109,49 @@ class TreeBuilder:
         parent.awaits_value = True
         parent.key = self._key(scalar, event, parent)
 
-    def _take_start(self, event: yaml.CollectionStartEvent) -> None:
+    def _on_start(self, event: yaml.CollectionStartEvent) -> None:
         self._count(1, event.start_mark)
         if event.tag is not None:
             self._report_tag(event.tag, event.start_mark)
         is_map = isinstance(event, yaml.MappingStartEvent)
         start = span_at(self._source, event.start_mark)
         if len(self._open) >= MAX_DEPTH:
-            message = f"maps and lists stand inside each other more than {MAX_DEPTH} times"
+            message = f"maps and lists are nested more than {MAX_DEPTH} levels deep"
             raise Stopped(Diagnostic(rules.NESTED_TOO_DEEP, message, start))
         if event.anchor is not None:
             self._anchors[event.anchor] = None
         self._open.append(_Open(start, is_map, bool(event.flow_style), event.anchor))
 
-    def _take_end(self) -> None:
+    def _on_end(self) -> None:
         ended = self._open.pop()
         tree = ended.tree()
         if ended.anchor is not None:
             self._anchors[ended.anchor] = _Anchored(tree, ended.values, ended.height)
         self._add(tree, ended.values, ended.height)
 
-    def _take_alias(self, event: yaml.AliasEvent) -> None:
+    def _on_alias(self, event: yaml.AliasEvent) -> None:
         anchor = event.anchor or ""
         name = shown(anchor)
         span = span_at(self._source, event.start_mark, len(anchor) + 1)
         anchored = self._anchors.get(anchor)
         if anchored is None:
             inside = anchor in self._anchors
-            message = f"'*{name}' is part of what it stands for" if inside else _undefined(name)
-            hint = None if inside else f"mark what it repeats with '&{name}', or quote the text"
+            message = (
+                f"'*{name}' is part of the value that it repeats" if inside else _undefined(name)
+            )
+            hint = None if inside else f"mark the value with '&{name}', or quote the text"
             raise Stopped(Diagnostic(rules.BAD_ALIAS, message, span, hint=hint))
         if self._open and self._open[-1].is_map and not self._open[-1].awaits_value:
-            message = f"the alias '*{name}' stands where a key is expected"
-            raise Stopped(Diagnostic(rules.BAD_ALIAS, message, span, hint="write the key out"))
+            message = f"found the alias '*{name}', expected a key"
+            raise Stopped(Diagnostic(rules.BAD_ALIAS, message, span, hint="write out the key"))
         self._count(anchored.values, event.start_mark)
         if len(self._open) + anchored.height > MAX_DEPTH:
-            message = f"with what '*{name}' stands for, more than {MAX_DEPTH} levels are nested"
+            message = f"with '*{name}', values are nested more than {MAX_DEPTH} levels deep"
             raise Stopped(Diagnostic(rules.NESTED_TOO_DEEP, message, span))
         self._add(anchored.tree, anchored.values, anchored.height)
 
     def _add(self, tree: Tree, values: int, height: int) -> None:
-        """Put a finished value where it belongs."""
+        """Add a complete value to its parent."""
         if not self._open:
             self.root = tree
             return
@@ -163,7 +165,7 @@ class TreeBuilder:
                 parent.entries.append(Entry(parent.key, tree))
             parent.awaits_value = False
         else:
-            hint = "put a text with braces or brackets in quotes"
+            hint = "quote a text with braces or brackets"
             self._report(
                 rules.KEY_NOT_TEXT, f"a key is text, found {describe(tree)}", tree.span, hint
             )
@@ -174,7 +176,7 @@ class TreeBuilder:
             self._report_tag(event.tag, event.start_mark)
         span, verbatim, offset = scalar_span(self._source, event)
         value: ScalarValue = event.value
-        if not event.style:  # None from PyYAML's parser, "" from libyaml's: unquoted
+        if not event.style:  # unquoted: None from PyYAML's parser, "" from libyaml's
             if event.tag is None:
                 value = self._plain(event.value, span)
         else:
@@ -186,14 +188,14 @@ class TreeBuilder:
         try:
             return resolve_plain(text)
         except NumberRefused as refusal:
-            hint = "leave the key out where there is no limit; put it in quotes where it is a text"
+            hint = "leave the key out for no limit; quote the value if it is a text"
             self._report(rules.BAD_NUMBER, f"'{shown(text)}' {refusal}", span, hint)
-            return 1  # stands in, so that what is said about its place is said once
+            return 1  # a placeholder, so that no other diagnostic follows
 
     def _key(self, scalar: Scalar, event: yaml.ScalarEvent, parent: _Open) -> Scalar | None:
         if scalar.value == "<<" and not event.style:
-            hint = "write the keys out; what nodes share belongs into a node type or qos_profiles"
-            self._report(rules.MERGE_KEY, "YAML merge keys are not read", scalar.span, hint)
+            hint = "write out the keys; put what nodes share into a node type or qos_profiles"
+            self._report(rules.MERGE_KEY, "YAML merge keys are not supported", scalar.span, hint)
             return None
         if scalar.value is None and not event.value:
             self._report(rules.KEY_NOT_TEXT, "a key is missing before this ':'", scalar.span, None)
@@ -202,19 +204,19 @@ class TreeBuilder:
         if not isinstance(scalar.value, str):
             text = shown(event.value)
             message = f"a key is text, found {describe(scalar)}"
-            self._report(rules.KEY_NOT_TEXT, message, scalar.span, f"put it in quotes: '{text}'")
+            self._report(rules.KEY_NOT_TEXT, message, scalar.span, f"quote it: '{text}'")
             key = Scalar(event.value, scalar.span, scalar.verbatim, scalar.content_offset)
         first = parent.keys.setdefault(str(key.value), key)
         if first is key:
             return key
         label = Label(first.span, "first here")
-        message = f"the key '{shown(key.value)}' stands here a second time"
-        hint = "rename one of them, or put what they say together"
+        message = f"duplicate key '{shown(key.value)}'"
+        hint = "rename one of them, or merge their values"
         self.diagnostics.append(Diagnostic(rules.DUPLICATE_KEY, message, key.span, (label,), hint))
         return None
 
     def _check_value_in_braces(self, parent: _Open, value: Scalar) -> None:
-        """Report ``{message.data}`` and ``{rate_hz:10}``, which YAML takes for keys alone."""
+        """Report ``{message.data}`` and ``{rate_hz:10}``: to YAML, keys without values."""
         key = parent.key
         if not parent.is_map or key is None or key.content_offset or not key.verbatim:
             return
@@ -222,20 +224,20 @@ class TreeBuilder:
             return
         name, colon, rest = str(key.value).partition(":")
         if colon and name and rest and name.isidentifier():
-            message = f"there is no space behind the colon of '{shown(key.value)}'"
+            message = f"there is no space after the colon of '{shown(key.value)}'"
             self._report(rules.KEY_WITHOUT_VALUE, message, key.span, f"write '{name}: {rest}'")
             value = Scalar(self._plain(rest, key.span), key.part(len(name) + 1, len(rest)))
             parent.entries[-1] = Entry(Scalar(name, key.part(0, len(name))), value)
             return
         text = f"{{{key.value}}}"
         message = f"'{shown(text)}' is a map whose key has no value"
-        hint = f'put it in quotes if it is an expression: "{shown(text)}"'
+        hint = f'quote it if it is an expression: "{shown(text)}"'
         self._report(rules.KEY_WITHOUT_VALUE, message, key.span, hint)
         parent.text_in_braces = Scalar(text, parent.start, verbatim=False)
 
     def _report_tag(self, tag: str, mark: Mark | None) -> None:
-        hint = "leave it out, and put what is to be text in quotes"
-        message = f"the tag '{shown(tag.replace('tag:yaml.org,2002:', '!!'))}' is not read"
+        hint = "remove it, and quote the value if it is a text"
+        message = f"the tag '{shown(tag.replace('tag:yaml.org,2002:', '!!'))}' is not supported"
         self._report(rules.YAML_TAG, message, span_at(self._source, mark), hint)
 
     def _count(self, values: int, mark: Mark | None) -> None:
@@ -248,10 +250,10 @@ class TreeBuilder:
 
 
 def too_many_values(source: SourceFile, mark: Mark | None) -> Diagnostic:
-    """Return the diagnostic for more than MAX_VALUES values; ``mark`` is where one is too many."""
-    message = f"this file says more than {MAX_VALUES:,} things"
+    """Return the diagnostic for too many values; ``mark`` is the first one beyond MAX_VALUES."""
+    message = f"this file has more than {MAX_VALUES:,} values"
     return Diagnostic(rules.TOO_MANY_VALUES, message, span_at(source, mark))
 
 
 def _undefined(name: str) -> str:
-    return f"'*{name}' repeats something, but nothing before it is marked '&{name}'"
+    return f"'*{name}' is an alias, but no value before it is marked '&{name}'"

@@ -1,4 +1,4 @@
-"""Which characters a text may contain."""
+"""Check for forbidden characters."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def check_text(source: SourceFile) -> list[Diagnostic]:
         match = _FORBIDDEN_IN_TEXT.search(line)
         if match is not None:
             count = len(_FORBIDDEN_IN_TEXT.findall(source.text))
-            more = f", the first of {count} like it" if count > 1 else ""
+            more = f", the first of {count} such characters" if count > 1 else ""
             message = f"{_character(match[0])} is not allowed in a file{more}"
             span = Span(source, number, match.start() + 1)
             return [Diagnostic(FORBIDDEN_CHARACTER, message, span, hint="delete it")]
@@ -46,7 +46,7 @@ def check_value(value: str, span: Span) -> tuple[str, list[Diagnostic]]:
         FORBIDDEN_CHARACTER,
         message,
         span,
-        hint="leave the escape out; only \\t and \\n may stand for control characters",
+        hint="remove the escape; \\t and \\n are the only allowed control characters",
     )
     return _FORBIDDEN_IN_VALUE.sub("", value), [diagnostic]
 

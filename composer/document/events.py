@@ -1,7 +1,8 @@
 """YAML events, from libyaml where PyYAML was built with it, else from PyYAML's own parser.
 
-Only events are taken: a composer builds recursively, and libyaml's crashes the process on deep
-input. The events come one by one, so that a reader which has seen enough stops the parser too.
+This reads events only: YAML composers are recursive, and libyaml's crashes the process on deeply
+nested
+input. Events come one by one, so that a consumer can stop the parser early.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ def parse_events(text: str) -> Generator[yaml.Event, None, None]:
         loader.dispose()
 
 
-def excess(text: str) -> Mark | None:
-    """Return where the first value stands that is one too many; None where there is none.
+def first_excess_value(text: str) -> Mark | None:
+    """Return the location of the first value beyond MAX_VALUES, or None.
 
-    Events alone are had in a tenth of the time that the tree takes. Whatever else is wrong with
-    the text, and the values that aliases repeat, is found in building the tree.
+    Reading the events takes a tenth of the time of building the tree. Other errors, and values
+    repeated by aliases, are found when the tree is built.
     """
-    if len(text) < 2 * MAX_VALUES:  # a value takes a character, and one between it and the next
+    if len(text) < 2 * MAX_VALUES:  # each value takes a character and a separator
         return None
     values = depth = 0
     with closing(parse_events(text)) as stream:

@@ -1,4 +1,4 @@
-"""Reading a file that may be anything: too large, a device, a pipe, in some other encoding."""
+"""Read files safely: too large, not a regular file, or in another encoding."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _WIDE_ENCODINGS = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
 
 
 class _NotRead(Exception):
-    """Nothing was read; the diagnostic's message and hint."""
+    """A file cannot be read; the message and the hint of the diagnostic."""
 
     def __init__(self, message: str, hint: str | None = None) -> None:
         super().__init__(message)
@@ -35,7 +35,7 @@ class _NotRead(Exception):
 
 
 def read_bytes(path: Path, source: SourceFile) -> tuple[bytes, list[Diagnostic]]:
-    """Return what is in a regular file of at most MAX_BYTES, or a diagnostic at ``source``."""
+    """Return the content of a regular file of at most MAX_BYTES, or a diagnostic."""
     start = Span(source, 1, 1)
     try:
         data = _read(path)
@@ -52,7 +52,7 @@ def too_large(source: SourceFile) -> Diagnostic:
         FILE_TOO_LARGE,
         f"this file is larger than {MAX_BYTES:,} bytes",
         Span(source, 1, 1),
-        hint="split the system, or describe repeated nodes once as a node type",
+        hint="split the system, or declare repeated nodes once as a node type",
     )
 
 
@@ -78,10 +78,10 @@ def _not_utf8(data: bytes, offset: int, span: Span) -> Diagnostic:
 
 
 def _read(path: Path) -> bytes | None:
-    """Return the content, or None when it is too much. Raises _NotRead."""
+    """Return the content, or None if it is too large. Raises _NotRead."""
     try:
-        # Looked at before it is opened, for opening a device can have effects; and again after,
-        # for the name may stand for something else by then.
+        # Checked before opening, since opening a device can have side effects, and again after,
+        # since the file may have been replaced in between.
         _require_regular(path.stat().st_mode)
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
         with os.fdopen(descriptor, "rb") as file:
@@ -108,7 +108,7 @@ def _similar_name(path: Path) -> str | None:
     name = nearest(path.name, _names_beside(path))
     if name is None:
         return None
-    # Of a long path the end is what matters, and what differs.
+    # Do not shorten the path: its end is the part that differs.
     return f"did you mean '{shown(path.with_name(name), limit=_LONGEST_PATH)}'?"
 
 

@@ -1,35 +1,35 @@
-"""How large a file may be.
+"""Limits for the size of files.
 
-Every limit is beyond what a person writes, and beyond a generated system of 2000 nodes and 6000
-connections. What exceeds one is refused within about a second and 200 MB.
+They allow any file written by hand and generated systems of 2000 nodes and 6000 connections. A file
+beyond a limit is refused within about one second and 200 MB.
 """
 
 from __future__ import annotations
 
-#: Bytes in a file; looked at before anything is read.
+#: Bytes in a file; checked before it is read.
 MAX_BYTES = 2_000_000
 
-#: Maps and lists inside each other.
+#: Nesting depth of maps and lists.
 MAX_DEPTH = 32
 
-#: Keys, values, maps and lists in a file, those repeated by aliases counted again.
+#: Keys, values, maps and lists in a file, counting values repeated by aliases again.
 MAX_VALUES = 250_000
 
-#: Copies that the ``for_each`` of one file make.
+#: Copies made by all ``for_each`` of one file.
 MAX_COPIES = 2_000
 
-#: Files that a system includes, those counted again that are included again.
+#: Files that a system includes, counting each include.
 MAX_INCLUDES = 500
 
-#: Keys, values, maps and lists in all files that a system includes, and in what patterns stand for.
+#: Keys, values, maps and lists in all files that a system includes, and matches of patterns.
 MAX_INCLUDED_VALUES = 50_000
 
-#: Files that include each other, one in another.
+#: Nesting depth of includes.
 MAX_INCLUDE_DEPTH = 16
 
 #: Characters of a number.
 MAX_NUMBER_LENGTH = 100
 
-#: The integers that some ROS type can hold: int64 and uint64.
+#: The range of ROS integers: int64 and uint64.
 MIN_INTEGER = -(2**63)
 MAX_INTEGER = 2**64 - 1

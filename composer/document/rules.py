@@ -1,4 +1,4 @@
-"""The rules of reading (RC0xx): what keeps a text from being a tree of keys and values."""
+"""The rules of reading YAML (RC0xx)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ UNREADABLE_FILE = register(
         code="RC001",
         name="unreadable-file",
         summary="A file cannot be read, or is not a regular file.",
-        why="Folders, devices and pipes hold no system; reading a pipe could block for ever.",
+        why="Folders and devices do not contain a system; reading a pipe could block forever.",
         bad="compose validate /dev/zero",
         good="compose validate systems/pipeline.yaml",
     )
@@ -25,7 +25,7 @@ FILE_TOO_LARGE = register(
         name="file-too-large",
         summary="A file is larger than two megabytes.",
         why=(
-            "Nobody writes that much YAML: it is a mistake or an attack, and reading it would take "
+            "So much YAML is a mistake or an attack, and reading it would take "
             "minutes and gigabytes."
         ),
         bad="compose validate recording.yaml  # 10 MB of recorded data",
@@ -46,10 +46,10 @@ FORBIDDEN_CHARACTER = register(
     _error(
         code="RC004",
         name="forbidden-character",
-        summary="A control character, or one that turns or hides text.",
+        summary="A control character, or a character that hides text or changes its direction.",
         why=(
-            "Such characters make a file look different from what it says, and steer the terminal "
-            "that shows it."
+            "Such characters make a file look different from its content, and can control the "
+            "terminal that shows it."
         ),
         bad="""\
 system: demo
@@ -68,7 +68,7 @@ YAML_SYNTAX = register(
         code="RC005",
         name="yaml-syntax",
         summary="The text is not YAML.",
-        why="Until the text can be read, nothing else about it can be known.",
+        why="No other check is possible until the text can be parsed.",
         bad="""\
 system: demo
 nodes:
@@ -89,8 +89,8 @@ NESTED_TOO_DEEP = register(
     _error(
         code="RC006",
         name="nested-too-deep",
-        summary="Maps and lists stand inside each other more than 32 times.",
-        why="No system needs it, and programs that read such a text run out of stack.",
+        summary="Maps and lists are nested more than 32 levels deep.",
+        why="No system needs it, and other YAML parsers run out of stack on such input.",
         bad="""\
 system: demo
 nodes:
@@ -107,8 +107,8 @@ TOO_MANY_VALUES = register(
     _error(
         code="RC007",
         name="too-many-values",
-        summary="A file says more than 250 000 things.",
-        why="Aliases let a few lines stand for more values than any program can go through.",
+        summary="A file has more than 250 000 values.",
+        why="With aliases, a few lines can expand to more values than a program can process.",
         bad="a: &a [x, x]\nb: &b [*a, *a]\nc: &c [*b, *b]  # and so on",
         good="a: [x, x]",
     )
@@ -117,8 +117,8 @@ SEVERAL_DOCUMENTS = register(
     _error(
         code="RC008",
         name="several-documents",
-        summary="A file holds more than one YAML document.",
-        why="One file is one system or one node type, so that its name says what is in it.",
+        summary="A file contains more than one YAML document.",
+        why="Each file is one system or one node type.",
         bad="""\
 system: first
 nodes:
@@ -150,7 +150,7 @@ YAML_TAG = register(
         code="RC010",
         name="yaml-tag",
         summary="A value has a YAML tag, such as !!str or !env.",
-        why="Tags would let a file decide how it is read. The language has one way to say a thing.",
+        why="Tags change how values are read. The language has one way to write each value.",
         bad="""\
 system: demo
 description: !!str 5
@@ -169,8 +169,8 @@ DUPLICATE_KEY = register(
     _error(
         code="RC011",
         name="duplicate-key",
-        summary="A key stands twice in one map.",
-        why="YAML readers silently keep the last one, and half of what was written is lost.",
+        summary="A key occurs twice in one map.",
+        why="YAML parsers silently keep the last value, and the other one is lost.",
         bad="""\
 system: demo
 nodes:
@@ -189,7 +189,7 @@ KEY_NOT_TEXT = register(
     _error(
         code="RC012",
         name="key-not-text",
-        summary="A key is a number, a truth value, a list, a map or nothing.",
+        summary="A key is a number, a boolean, a list, a map or null.",
         why="Every key of the language is a word or a name.",
         bad="""\
 system: demo
@@ -208,7 +208,7 @@ MERGE_KEY = register(
         code="RC013",
         name="merge-key",
         summary="A YAML merge key (<<) is used.",
-        why="YAML 1.2 has no merge keys, and what they put together cannot be told from the text.",
+        why="YAML 1.2 has no merge keys, and their result is hard to see in the text.",
         bad="""\
 system: demo
 nodes:
@@ -246,8 +246,8 @@ BAD_ALIAS = register(
     _error(
         code="RC015",
         name="bad-alias",
-        summary="An alias (*name) stands for nothing, or for what it is part of.",
-        why="An alias repeats what an anchor (&name) before it marks.",
+        summary="An alias (*name) has no anchor, or is part of its own anchor.",
+        why="An alias repeats the value that an anchor (&name) before it marks.",
         bad="""\
 system: demo
 nodes:
@@ -265,7 +265,7 @@ KEY_WITHOUT_VALUE = register(
         code="RC016",
         name="key-without-value",
         summary="A key in braces has no colon and no value.",
-        why="In YAML, braces make a map: an expression or a text with braces needs quotes.",
+        why="In YAML, braces start a map. An expression or a text with braces needs quotes.",
         bad="""\
 system: demo
 nodes:

@@ -27,7 +27,7 @@ _FIRST_OF_NUMBER = frozenset("0123456789+-.")
 
 
 class NumberRefused(Exception):
-    """A number that no ROS type can hold, or that compares with nothing. Its text says why."""
+    """A number that is not finite or exceeds the range of ROS types. The text says why."""
 
 
 def resolve_plain(text: str) -> ScalarValue:

@@ -1,4 +1,4 @@
-"""Marks of the YAML parser to spans. Marks count from 0, in characters; spans from 1."""
+"""Convert marks of the YAML parser, which count from 0, to spans, which count from 1."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _BLOCK_STYLES = ("|", ">")
 
 
 class Mark(Protocol):
-    """A place in a text, as both parsers give it."""
+    """A position in a text, as both parsers give it."""
 
     @property
     def line(self) -> int:
@@ -26,7 +26,7 @@ class Mark(Protocol):
 def span_at(source: SourceFile, mark: Mark | None, length: int = 1) -> Span:
     """Return the span of ``length`` characters that begins at ``mark``.
 
-    Without a mark, which PyYAML's types allow and its parsers never do, the first of the file.
+    PyYAML's types allow a missing mark, its parsers never return one; the span is then 1:1.
     """
     if mark is None:
         return Span(source, 1, 1, length)
@@ -34,9 +34,9 @@ def span_at(source: SourceFile, mark: Mark | None, length: int = 1) -> Span:
 
 
 def scalar_span(source: SourceFile, event: yaml.ScalarEvent) -> tuple[Span, bool, int]:
-    """Return the span of a scalar, whether its text is its value, and where in it that begins.
+    """Return the span of a scalar, whether it is verbatim, and the offset of its content.
 
-    The span of a scalar of several lines ends with the first of them.
+    The span of a multi-line scalar ends with its first line.
     """
     begin, end = event.start_mark, event.end_mark
     if begin is None or end is None:

@@ -1,7 +1,6 @@
-"""What the YAML parser says, in words that tell how to mend it.
+"""Explain errors of the YAML parser, with hints how to fix them.
 
-libyaml and PyYAML's own parser say the same things differently; what is looked for here is in the
-words of both.
+libyaml and PyYAML's own parser word the same errors differently; the patterns here match both.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ _CLOSING = {"[": "]", "{": "}"}
 
 @dataclass(frozen=True, slots=True)
 class _Problem:
-    """A parser's complaint: its words, the place it gave up at and what it was in then."""
+    """An error of the parser: its message, where it stopped, and the context it was in."""
 
     source: SourceFile
     words: str
@@ -36,44 +35,44 @@ class _Problem:
 
     @property
     def line(self) -> str:
-        """The line the parser gave up in."""
+        """The line where the parser stopped."""
         return self.source.line(self.place.line + 1)
 
     @property
     def before(self) -> str:
-        """The part of that line before the place."""
+        """The part of that line before the error."""
         return self.line[: self.place.column]
 
     @property
     def character(self) -> str:
-        """The character at the place; empty at the end of a line."""
+        """The character at the error; empty at the end of a line."""
         return self.line[self.place.column : self.place.column + 1]
 
     @property
     def opening(self) -> str:
-        """The character at which began what the parser was in."""
+        """The first character of the context."""
         line = self.source.line(self.began.line + 1)
         return line[self.began.column : self.began.column + 1]
 
-    def here(self, message: str, hint: str | None = None, *related: Label) -> Diagnostic:
-        """Return a diagnostic at the place the parser gave up at."""
+    def at_error(self, message: str, hint: str | None = None, *related: Label) -> Diagnostic:
+        """Return a diagnostic where the parser stopped."""
         return Diagnostic(YAML_SYNTAX, message, span_at(self.source, self.place), related, hint)
 
-    def there(self, message: str, hint: str | None = None) -> Diagnostic:
-        """Return a diagnostic where began what the parser was in."""
+    def at_context(self, message: str, hint: str | None = None) -> Diagnostic:
+        """Return a diagnostic at the start of the context."""
         return Diagnostic(YAML_SYNTAX, message, span_at(self.source, self.began), (), hint)
 
-    def beginning(self, message: str) -> Label:
-        """Return a label where began what the parser was in."""
+    def context_label(self, message: str) -> Label:
+        """Return a label at the start of the context."""
         return Label(span_at(self.source, self.began), message)
 
 
 def explain(
     error: yaml.YAMLError | ValueError, source: SourceFile, bracket: Span | None
 ) -> Diagnostic:
-    """Return the diagnostic for whatever the parser raised.
+    """Return the diagnostic for an error of the parser.
 
-    ``bracket`` is the innermost one that was open then.
+    ``bracket`` is the innermost open bracket, if any.
     """
     place = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     if place is None:
@@ -91,7 +90,7 @@ def explain(
         diagnostic = explanation(problem)
         if diagnostic is not None:
             return diagnostic
-    return problem.here(f"this is not YAML: {shown(problem.words)}")
+    return problem.at_error(f"this is not YAML: {shown(problem.words)}")
 
 
 def _tab(problem: _Problem) -> Diagnostic | None:
@@ -100,24 +99,24 @@ def _tab(problem: _Problem) -> Diagnostic | None:
         return None
     place = Span(problem.source, problem.place.line + 1, indentation.index("\t") + 1)
     hint = "indent with spaces"
-    return Diagnostic(YAML_SYNTAX, "a tab indents this line", place, hint=hint)
+    return Diagnostic(YAML_SYNTAX, "this line is indented with a tab", place, hint=hint)
 
 
 def _open_quote(problem: _Problem) -> Diagnostic | None:
     if "quoted scalar" not in problem.context or "unexpected" not in problem.words:
         return None
     quote = problem.opening
-    return problem.there("this quote is never closed", f"end the text with another {quote}")
+    return problem.at_context("this quote is never closed", f"end the text with another {quote}")
 
 
 def _escape(problem: _Problem) -> Diagnostic | None:
     if "quoted scalar" not in problem.context and "double-quoted" not in problem.context:
         return None
-    message = "this backslash begins no escape that YAML knows"
+    message = "this backslash does not start a YAML escape"
     hint = "use single quotes, or write the backslash twice"
     place = problem.before.rfind("\\") if problem.character != "\\" else problem.place.column
     if place < 0:
-        return problem.here(message, hint)
+        return problem.at_error(message, hint)
     span = Span(problem.source, problem.place.line + 1, place + 1)
     return Diagnostic(YAML_SYNTAX, message, span, hint=hint)
 
@@ -127,11 +126,11 @@ def _in_brackets(problem: _Problem) -> Diagnostic | None:
         return None
     if problem.character == "{" and problem.before.endswith("$"):
         hint = 'write "${name}": inside braces and brackets it needs quotes'
-        return problem.here("a '${...}' stands here without quotes", hint)
+        return problem.at_error("'${...}' needs quotes here", hint)
     if problem.place.line != problem.began.line or not problem.character:
         return _not_closed(problem, span_at(problem.source, problem.began))
     hint = f"{_QUOTE_TEXT} if it is one; commas separate items"
-    return problem.here(f"expected ',' or '{_CLOSING.get(problem.opening, '')}' here", hint)
+    return problem.at_error(f"expected ',' or '{_CLOSING.get(problem.opening, '')}' here", hint)
 
 
 def _not_closed(problem: _Problem, bracket: Span) -> Diagnostic:
@@ -145,9 +144,9 @@ def _colon(problem: _Problem) -> Diagnostic | None:
     if "mapping values are not allowed" not in problem.words:
         return None
     if _KEY_AND_VALUE_BEFORE.match(problem.before):
-        return problem.here("a second ':' in one value", f"{_QUOTE_TEXT}: a ': ' makes a key")
-    message = "this key stands where none can"
-    hint = "line it up with the key before it, or end that one with ':'"
+        return problem.at_error("a second ':' in one value", f"{_QUOTE_TEXT}: a ': ' makes a key")
+    message = "a key is not allowed here"
+    hint = "align it with the key before it, or end that key with ':'"
     key = problem.before.lstrip()
     start = len(problem.before) - len(key)
     span = Span(problem.source, problem.place.line + 1, start + 1, max(len(key), 1))
@@ -160,40 +159,42 @@ def _no_colon(problem: _Problem) -> Diagnostic | None:
     match = _COLON_WITHOUT_SPACE.match(problem.source.line(problem.began.line + 1))
     if match is not None:
         span = Span(problem.source, problem.began.line + 1, match.end())
-        message = "there is no space behind this colon"
+        message = "there is no space after this colon"
         return Diagnostic(YAML_SYNTAX, message, span, hint="write 'key: value'")
-    return problem.there("this line has no key, or its key no ':'", "write 'key: value'")
+    return problem.at_context("this line has no key, or its key no ':'", "write 'key: value'")
 
 
 def _among_keys(problem: _Problem) -> Diagnostic | None:
     if problem.context != "while parsing a block mapping":
         return None
     if problem.character and problem.character in "]}":
-        return problem.here(f"this '{problem.character}' closes nothing", "delete it")
+        return problem.at_error(f"this '{problem.character}' closes nothing", "delete it")
     if problem.before.strip():
-        return problem.here("this stands behind a finished value", f"{_QUOTE_TEXT} if it is one")
-    map_begins = problem.beginning("the map begins here")
+        return problem.at_error(
+            "this stands behind a finished value", f"{_QUOTE_TEXT} if it is one"
+        )
+    map_begins = problem.context_label("the map begins here")
     if problem.character == "-":
         hint = "indent the item under the key it belongs to"
-        return problem.here("a list item stands among keys", hint, map_begins)
+        return problem.at_error("a list item stands among keys", hint, map_begins)
     message = "this line is not in line with the keys it stands among"
-    return problem.here(message, "give all keys of a map the same indentation", map_begins)
+    return problem.at_error(message, "give all keys of a map the same indentation", map_begins)
 
 
 def _among_items(problem: _Problem) -> Diagnostic | None:
     if problem.context != "while parsing a block collection":
         return None
-    list_begins = problem.beginning("the list begins here")
+    list_begins = problem.context_label("the list begins here")
     hint = "begin it with '- ', or indent it as what it belongs to"
-    return problem.here("this line stands in a list and is no item of it", hint, list_begins)
+    return problem.at_error("this line stands in a list and is no item of it", hint, list_begins)
 
 
 def _cannot_start(problem: _Problem) -> Diagnostic | None:
     if "cannot start any token" not in problem.words:
         return None
     if problem.character == "\t":
-        return problem.here("a tab stands where only spaces can", "use a space")
-    return problem.here(f"no value begins with '{shown(problem.character)}'", _QUOTE_TEXT)
+        return problem.at_error("a tab is not allowed here", "use a space")
+    return problem.at_error(f"a value cannot start with '{shown(problem.character)}'", _QUOTE_TEXT)
 
 
 def _no_content(problem: _Problem) -> Diagnostic | None:
@@ -202,21 +203,21 @@ def _no_content(problem: _Problem) -> Diagnostic | None:
     if not problem.character and problem.bracket is not None:
         return _not_closed(problem, problem.bracket)
     found = f"'{shown(problem.character)}'" if problem.character else "the end of the line"
-    return problem.here(f"expected a value, found {found}", f"{_QUOTE_TEXT} if it is one")
+    return problem.at_error(f"expected a value, found {found}", f"{_QUOTE_TEXT} if it is one")
 
 
 def _block_text(problem: _Problem) -> Diagnostic | None:
     if "block scalar" not in problem.context:
         return None
     hint = "write '|' or '>' at the end of the line, and the text indented below"
-    return problem.here("this does not belong behind '|' or '>'", hint)
+    return problem.at_error("unexpected text after '|' or '>'", hint)
 
 
 def _after_end(problem: _Problem) -> Diagnostic | None:
     if "<document start>" not in problem.words:
         return None
-    hint = "a file is one map of keys and values: 'key: value', with a space behind the colon"
-    return problem.here("the YAML ends before this", hint)
+    hint = "a file is one map of keys and values: 'key: value', with a space after the colon"
+    return problem.at_error("the YAML ends before this", hint)
 
 
 _EXPLANATIONS: tuple[Callable[[_Problem], Diagnostic | None], ...] = (

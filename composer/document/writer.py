@@ -1,4 +1,4 @@
-"""Located tree to text: YAML 1.2 as a person would write it, and that reads as the same tree."""
+"""Write a located tree as readable YAML 1.2 that parses to the same tree."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from composer.tree import Mapping, Scalar, ScalarValue, Sequence, Tree
 
 _WIDTH = 100
 _INDENT = "  "
-#: What needs no quotes, whatever it stands in, if it is no number and no other word of YAML.
+#: Texts that need no quotes in any context, unless YAML reads them as another type.
 _PLAIN = re.compile(r"[A-Za-z_/](?:[A-Za-z0-9_./ -]*[A-Za-z0-9_./])?")
-_SECTION = 1  # the depth of what stands under the keys of a file
+_SECTION = 1  # the depth of the values of a file's keys
 
 
 def write_document(tree: Mapping) -> str:
-    """Return a text that says what ``tree`` says.
+    """Return ``tree`` as YAML.
 
-    Sections are blocks; in them, what fits into a line stands in one.
+    Sections are in block style; within them, a value that fits into a line is in flow style.
     """
     return "".join(f"{line}\n" for line in _block(tree, 0))
 
 
 def _block(tree: Tree, depth: int) -> Iterator[str]:
-    """Yield the lines of a map or list that has something in it."""
+    """Yield the lines of a map or list that is not empty."""
     match tree:
         case Mapping():
             for entry in tree:
@@ -103,7 +103,7 @@ def _is_plain(text: str) -> bool:
 
 
 def _quoted(text: str) -> str:
-    """Return a text in double quotes: JSON's, with an escape for everything that is not seen."""
+    """Return a text in double quotes, with escapes for everything that is not printable."""
     return "".join(
         character if character.isprintable() else f"\\U{ord(character):08x}"
         for character in json.dumps(text, ensure_ascii=False)

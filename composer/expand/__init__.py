@@ -1,7 +1,8 @@
-"""Load-time variables: ``${name}`` in a file, and what is put in its place; and copies.
+"""Expand load-time variables (``${name}``) and copies (``for_each``).
 
-A scalar that is just ``${name}`` becomes the value, whatever it is; inside a text the value's own
-text is put in; ``$${`` is a plain ``${``. A declared variable without a value stays as written.
+A scalar that is only ``${name}`` becomes the value of the variable, of any type. Within a text, the
+text of the value is inserted. ``$${`` stands for ``${``. A declared variable without value stays as
+written.
 """
 
 from __future__ import annotations
@@ -22,24 +23,24 @@ from composer.tree import Entry, Mapping, Scalar, Tree
 __all__ = ["expand", "missing_variables"]
 
 _SECTION = "variables"
-_LONGEST_CIRCLE = 8  # names told of one
+_MAX_CYCLE_NAMES = 8  # maximum number of names in a message
 
 
 def expand(tree: Mapping, given: Map[str, Tree]) -> tuple[Mapping, list[Diagnostic]]:
-    """Return ``tree`` with its variables put in, and what is wrong with them.
+    """Return ``tree`` with variables and copies expanded, and the diagnostics.
 
-    ``given`` goes before what the file itself says: the arguments that a system has for a node
-    type, or for a system that it includes. What says ``for_each`` is there as often as it asks for.
-    A value that stands for ``${name}`` alone keeps the place where it was written, so that a
-    diagnostic points at the argument; a text with values in it keeps its own. The section
-    ``variables`` stays as it is. Takes time in proportion to the expanded file, which is bounded.
+    ``given`` are the arguments of a node type or an included system; they override the file's own
+    values. A value in place of a whole ``${name}`` keeps the location where it was written, so that
+    a diagnostic points at the argument; a text with inserted values keeps its own location. The
+    section ``variables`` stays as it is. The time is linear in the size of the result, which is
+    limited.
     """
     scope = read_scope(tree, is_node_type=kind_of(tree) == "node")
     substitution = Substitution(scope)
     diagnostics = list(_unknown_arguments(tree, scope, given))
     try:
-        diagnostics += _work_out(substitution, given)
-        expanded = _filled(substitution, tree)
+        diagnostics += _evaluate(substitution, given)
+        expanded = _expand_sections(substitution, tree)
     except TooLarge as stopped:
         return tree, [*diagnostics, *substitution.diagnostics, stopped.diagnostic]
     return expanded, [*diagnostics, *substitution.diagnostics, *_unused(scope)]
@@ -48,7 +49,7 @@ def expand(tree: Mapping, given: Map[str, Tree]) -> tuple[Mapping, list[Diagnost
 def missing_variables(tree: Mapping, given: Map[str, Tree]) -> tuple[str, ...]:
     """Return the variables of a node type that have no default and are not ``given``.
 
-    One that was given under a misspelt name is not among them: ``expand`` tells that.
+    A variable that was given under a misspelled name is left out: ``expand`` reports it.
     """
     scope = read_scope(tree, is_node_type=True)
     for name in given:
@@ -61,8 +62,8 @@ def missing_variables(tree: Mapping, given: Map[str, Tree]) -> tuple[str, ...]:
     )
 
 
-def _work_out(substitution: Substitution, given: Map[str, Tree]) -> list[Diagnostic]:
-    """Give every variable its value, each after those it uses; return the circles."""
+def _evaluate(substitution: Substitution, given: Map[str, Tree]) -> list[Diagnostic]:
+    """Evaluate every variable after those it uses. Return diagnostics for cycles."""
     scope = substitution.scope
     scope.values.update((name, measure(value)) for name, value in given.items())
     own = {
@@ -70,19 +71,19 @@ def _work_out(substitution: Substitution, given: Map[str, Tree]) -> list[Diagnos
         for name, variable in scope.declared.items()
         if variable.value is not None and name not in given
     }
-    order, circles = dependency_order({name: set(references(own[name])) for name in own})
+    order, cycles = dependency_order({name: set(references(own[name])) for name in own})
     for name in order:
-        scope.values[name] = substitution.put_into(own[name])
-    return [_circle(circle, scope) for circle in circles]
+        scope.values[name] = substitution.evaluate(own[name])
+    return [_cycle(cycle, scope) for cycle in cycles]
 
 
-def _filled(substitution: Substitution, tree: Mapping) -> Mapping:
-    """Return the file with variables put in, and its copies made; ``variables`` as it stands."""
+def _expand_sections(substitution: Substitution, tree: Mapping) -> Mapping:
+    """Return the file with variables and copies expanded, except the section ``variables``."""
     substitution.growth.values = 0
     substitution.grow(1 + len(tree.entries), tree)
     sections = COPYING if kind_of(tree) == "system" else {}
 
-    def filled(entry: Entry) -> Entry:
+    def expanded_entry(entry: Entry) -> Entry:
         if entry.name == _SECTION:
             return entry
         copying = sections.get(entry.name)
@@ -90,7 +91,7 @@ def _filled(substitution: Substitution, tree: Mapping) -> Mapping:
             return Entry(entry.key, copying(entry.value, substitution))
         return Entry(entry.key, substitution.add(entry.value, depth=1).tree)
 
-    return Mapping(tuple(filled(entry) for entry in tree), tree.span)
+    return Mapping(tuple(expanded_entry(entry) for entry in tree), tree.span)
 
 
 def _unknown_arguments(tree: Mapping, scope: Scope, given: Map[str, Tree]) -> Iterator[Diagnostic]:
@@ -101,26 +102,26 @@ def _unknown_arguments(tree: Mapping, scope: Scope, given: Map[str, Tree]) -> It
         if argument not in scope.declared:
             owner = f"'{shown(name.value)}'" if isinstance(name, Scalar) else "this file"
             message = f"{owner} has no variable '{shown(argument)}'"
-            hint = scope.hint(argument) or "leave it out"
+            hint = scope.hint(argument) or "remove it"
             yield Diagnostic(rules.UNKNOWN_VARIABLE, message, value.span, hint=hint)
 
 
-def _circle(names: list[str], scope: Scope) -> Diagnostic:
-    first, *others = names[:_LONGEST_CIRCLE]
-    rest = ["..."] if len(names) > _LONGEST_CIRCLE else []
+def _cycle(names: list[str], scope: Scope) -> Diagnostic:
+    first, *others = names[:_MAX_CYCLE_NAMES]
+    rest = ["..."] if len(names) > _MAX_CYCLE_NAMES else []
     written = " -> ".join([*map(shown, (first, *others)), *rest, shown(first)])
-    message = f"variable '{shown(first)}' stands for itself: {written}"
-    labels = tuple(Label(scope.declared[name].key.span, "by way of this") for name in others)
+    message = f"variable '{shown(first)}' is defined by itself: {written}"
+    labels = tuple(Label(scope.declared[name].key.span, "through this") for name in others)
     span = scope.declared[first].key.span
     return Diagnostic(rules.CYCLIC_VARIABLES, message, span, labels)
 
 
 def _unused(scope: Scope) -> Iterator[Diagnostic]:
     for variable in scope.declared.values():
-        # Of what was not worked out: defaults that an argument replaced, and circles.
+        # Uses in values that were not evaluated: overridden defaults and cycles.
         scope.used.update(references(variable.value) if variable.value is not None else ())
     for name, variable in scope.declared.items():
         if name not in scope.used:
             message = f"variable '{shown(name)}' is never used"
-            hint = f"use it as '${{{shown(name)}}}', or leave it out"
+            hint = f"use it as '${{{shown(name)}}}', or remove it"
             yield Diagnostic(rules.UNUSED_VARIABLE, message, variable.key.span, hint=hint)

@@ -1,10 +1,11 @@
-"""``for_each``: a node, a connection or an include that is there several times.
+"""Copies (``for_each``) of nodes, connections and includes.
 
     camera_${index}:
       for_each: {index: [0, 1, 2]}
 
-Each name stands for its values in turn, within the entry and in the name of the node; of several
-names there is a copy for every combination. A number stands for the numbers from 0 up to it.
+Each name takes its values one after the other, in the entry and in the name of the node. Several
+names
+give one copy per combination. A number N stands for the values 0 to N - 1.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ _DEPTH = 2  # of the entries of a section
 
 
 def _nodes(section: Tree, substitution: Substitution) -> Tree:
-    """Return the entries of a map, variables put into their keys as well."""
+    """Return the copies of the entries of a map, with variables expanded in the keys too."""
     if not isinstance(section, Mapping):
         return substitution.add(section, 1).tree
     substitution.grow(1, section)
@@ -40,7 +41,9 @@ def _nodes(section: Tree, substitution: Substitution) -> Tree:
             key = _key(entry.key, copy)
             made = Entry(key, copy.add(body, _DEPTH).tree)
             if made.name in found:
-                substitution.diagnostics.append(_twice(entry, written[made.name], made.name))
+                substitution.diagnostics.append(
+                    _duplicate_name(entry, written[made.name], made.name)
+                )
             else:
                 found[made.name], written[made.name] = made, entry
     return Mapping(tuple(found.values()), section.span)
@@ -58,7 +61,7 @@ def _items(section: Tree, substitution: Substitution) -> Tree:
     return Sequence(items, section.span)
 
 
-#: The sections of a system that have copies in them.
+#: The sections of a system whose entries can have copies.
 COPYING: Map[str, Callable[[Tree, Substitution], Tree]] = {
     "include": _items,
     "nodes": _nodes,
@@ -67,21 +70,21 @@ COPYING: Map[str, Callable[[Tree, Substitution], Tree]] = {
 
 
 def _copies(tree: Tree, substitution: Substitution) -> Iterator[tuple[Substitution, Tree]]:
-    """Yield what puts variables into each copy of ``tree``, and what it is to put them into."""
-    asked = tree.entry(FOR_EACH) if isinstance(tree, Mapping) else None
-    if asked is None or not isinstance(tree, Mapping):
+    """Yield a substitution and the tree to apply it to, for each copy of ``tree``."""
+    for_each = tree.entry(FOR_EACH) if isinstance(tree, Mapping) else None
+    if for_each is None or not isinstance(tree, Mapping):
         yield substitution, tree
         return
-    loops = substitution.add(asked.value, _DEPTH).tree
+    loops = substitution.add(for_each.value, _DEPTH).tree
     values = _values(loops)
     if values is None:
-        # What is wrong with it the schema says. Its names may stand for anything.
+        # The schema reports the error. The names may have any value.
         names = loops.entries if isinstance(loops, Mapping) else ()
         unknown = {entry.name: Declared(entry.key, None) for entry in names}
         yield substitution.within(substitution.scope.inner(unknown, is_known=False)), tree
         return
-    substitution.grow_copies(prod(len(choices) for _, choices in values), asked.value)
-    body = Mapping(tuple(entry for entry in tree if entry is not asked), tree.span)
+    substitution.grow_copies(prod(len(choices) for _, choices in values), for_each.value)
+    body = Mapping(tuple(entry for entry in tree if entry is not for_each), tree.span)
     for chosen in product(*(choices for _, choices in values)):
         names_and_values = zip((key for key, _ in values), chosen, strict=True)
         declared = {str(key.value): Declared(key, value) for key, value in names_and_values}
@@ -89,7 +92,7 @@ def _copies(tree: Tree, substitution: Substitution) -> Iterator[tuple[Substituti
 
 
 def _values(loops: Tree) -> list[tuple[Scalar, tuple[Tree, ...]]] | None:
-    """Return what each name stands for in turn; None where that is not said as it should be."""
+    """Return the values of each name, or None if they are malformed."""
     if not isinstance(loops, Mapping) or not loops.entries:
         return None
     found = [(entry.key, _choices(entry.value)) for entry in loops]
@@ -103,7 +106,7 @@ def _choices(tree: Tree) -> tuple[Tree, ...]:
         case Scalar(value=bool()):
             return ()
         case Scalar(value=int() as count) if count > 0:
-            # One more than there may be is enough to be told that there are too many.
+            # One more than the maximum is enough to exceed it.
             numbers = range(min(count, MAX_COPIES + 1))
             return tuple(Scalar(number, tree.span, verbatim=False) for number in numbers)
         case _:
@@ -115,7 +118,7 @@ def _is_plain(tree: Tree) -> bool:
 
 
 def _key(key: Scalar, copy: Substitution) -> Scalar:
-    """Return the name of a copy, at the place of what it was made from."""
+    """Return the name of a copy, at the location of the original key."""
     if not isinstance(key.value, str) or not has_reference(key.value):
         return key
     name = copy.add(key, _DEPTH).tree
@@ -125,13 +128,13 @@ def _key(key: Scalar, copy: Substitution) -> Scalar:
     return Scalar(text, key.span, verbatim=False)
 
 
-def _twice(entry: Entry, earlier: Entry, name: str) -> Diagnostic:
-    """Say that a name is there already, made from the same entry or from another."""
+def _duplicate_name(entry: Entry, earlier: Entry, name: str) -> Diagnostic:
+    """Report a name that was made twice, from the same entry or from two."""
     span = entry.key.span
     loops = entry.value.get(FOR_EACH) if isinstance(entry.value, Mapping) else None
     if entry is earlier and isinstance(loops, Mapping):
-        told_apart = "_".join(f"${{{shown(loop.name)}}}" for loop in loops)
-        hint = f"tell them apart: '{shown(entry.name)}_{told_apart}'"
+        suffix = "_".join(f"${{{shown(loop.name)}}}" for loop in loops)
+        hint = f"make the names unique: '{shown(entry.name)}_{suffix}'"
         message = f"copies of this node have the same name, '{shown(name)}'"
         return Diagnostic(rules.DUPLICATE_NODE_NAME, message, span, hint=hint)
     label = Label(earlier.key.span, "the other one")

@@ -1,4 +1,4 @@
-"""The order in which things that use each other can be worked out, and the circles among them."""
+"""Topological order of names that use each other, and the cycles among them."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Iterable, Mapping
 
 
 def dependency_order(uses: Mapping[str, Iterable[str]]) -> tuple[list[str], list[list[str]]]:
-    """Return the names, each behind what it uses, and the circles.
+    """Return the names, each after those that it uses, and the cycles.
 
-    Names on a circle, and those that use them, are not in the order. Of circles that share names
-    one is told. Takes time in proportion to the number of uses.
+    The order leaves out names on a cycle and names that use them. Of cycles that share names, one
+    is returned. The time is linear in the number of uses.
     """
     needs = {name: dict.fromkeys(used for used in uses[name] if used in uses) for name in uses}
     users: dict[str, list[str]] = {name: [] for name in uses}
@@ -27,22 +27,22 @@ def dependency_order(uses: Mapping[str, Iterable[str]]) -> tuple[list[str], list
             missing[user] -= 1
             if missing[user] == 0:
                 ready.append(user)
-    return order, _circles({name: needs[name] for name, count in missing.items() if count})
+    return order, _cycles({name: needs[name] for name, count in missing.items() if count})
 
 
-def _circles(needs: Mapping[str, Iterable[str]]) -> list[list[str]]:
-    """Return circles among names each of which needs another one of them."""
+def _cycles(needs: Mapping[str, Iterable[str]]) -> list[list[str]]:
+    """Return the cycles among names that each need another of them."""
     following = {name: next(used for used in needs[name] if used in needs) for name in needs}
-    walk_of: dict[str, str] = {}  # by name: the name with which the walk began that came by
-    circles = []
+    walk_of: dict[str, str] = {}  # by name: the start of the walk that first visited it
+    cycles = []
     for start in needs:
         name = start
         while name not in walk_of:
             walk_of[name] = start
             name = following[name]
         if walk_of[name] == start:
-            circle = [name]
-            while following[circle[-1]] != name:
-                circle.append(following[circle[-1]])
-            circles.append(circle)
-    return circles
+            cycle = [name]
+            while following[cycle[-1]] != name:
+                cycle.append(following[cycle[-1]])
+            cycles.append(cycle)
+    return cycles

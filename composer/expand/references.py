@@ -1,4 +1,4 @@
-"""``${name}`` in a text."""
+"""References to variables (``${name}``) in texts."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from composer.tree import Mapping, Scalar, Sequence, Tree
 
 _MARK = "${"
 _PIECE = re.compile(
-    r"(?P<literal>\$\$\{)"  # stands for itself
+    r"(?P<literal>\$\$\{)"  # a literal ``${``
     r"|\$\{(?P<name>[A-Za-z_][A-Za-z0-9_]*)\}"
-    r"|\$\{[^}]*\}?"  # looks like a reference and is none
+    r"|\$\{[^}]*\}?"  # a malformed reference
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A ``${name}`` and where in its text it stands. ``name`` is None where there is none."""
+    """A ``${name}`` and its offset in the text. ``name`` is None if it is malformed."""
 
     name: str | None
     start: int
@@ -26,7 +26,7 @@ class Reference:
 
 
 def pieces(text: str) -> list[str | Reference]:
-    """Return the texts and references that ``text`` is made of; ``$${`` is a literal ``${``."""
+    """Split ``text`` into texts and references. ``$${`` is a literal ``${``."""
     found: list[str | Reference] = []
     end = 0
     for match in _PIECE.finditer(text):

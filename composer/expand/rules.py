@@ -12,8 +12,8 @@ UNKNOWN_VARIABLE = register(
     _error(
         code="RC281",
         name="unknown-variable",
-        summary="A variable is used, or given to a node type, that is not declared.",
-        why="Nothing can be put in its place, and a value that nobody asks for is a mistake.",
+        summary="A variable is used or given to a node type but not declared.",
+        why="It has no value, and a value for an undeclared variable has no effect.",
         bad="""\
 system: demo
 variables: {rate_hz: 10}
@@ -32,10 +32,10 @@ MALFORMED_VARIABLE = register(
     _error(
         code="RC282",
         name="malformed-variable",
-        summary="What stands behind '${' is not a name and a closing brace.",
+        summary="'${' is not followed by a name and a closing brace.",
         why=(
-            "'${name}' is put in when a file is loaded, '{expression}' is worked out at run time; "
-            "there is nothing between the two."
+            "'${name}' is replaced when a file is loaded, '{expression}' is evaluated at run "
+            "time. There are no expressions in '${...}'."
         ),
         bad="""\
 system: demo
@@ -53,8 +53,8 @@ CYCLIC_VARIABLES = register(
     _error(
         code="RC283",
         name="cyclic-variables",
-        summary="Variables stand for each other in a circle.",
-        why="None of them can be worked out before the others.",
+        summary="Variables are defined by each other in a cycle.",
+        why="None of them can be evaluated before the others.",
         bad="""\
 system: demo
 variables: {first: "${second}", second: "${first}"}
@@ -73,8 +73,8 @@ NOT_A_TEXT = register(
     _error(
         code="RC284",
         name="variable-not-text",
-        summary="A variable that stands for a map or list is used inside a text.",
-        why="Maps and lists have no text of their own; alone, '${name}' stands for all of them.",
+        summary="A variable whose value is a map or list is used inside a text.",
+        why="Maps and lists cannot be inserted into a text; use '${name}' alone.",
         bad="""\
 system: demo
 variables: {point: {x: 1}}
@@ -93,8 +93,8 @@ TOO_LARGE = register(
     _error(
         code="RC285",
         name="variables-too-large",
-        summary="With its variables put in and its copies made, a file says too much.",
-        why="A few lines with variables or 'for_each' can stand for more than anybody can read.",
+        summary="A file is too large after its variables and copies are expanded.",
+        why="A few lines with variables or 'for_each' can exhaust time and memory.",
         bad="variables: {a: '${b}${b}', b: '${c}${c}', c: '${d}${d}'}  # and so on",
         good="variables: {a: some text}",
     )
@@ -105,7 +105,7 @@ UNUSED_VARIABLE = register(
         name="unused-variable",
         severity=Severity.INFO,
         summary="A variable is declared and never used.",
-        why="It may be misspelt where it was meant, and changing it does nothing.",
+        why="It may be misspelled where it is used, and changing it has no effect.",
         bad="""\
 system: demo
 variables: {rate_hz: 10}
@@ -124,8 +124,8 @@ DUPLICATE_NODE_NAME = register(
     _error(
         code="RC288",
         name="duplicate-node-name",
-        summary="Two nodes of a system have the same name, by 'for_each' or by 'include'.",
-        why="Connections and dependencies could not say which one they mean.",
+        summary="Two nodes of a system have the same name because of 'for_each' or 'include'.",
+        why="Connections and dependencies would be ambiguous.",
         bad="""\
 system: demo
 nodes:

@@ -1,4 +1,4 @@
-"""The variables of a file: what is declared, what was given, and what each stands for."""
+"""The variables of a file: declarations, arguments and values."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from composer.diagnostics import nearest
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
-#: Names compared for hints in one file; more would take longer than all the rest.
+#: Maximum number of comparisons for hints in one file, to limit the time.
 _MAX_COMPARISONS = 20_000
 
 
 @dataclass(frozen=True, slots=True)
 class Sized:
-    """A tree without variables, the number of values in it and the levels of maps and lists."""
+    """A tree without variables, its number of values and its nesting depth."""
 
     tree: Tree
     values: int
@@ -22,7 +22,7 @@ class Sized:
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """A declared variable; ``value`` is None where one must be given."""
+    """A declared variable; ``value`` is None if an argument is required."""
 
     key: Scalar
     value: Tree | None
@@ -30,21 +30,21 @@ class Declared:
 
 @dataclass(slots=True)
 class Scope:
-    """What the names in a file stand for.
+    """The names in a file and their values.
 
-    ``values`` are the variables worked out so far. A declared one that is not among them, because
-    it was not given or stands on a circle, stays as it is written.
+    ``values`` are the variables evaluated so far. A declared variable without a value, because it
+    was not given or is part of a cycle, stays as written.
     """
 
     declared: dict[str, Declared]
-    is_known: bool  # false when the section is no map: then nobody knows what is declared
+    is_known: bool  # False if the section is malformed, so that the declarations are unknown
     values: dict[str, Sized] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
     outer: Scope | None = None
     _compared: int = 0
 
     def inner(self, declared: dict[str, Declared], *, is_known: bool = True) -> Scope:
-        """Return a scope in which these names stand for something, before those of this one."""
+        """Return a nested scope in which these names take precedence."""
         values = {
             name: measure(variable.value)
             for name, variable in declared.items()
@@ -53,20 +53,20 @@ class Scope:
         return Scope(declared, self.is_known and is_known, values, outer=self)
 
     def find(self, name: str) -> Sized | None:
-        """Return what ``name`` stands for, as far as that is worked out; it counts as used."""
+        """Return the value of ``name`` if it is known, and count it as used."""
         if name in self.declared or self.outer is None:
             self.used.add(name)
             return self.values.get(name)
         return self.outer.find(name)
 
     def declares(self, name: str) -> bool:
-        """Say whether ``name`` is a variable here."""
+        """Return whether ``name`` is a declared variable."""
         return name in self.declared or (self.outer is not None and self.outer.declares(name))
 
     def hint(self, name: str) -> str | None:
-        """Return the nearest declared name as a hint; none when many were asked for already.
+        """Return the nearest declared name as a hint, or None after too many comparisons.
 
-        That name counts as used: it is what was meant.
+        That name counts as used.
         """
         if self.outer is not None:
             close = nearest(name, self.declared)
@@ -80,9 +80,9 @@ class Scope:
 
 
 def read_scope(tree: Mapping, is_node_type: bool) -> Scope:
-    """Return the variables that a file declares, nothing being worked out yet.
+    """Return the variables that a file declares, not yet evaluated.
 
-    A system says what they stand for, a node type what they stand for unless it is told.
+    A system declares values, a node type defaults.
     """
     section = tree.get("variables")
     if section is None:
@@ -102,7 +102,7 @@ def _default(entry: Entry) -> Tree | None:
 
 
 def measure(tree: Tree) -> Sized:
-    """Return a tree that is as it stays, with its size."""
+    """Return an expanded tree with its size."""
     match tree:
         case Scalar():
             return Sized(tree, 1, 0)

@@ -1,4 +1,4 @@
-"""Putting variables into a tree, within limits."""
+"""Replace the variables in a tree, within limits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 
 class TooLarge(Exception):
-    """The variables make the file grow beyond all limits; the diagnostic says where."""
+    """The expanded file exceeds a limit; ``diagnostic`` says where."""
 
     def __init__(self, diagnostic: Diagnostic) -> None:
         super().__init__(diagnostic.message)
@@ -22,7 +22,7 @@ class TooLarge(Exception):
 
 @dataclass(slots=True)
 class Growth:
-    """How much one file says once its variables are put in."""
+    """The size of an expanded file."""
 
     values: int = 0
     characters: int = 0
@@ -31,40 +31,40 @@ class Growth:
 
 @dataclass(slots=True)
 class Substitution:
-    """Puts the variables of one file into its trees, and keeps count of what that adds."""
+    """Replaces the variables of one file in its trees, and counts the size."""
 
     scope: Scope
     diagnostics: list[Diagnostic] = field(default_factory=list)
     growth: Growth = field(default_factory=Growth)
 
     def within(self, scope: Scope) -> Substitution:
-        """Return what puts in the variables of another scope, and keeps the same count."""
+        """Return a substitution for another scope that shares the counts."""
         return Substitution(scope, self.diagnostics, self.growth)
 
-    def put_into(self, tree: Tree, depth: int = 0) -> Sized:
-        """Return ``tree``, which stands in ``depth`` maps and lists, with variables put in.
+    def evaluate(self, tree: Tree, depth: int = 0) -> Sized:
+        """Return ``tree``, nested in ``depth`` maps and lists, with its variables replaced.
 
-        A value keeps the place where it was written. Raises TooLarge.
+        Values keep the location where they were written. Raises TooLarge.
         """
         self.growth.values = 0
         return self.add(tree, depth)
 
     def grow(self, values: int, tree: Tree) -> None:
-        """Count values that are put where ``tree`` stands. Raises TooLarge."""
+        """Count values that are inserted at ``tree``. Raises TooLarge."""
         self.growth.values += values
         if self.growth.values > MAX_VALUES:
-            message = f"with its variables, this file says more than {MAX_VALUES:,} things"
+            message = f"with its variables expanded, this file has more than {MAX_VALUES:,} values"
             raise self._too_large(tree, message)
 
     def grow_copies(self, copies: int, tree: Tree) -> None:
-        """Count copies that ``tree`` asks for. Raises TooLarge."""
+        """Count the copies that ``tree`` makes. Raises TooLarge."""
         self.growth.copies += copies
         if self.growth.copies > MAX_COPIES:
             message = f"with this, the file makes more than {MAX_COPIES:,} copies"
             raise self._too_large(tree, message)
 
     def add(self, tree: Tree, depth: int) -> Sized:
-        """Do the same with a further part of what is counted already."""
+        """Return ``tree`` with its variables replaced, adding to the counts."""
         match tree:
             case Scalar():
                 return self._scalar(tree, depth)
@@ -102,7 +102,7 @@ class Substitution:
                 return Sized(Scalar(text, scalar.span, verbatim=False), 1, 0)
 
     def _whole(self, reference: Reference, scalar: Scalar, depth: int) -> Sized:
-        """Return what stands for a scalar that is one reference."""
+        """Return the value of a scalar that is a single reference."""
         found = self._find(reference, scalar)
         if found is None:
             self.grow(1, scalar)
@@ -110,12 +110,13 @@ class Substitution:
         self.grow(found.values, scalar)
         if depth + found.height > MAX_DEPTH:
             raise self._too_large(
-                scalar, f"with its variables, more than {MAX_DEPTH} maps and lists are nested here"
+                scalar,
+                f"with its variables expanded, this is nested more than {MAX_DEPTH} levels deep",
             )
         return found
 
     def _part(self, part: str | Reference, scalar: Scalar) -> str:
-        """Return the text that stands for a part of a text."""
+        """Return the text of a part of a scalar."""
         if isinstance(part, str):
             return part
         found = self._find(part, scalar)
@@ -123,7 +124,7 @@ class Substitution:
             return part.written
         if not isinstance(found.tree, Scalar):
             kind = "map" if isinstance(found.tree, Mapping) else "list"
-            message = f"'{part.written}' stands for a {kind}, which has no place inside a text"
+            message = f"'{part.written}' is a {kind}, which cannot be inserted into a text"
             self._report(rules.NOT_A_TEXT, message, part, scalar)
             return part.written
         text = found.tree.value if isinstance(found.tree.value, str) else shown(found.tree.value)
@@ -137,8 +138,8 @@ class Substitution:
     def _find(self, reference: Reference, scalar: Scalar) -> Sized | None:
         name = reference.name
         if name is None:
-            message = f"'{shown(reference.written)}' is no variable: expected '${{name}}'"
-            hint = "write '$${' for a plain '${', and '{...}' for an expression"
+            message = f"'{shown(reference.written)}' is not a variable: expected '${{name}}'"
+            hint = "write '$${' for a literal '${', and '{...}' for an expression"
             self._report(rules.MALFORMED_VARIABLE, message, reference, scalar, hint)
             return None
         found = self.scope.find(name)

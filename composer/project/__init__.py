@@ -1,8 +1,9 @@
-"""What belongs together: a folder with its systems, node types and settings.
+"""Projects: folders with systems, node types and settings.
 
-A project's root is the nearest folder with a ``composer.yaml``, or with a ``pyproject.toml`` that
-has a table ``[tool.composer]``; without either the folder above the nearest ``nodes``, else the
-folder itself. Nothing that a file refers to is read from outside of it, not through links either.
+The root of a project is the nearest folder with a ``composer.yaml``, or with a ``pyproject.toml``
+that has the table ``[tool.composer]``; without either, the folder above the nearest ``nodes``
+folder, or the folder itself. Files outside the project are never read, not even through symbolic
+links.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ INTERFACES = "interfaces"
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """A project as seen from ``folder``, a folder in it. ``diagnostics`` are about its settings."""
+    """A project as seen from ``folder`` in it. ``diagnostics`` are about its settings."""
 
     root: Path
     folder: Path
@@ -33,7 +34,7 @@ class Project:
 
     @classmethod
     def at(cls, folder: Path) -> Project:
-        """Return the project that ``folder`` belongs to."""
+        """Return the project of ``folder``."""
         start = folder.resolve()
         found = find_settings(start)
         if found is None:
@@ -44,20 +45,20 @@ class Project:
 
     @property
     def node_folders(self) -> tuple[Path, ...]:
-        """Where the project's node types are."""
+        """The folders of the project's node types."""
         return self._folders(self.settings.nodes, NODES)
 
     @property
     def interface_folders(self) -> tuple[Path, ...]:
-        """Where the sources of the project's interface packages are."""
+        """The folders of the project's interface packages."""
         return self._folders(self.settings.interfaces, INTERFACES)
 
     def holds(self, path: Path) -> bool:
-        """Say whether ``path`` is in the project, whatever links it leads through."""
+        """Return whether ``path`` is in the project after resolving symbolic links."""
         try:
-            # Unlike Path.resolve, it takes a link to itself the same way on every Python.
+            # Unlike Path.resolve, it handles symbolic link loops the same way on every Python.
             return Path(os.path.realpath(path)).is_relative_to(self.root)
-        except (OSError, ValueError):  # no path at all
+        except (OSError, ValueError):  # not a valid path
             return False
 
     def _folders(self, chosen: tuple[Path, ...] | None, usual: str) -> tuple[Path, ...]:
@@ -69,7 +70,7 @@ class Project:
         return (nearest,)
 
     def _ancestors(self) -> Iterator[Path]:
-        """Yield the folders from ``folder`` up to the root; to the top where there is no such."""
+        """Yield the folders from ``folder`` up to the project root, or to the file system root."""
         for ancestor in (self.folder, *self.folder.parents):
             yield ancestor
             if ancestor == self.root and self.settings.source is not None:
@@ -81,5 +82,5 @@ def _nearest(name: str, ancestors: Iterator[Path] | tuple[Path, ...]) -> Path | 
 
 
 def _has_folder(folder: Path, name: str) -> bool:
-    """Say so without a path: this is asked for every file, and of all folders above it."""
+    """Return whether a folder exists. Called for every file and every parent: avoids Path."""
     return os.path.isdir(f"{folder}/{name}")  # noqa: PTH112

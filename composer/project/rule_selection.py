@@ -1,4 +1,4 @@
-"""The diagnostics that a project wants to hear of, and how much they weigh there."""
+"""Apply the rule settings of a project: selected, ignored and their severity."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from composer.source import Located
 
 
 def apply_rule_settings(diagnostics: Iterable[Diagnostic], settings: Settings) -> list[Diagnostic]:
-    """Return what is left of ``diagnostics``, each with the severity that it has in the project.
+    """Return the selected diagnostics with the severities that the project sets.
 
-    Errors stay as they are: no system runs that has one.
+    Errors cannot be ignored or downgraded: they prevent a system from running.
     """
     if settings.source is None:
         return list(diagnostics)
@@ -23,7 +23,7 @@ def apply_rule_settings(diagnostics: Iterable[Diagnostic], settings: Settings) -
 
 
 def check_rule_settings(settings: Settings, rules: Collection[Rule]) -> Iterator[Diagnostic]:
-    """Yield what is wrong with the names of rules in ``settings``."""
+    """Yield diagnostics for wrong names of rules in ``settings``."""
     for text in (*settings.select, *settings.ignore):
         if not any(rule.matches(text.value) for rule in rules):
             yield _unknown(text, rules)
@@ -65,12 +65,12 @@ def _is_exactly(rule: Rule, text: Located[str]) -> bool:
 
 def _unknown(text: Located[str], rules: Iterable[Rule]) -> Diagnostic:
     names = [name for rule in rules for name in (rule.code, rule.name)]
-    message = f"no rule is called '{shown(text.value)}'"
+    message = f"there is no rule '{shown(text.value)}'"
     close = nearest(text.value, names)
     hint = f"did you mean '{close}'?" if close is not None else "'compose rule' lists the rules"
     return Diagnostic(BAD_SETTING, message, text.span, hint=hint)
 
 
 def _about_error(text: Located[str], what: str) -> Diagnostic:
-    message = f"'{text}' is an error, which cannot be {what} for a whole project"
-    return Diagnostic(BAD_SETTING, message, text.span, hint="mend what it finds")
+    message = f"'{text}' is an error, which cannot be {what}"
+    return Diagnostic(BAD_SETTING, message, text.span, hint="fix the reported problem")

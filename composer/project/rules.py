@@ -1,4 +1,4 @@
-"""The rule of settings (RC042)."""
+"""The rule for settings (RC042)."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ BAD_SETTING = register(
         code="RC042",
         name="bad-setting",
         severity=Severity.ERROR,
-        summary="A setting of the project, in composer.yaml or pyproject.toml, cannot be used.",
+        summary="A setting of the project, in composer.yaml or pyproject.toml, is invalid.",
         why=(
-            "What was chosen for the whole project would silently not be done: a folder of node "
-            "types not found, a rule ignored that was not meant."
+            "The setting would silently have no effect: node types would not be found, or the "
+            "wrong rule ignored."
         ),
         bad="ignore: [qos-implict]  # composer.yaml",
         good="ignore: [qos-implicit]  # composer.yaml",

@@ -1,4 +1,4 @@
-"""What a project has chosen: settings from a tree, and what is wrong with them."""
+"""The settings of a project."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _SCHEMA = "project"
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The choices of a project. ``source`` is where they were read; None where there are none.
+    """The settings of a project. ``source`` is their file, or None without settings.
 
-    ``nodes`` and ``interfaces`` are folders; None stands for the usual ones. The others are about
-    rules, by name, code or beginning of codes as they are written.
+    ``nodes`` and ``interfaces`` are folders; None stands for the defaults. ``select``, ``ignore``
+    and ``severity`` name rules by name, code or code prefix.
     """
 
     source: SourceFile | None = None
@@ -34,7 +34,7 @@ class Settings:
 
 
 def read_settings(written: SettingsSource) -> tuple[Settings, list[Diagnostic]]:
-    """Return the settings, those that are wrong left out, and what is wrong."""
+    """Return the valid settings and the diagnostics."""
     tree = written.tree
     if tree is None:
         return Settings(written.source), []
@@ -65,7 +65,7 @@ def _folders(
             found.append(folder.resolve())
         else:
             message = f"'{shown(text.value)}' {problem}"
-            hint = "name a folder below the one that these settings are in"
+            hint = "use a folder below the folder of this file"
             diagnostics.append(Diagnostic(BAD_SETTING, message, text.span, hint=hint))
     return tuple(found)
 
@@ -73,9 +73,13 @@ def _folders(
 def _problem(folder: Path, root: Path) -> str | None:
     try:
         if not folder.resolve().is_relative_to(root):
-            return "leads out of the project"
+            return "is outside the project"
         return None if folder.is_dir() else "is not a folder"
-    except (OSError, RuntimeError, ValueError):  # too long, a link to itself, or no path at all
+    except (
+        OSError,
+        RuntimeError,
+        ValueError,
+    ):  # too long, a symbolic link loop or not a valid path
         return "is not a folder"
 
 

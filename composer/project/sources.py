@@ -1,4 +1,4 @@
-"""Where a project keeps its settings, read as a located tree."""
+"""Find and read the settings file of a project."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PYPROJECT_FILE = "pyproject.toml"
 
 @dataclass(frozen=True, slots=True)
 class SettingsSource:
-    """Settings as they are written. ``tree`` is None where too little of them can be read."""
+    """Settings as a located tree. ``tree`` is None if they cannot be read."""
 
     root: Path
     source: SourceFile
@@ -32,14 +32,14 @@ class SettingsSource:
 
 
 def find_settings(folder: Path) -> SettingsSource | None:
-    """Return the settings of the nearest of ``folder`` and the folders above that has any."""
-    # Asked of every file, and for all folders above it: a Path for each is what takes time.
+    """Return the settings in ``folder`` or the nearest parent that has any."""
+    # Called for every file and every parent: a Path for each would be slow.
     root = str(folder)
     while True:
         own, table = _stamp(f"{root}/{SETTINGS_FILE}"), _stamp(f"{root}/{PYPROJECT_FILE}")
-        written = _written(root or "/", own, table) if own or table else None
-        if written is not None or not root.strip("/"):
-            return written
+        settings = _read_settings(root or "/", own, table) if own or table else None
+        if settings is not None or not root.strip("/"):
+            return settings
         root = root.rpartition("/")[0]
 
 
@@ -47,25 +47,25 @@ _Stamp: TypeAlias = tuple[int, int]
 
 
 def _stamp(path: str) -> _Stamp | None:
-    """Return what changes when a file does; None where there is none."""
+    """Return a value that changes when the file does; None if it does not exist."""
     try:
         status = os.lstat(path)
-    except OSError:  # also for a folder that may not be looked into
+    except OSError:  # also for folders without permission
         return None
     return status.st_mtime_ns, status.st_size
 
 
 @lru_cache(maxsize=32)
-def _written(
+def _read_settings(
     folder: str, own_stamp: _Stamp | None, table_stamp: _Stamp | None
 ) -> SettingsSource | None:
-    """Read what is in ``folder``: once while it stays so, for every file of a project asks."""
+    """Read the settings in ``folder``, again only if a file has changed."""
     root = Path(folder)
     own = _own_file(root) if own_stamp is not None else None
     table = _table(root) if table_stamp is not None else None
     if own is None or table is None:
         return own or table
-    return _both(own, table)
+    return _prefer_file(own, table)
 
 
 def _own_file(root: Path) -> SettingsSource:
@@ -78,7 +78,7 @@ def _own_file(root: Path) -> SettingsSource:
             root, source, None, (Diagnostic(UNREADABLE_FILE, message, _start(source)),)
         )
     tree, source, diagnostics = read_document(path, name)
-    if [diagnostic.rule for diagnostic in diagnostics] == [NOT_A_MAP] and _says_nothing(source):
+    if [diagnostic.rule for diagnostic in diagnostics] == [NOT_A_MAP] and _is_empty(source):
         return SettingsSource(root, source, Mapping((), _start(source)), ())
     return SettingsSource(root, source, tree, tuple(diagnostics))
 
@@ -97,14 +97,14 @@ def _table(root: Path) -> SettingsSource | None:
     return SettingsSource(root, source, tree, tuple(diagnostics))
 
 
-def _both(own: SettingsSource, table: SettingsSource) -> SettingsSource:
-    """Keep the file, and say that the table is not read."""
+def _prefer_file(own: SettingsSource, table: SettingsSource) -> SettingsSource:
+    """Return the file's settings, with a diagnostic that the table is ignored."""
     span = table.tree.span if table.tree is not None else _start(table.source)
     diagnostic = Diagnostic(
         BAD_SETTING,
-        f"the table {TABLE} is not read: there is a {SETTINGS_FILE} beside it",
+        f"the table {TABLE} is ignored: the folder also has a {SETTINGS_FILE}",
         span,
-        (Label(_start(own.source), "these are the settings"),),
+        (Label(_start(own.source), "these settings are used"),),
         "keep one of the two",
     )
     return replace(own, diagnostics=(*own.diagnostics, diagnostic))
@@ -113,11 +113,11 @@ def _both(own: SettingsSource, table: SettingsSource) -> SettingsSource:
 def _is_inside(path: Path, root: Path) -> bool:
     try:
         return path.resolve().is_relative_to(root)
-    except (OSError, RuntimeError):  # a link to itself
+    except (OSError, RuntimeError):  # a symbolic link loop
         return False
 
 
-def _says_nothing(source: SourceFile) -> bool:
+def _is_empty(source: SourceFile) -> bool:
     return all(not line.strip() or line.lstrip().startswith("#") for line in source.lines)
 
 

@@ -1,7 +1,8 @@
 """The table ``[tool.composer]`` of a pyproject.toml, as a located tree.
 
-Python's TOML reader tells no places. They are looked for in the text, each key behind the one it
-belongs to, each value behind its key: right for all that people write, and never outside the table.
+Python's TOML parser returns no locations. This module finds them in the text: each key after its
+parent, each
+value after its key. The result is right for typical files, and never outside the table.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _PLACE = re.compile(r"\(at line (\d+), column (\d+)\)$")
 
 
 def read_table(source: SourceFile) -> tuple[Mapping | None, list[Diagnostic]] | None:
-    """Return the table and what is wrong with it as TOML; None where there is no such table."""
+    """Return the table and its TOML errors, or None if there is no such table."""
     header = _HEADER.search(source.text)
     if header is None:
         return None
@@ -36,7 +37,11 @@ def read_table(source: SourceFile) -> tuple[Mapping | None, list[Diagnostic]] | 
         table = tomllib.loads(source.text)["tool"]["composer"]
     except tomllib.TOMLDecodeError as error:
         return None, [_syntax(source, str(error))]
-    except (KeyError, TypeError, RecursionError):  # in a text of several lines, or absurdly deep
+    except (
+        KeyError,
+        TypeError,
+        RecursionError,
+    ):  # the header is in a multi-line text, or nested too deep
         return None
     other = _OTHER_HEADER.search(source.text, header.end())
     region = _Region(source, header.start(), len(source.text) if other is None else other.start())
@@ -53,27 +58,27 @@ def _syntax(source: SourceFile, message: str) -> Diagnostic:
 
 @dataclass(slots=True)
 class _Region:
-    """The part of a text in which something is looked for; it shrinks as things are found."""
+    """The part of a text that is searched; its start moves behind each match."""
 
     source: SourceFile
     start: int
     end: int
 
     def span(self, offset: int, length: int) -> Span:
-        """Return the place of ``length`` characters at ``offset``."""
+        """Return the span of ``length`` characters at ``offset``."""
         before = self.source.text[:offset]
         column = offset - (before.rfind("\n") + 1)
         return Span(self.source, before.count("\n") + 1, column + 1, max(length, 1))
 
     def find(self, pattern: str) -> re.Match[str] | None:
-        """Return the first match in the region; what is before its end is not looked at again."""
+        """Return the first match, and continue after it next time."""
         match = re.compile(pattern).search(self.source.text, self.start, self.end)
         if match is not None:
             self.start = match.end()
         return match
 
     def rest(self) -> _Region:
-        """Return what is left of the region, to look for several things in turn."""
+        """Return a copy of the remaining region."""
         return _Region(self.source, self.start, self.end)
 
 

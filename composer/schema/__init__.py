@@ -1,7 +1,7 @@
-"""The shape of a file: which keys there are and what may stand under them, by JSON Schema.
+"""Check the structure of files with JSON Schema: keys and types of values.
 
-The schemas are files (``schemas/``), so that editors use the very same ones. What jsonschema says
-is told with the place of the key or value that is intended_key, in words of the language.
+Editors use the same schemas (``schemas/``). Errors of jsonschema are reported with the location of
+the key or value, in terms of the language.
 """
 
 from __future__ import annotations
@@ -12,33 +12,33 @@ from typing import Any
 
 from composer.diagnostics import Diagnostic
 from composer.resources import schemas_folder
-from composer.schema import rules  # noqa: F401 - they are known before the first is broken
+from composer.schema import rules  # noqa: F401 - registers the rules
 from composer.schema.fast_check import Check, compile_check
 from composer.tree import Mapping, plain
 
 __all__ = ["KINDS", "REPORT", "SCHEMAS", "check_schema", "kind_of", "schema"]
 
-#: The kinds of file about nodes, each with a schema of that name; also the key that marks one.
+#: The kinds of files, each with a schema of that name and marked by a key of that name.
 KINDS = ("system", "node")
 SCHEMAS = (*KINDS, "project")
-#: What is written, not read: the report of ``compose validate --format json``.
+#: The schema of the output of ``compose validate --format json``.
 REPORT = "report"
 
 
 def kind_of(tree: Mapping) -> str | None:
-    """Return ``system`` or ``node``, by the first key of the two; None when there is neither."""
+    """Return ``system`` or ``node``, whichever key comes first; None without either."""
     return next((entry.name for entry in tree if entry.name in KINDS), None)
 
 
 def check_schema(tree: Mapping, kind: str) -> list[Diagnostic]:
-    """Return everything that has the wrong shape in a file of ``kind``.
+    """Return the schema diagnostics of a file of ``kind``.
 
-    The tree is the one after ``expand``. A load-time variable without value fits everywhere.
+    The tree has its variables expanded. A load-time variable without value is valid anywhere.
     """
     content = plain(tree)
     if _compiled(kind)(content):
         return []
-    # What explains mistakes takes a tenth of a second to import, and most files are right.
+    # jsonschema takes a tenth of a second to import, and most files are valid.
     from composer.schema.validation import explain  # noqa: PLC0415
 
     return explain(content, tree, kind, schema(kind))

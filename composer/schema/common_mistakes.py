@@ -1,4 +1,4 @@
-"""Keys that people write instead of the right ones, from other tools and from memory."""
+"""Common wrong keys, such as those of other tools, and the keys to suggest."""
 
 from __future__ import annotations
 
@@ -51,25 +51,25 @@ _INTENDED: dict[str, tuple[str, ...]] = {
 }
 
 _ADVICE: dict[tuple[str, str], str] = {
-    ("node", "behavior"): "leave it out; a node with a type does what its type does",
-    ("inline node", "variables"): "variables belong to a node with a 'type'",
-    ("inline node", "topics"): "topics stand under 'publishers' and 'subscriptions'",
-    ("node type", "topics"): "topics stand under 'publishers' and 'subscriptions'",
-    ("inline node", "executable"): "a node is of a 'type', or declares its ports here",
-    ("inline node", "package"): "a node is of a 'type', or declares its ports here",
-    ("publisher", "publish"): "say it where it happens: a subscription, a timer, a service",
-    ("subscription", "callback"): "say here what is done: when, set, log, publish, call",
-    ("timer", "callback"): "say here what is done: when, set, log, publish, call",
-    ("service", "when"): "leave it out; every request gets an answer",
+    ("node", "behavior"): "remove it; the type determines the behavior of a node",
+    ("inline node", "variables"): "only a node with a 'type' has variables",
+    ("inline node", "topics"): "declare topics under 'publishers' and 'subscriptions'",
+    ("node type", "topics"): "declare topics under 'publishers' and 'subscriptions'",
+    ("inline node", "executable"): "give the node a 'type', or declare its ports here",
+    ("inline node", "package"): "give the node a 'type', or declare its ports here",
+    ("publisher", "publish"): "publish from a subscription, a timer or a service",
+    ("subscription", "callback"): "declare the reaction here: when, set, log, publish, call",
+    ("timer", "callback"): "declare the reaction here: when, set, log, publish, call",
+    ("service", "when"): "remove it; every request gets a response",
 }
 
 
 def intended_key(name: str, valid: Iterable[str]) -> str | None:
-    """Return the key among ``valid`` that ``name`` stands for, or None."""
+    """Return the key among ``valid`` that ``name`` is most likely meant to be, or None."""
     return _intended_key(name, frozenset(valid))
 
 
-# A mistake is seldom made once.
+# The same mistake is often repeated.
 @lru_cache(maxsize=1024)
 def _intended_key(name: str, keys: frozenset[str]) -> str | None:
     known = next((key for key in _INTENDED.get(name.casefold(), ()) if key in keys), None)
@@ -77,7 +77,7 @@ def _intended_key(name: str, keys: frozenset[str]) -> str | None:
 
 
 def advice(name: str, owner: str, valid: Iterable[str]) -> str | None:
-    """Return the hint for the key ``name``; ``owner`` is the title of what it stands in."""
+    """Return the hint for the unknown key ``name`` in a map with the title ``owner``."""
     keys = set(valid)
     if (owner, name) in _ADVICE:
         return _ADVICE[owner, name]

@@ -1,4 +1,4 @@
-"""What a schema wants where it finds something else, in words."""
+"""Describe what a schema expects, and hints for values of the wrong type."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _WORDS_FOR_TRUTH = frozenset({"yes", "no", "on", "off"})
 
 
 def expected(schema: dict[str, Any]) -> str:
-    """Return what ``schema`` takes, as ``a number or an '{expression}'``.
+    """Return the expected types, such as ``a number or an '{expression}'``.
 
-    That a load-time variable may stand anywhere goes without saying.
+    Load-time variables, which are allowed anywhere, are not mentioned.
     """
     words = [_WORDS[kind] for kind in _types(schema)]
     if schema.get("pattern") == _EXPRESSION:
@@ -32,32 +32,32 @@ def expected(schema: dict[str, Any]) -> str:
 
 
 def type_hint(schema: dict[str, Any], found: object) -> str | None:
-    """Return how to mend ``found`` where it is plain."""
-    wanted = _types(schema)
+    """Return a hint how to fix ``found`` for common mistakes."""
+    allowed = _types(schema)
     match found:
         case str():
-            return _text_hint(schema, wanted.keys(), found)
-        case bool() | int() | float() if wanted.keys() == {"string"}:
-            return "put it in quotes if it is a text"
-        case list() if wanted.keys() == {"object"}:
+            return _text_hint(schema, allowed.keys(), found)
+        case bool() | int() | float() if allowed.keys() == {"string"}:
+            return "quote it if it is a text"
+        case list() if allowed.keys() == {"object"}:
             return "write 'name: ...' for each, without a dash"
-        case None if wanted.keys() == {"object"}:
+        case None if allowed.keys() == {"object"}:
             return "an empty map is written '{}'"
     return None
 
 
-def _text_hint(schema: dict[str, Any], wanted: Set[str], found: str) -> str | None:
-    if "boolean" in wanted:
+def _text_hint(schema: dict[str, Any], allowed: Set[str], found: str) -> str | None:
+    if "boolean" in allowed:
         return "write true or false" if found.casefold() in _WORDS_FOR_TRUTH else None
-    if found[:1].isdigit() and wanted & {"number", "integer"}:
+    if found[:1].isdigit() and allowed & {"number", "integer"}:
         return "write the number alone; the key names the unit"
-    if "object" in wanted and schema.get("pattern") == _EXPRESSION:
+    if "object" in allowed and schema.get("pattern") == _EXPRESSION:
         return "name the field: {data: ...}"
-    return "write a list: [...]" if "array" in wanted else None
+    return "write a list: [...]" if "array" in allowed else None
 
 
 def _types(schema: dict[str, Any]) -> dict[str, None]:
-    """Return the JSON types that ``schema`` takes, in order, without text of some patterns only."""
+    """Return the JSON types that ``schema`` allows, in order, without text limited by a pattern."""
     types = schema.get("type", [])
     kinds = dict.fromkeys([types] if isinstance(types, str) else types)
     if "pattern" in schema and len(kinds) > 1:

@@ -1,4 +1,4 @@
-"""What jsonschema says, in words of the language and at the place that is intended_key."""
+"""Explain errors of jsonschema in terms of the language, with their locations."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 Path = tuple[str | int, ...]
 
-#: Keys that decide which shape the rest must have, and what has such keys, by title.
+#: Keys that determine which other keys are valid, and the titles of schemas that have them.
 _DECIDING = frozenset({"type", "topic", "service", "action"})
 _DECIDED = frozenset({"inline node", "connection"})
 
-#: What to write for a key that is missing, by the title of what it is missing in.
+#: Example values for missing keys, by the title of the schema.
 _EXAMPLES = {
     **dict.fromkeys(
         (("publisher", "type"), ("subscription", "type")),
@@ -43,11 +43,11 @@ _EXAMPLES = {
 
 @dataclass(frozen=True, slots=True)
 class _SchemaError:
-    """An error of jsonschema, and where it is."""
+    """An error of jsonschema with its location."""
 
     path: Path
     validator: str
-    wanted: Any  # what the schema says under the keyword
+    required: Any  # the value of the keyword in the schema
     instance: Any
     schema: dict[str, Any]
     place: TreeValue
@@ -55,7 +55,7 @@ class _SchemaError:
 
     @property
     def owner(self) -> str:
-        """The value as messages call it: ``timer 'tick'``."""
+        """The name of the value for messages: ``timer 'tick'``."""
         title = self.schema.get("title")
         name = self.path[-1] if self.path else None
         if title is None:
@@ -66,7 +66,7 @@ class _SchemaError:
 
     @property
     def owner_span(self) -> Span:
-        """Where the value begins, or its key; for a whole file, the key that says what it is."""
+        """The location of the value or its key; for a whole file, that of its first key."""
         first = next(iter(self.index.root), None)
         if not self.path and first is not None:
             return first.key.span
@@ -74,7 +74,7 @@ class _SchemaError:
 
     @property
     def subject(self) -> str:
-        """Where a value of the wrong kind stands: `` for 'period_ms'``."""
+        """The key of a value of the wrong type, for messages: `` for 'period_ms'``."""
         if not self.path:
             return ""
         if isinstance(self.path[-1], str):
@@ -83,16 +83,16 @@ class _SchemaError:
 
     @property
     def unknown(self) -> list[str]:
-        """The keys that do not belong here."""
+        """The keys that the schema does not have."""
         return [key for key in self.instance if key not in self.schema["properties"]]
 
 
 @dataclass(frozen=True, slots=True)
 class _MisspelledKeys:
-    """Right names of keys that were written wrong: what is said of those is not said again."""
+    """The intended names of misspelled keys, to avoid follow-up errors."""
 
     keys: set[tuple[Path, str]]
-    deciding: set[Path]  # where the wrong key would have decided what the others mean
+    deciding: set[Path]  # where the intended key determines which other keys are valid
 
     @classmethod
     def among(cls, errors: Iterable[_SchemaError]) -> _MisspelledKeys:
@@ -108,7 +108,7 @@ class _MisspelledKeys:
         return cls(keys, deciding)
 
     def covers(self, error: _SchemaError) -> bool:
-        """Say whether ``error`` may only be there because of a misspelled key."""
+        """Return whether ``error`` may only follow from a misspelled key."""
         if error.validator == "additionalProperties" and error.path in self.deciding:
             return False
         return bool(self.deciding) and any(
@@ -151,17 +151,17 @@ def _intended_key(error: _SchemaError, name: str) -> str | None:
 def _unknown_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
     entries = error.index.entries(error.place.tree)
     valid = error.schema["properties"]
-    unsaid = [key for key in valid if key not in error.instance]
+    unused = [key for key in valid if key not in error.instance]
     for name in error.unknown:
         if error.path in misspelled.deciding and _intended_key(error, name) not in _DECIDING:
             continue
         message = f"'{shown(name)}' is not a key of {error.owner}"
-        hint = advice(name, error.schema.get("title", ""), unsaid)
+        hint = advice(name, error.schema.get("title", ""), unused)
         yield Diagnostic(rules.UNKNOWN_KEY, message, entries[name].key.span, hint=hint)
 
 
 def _missing_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
-    for name in error.wanted:
+    for name in error.required:
         if name not in error.instance and (error.path, name) not in misspelled.keys:
             message = f"{error.owner} needs the key '{name}'"
             example = _EXAMPLES.get((error.schema.get("title", ""), name))
@@ -170,7 +170,7 @@ def _missing_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[
 
 
 def _missing_choice(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
-    names = [name for choice in error.wanted for name in choice["required"]]
+    names = [name for choice in error.required for name in choice["required"]]
     if not any((error.path, name) in misspelled.keys for name in names):
         message = f"{error.owner} needs {_any_of(names)}"
         example = _EXAMPLES.get((error.schema.get("title", ""), names[0]))
@@ -181,26 +181,26 @@ def _missing_choice(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterato
 def _excluding_keys(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     entries = error.index.entries(error.place.tree)
     first, second = sorted(
-        (entries[name].key for name in error.wanted["required"]), key=lambda key: key.span
+        (entries[name].key for name in error.required["required"]), key=lambda key: key.span
     )
     message = f"{error.owner} has both '{first.value}' and '{second.value}'"
-    label = Label(first.span, "the same is said here")
+    label = Label(first.span, "the other one")
     hint = "keep one of them"
     yield Diagnostic(rules.KEYS_EXCLUDE_EACH_OTHER, message, second.span, (label,), hint)
 
 
 def _wrong_type(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
-    wanted = expected(error.schema)
+    required = expected(error.schema)
     found = describe(error.place.tree)
-    message = f"expected {wanted}{error.subject}, found {found}"
+    message = f"expected {required}{error.subject}, found {found}"
     hint = type_hint(error.schema, error.instance)
     yield Diagnostic(rules.WRONG_TYPE, message, error.place.value_span, hint=hint)
 
 
 def _unknown_word(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     found = describe(error.place.tree)
-    message = f"expected {_any_of(error.wanted)}{error.subject}, found {found}"
-    close = nearest(error.instance, error.wanted) if isinstance(error.instance, str) else None
+    message = f"expected {_any_of(error.required)}{error.subject}, found {found}"
+    close = nearest(error.instance, error.required) if isinstance(error.instance, str) else None
     hint = f"did you mean '{close}'?" if close is not None else None
     yield Diagnostic(rules.UNKNOWN_WORD, message, error.place.value_span, hint=hint)
 
@@ -209,7 +209,7 @@ _LIMITS = {"minimum": "at least", "maximum": "at most", "exclusiveMinimum": "a n
 
 
 def _out_of_range(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
-    limit = f"{_LIMITS[error.validator]} {error.wanted}"
+    limit = f"{_LIMITS[error.validator]} {error.required}"
     message = f"expected {limit}{error.subject}, found {shown(error.instance)}"
     yield Diagnostic(rules.OUT_OF_RANGE, message, error.place.value_span)
 
@@ -217,7 +217,7 @@ def _out_of_range(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnosti
 def _nothing_there(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     name = error.path[-1] if error.path else "this"
     message = f"'{shown(name)}' is empty"
-    yield Diagnostic(rules.NOTHING_THERE, message, error.owner_span, hint="name at least one")
+    yield Diagnostic(rules.NOTHING_THERE, message, error.owner_span, hint="add at least one")
 
 
 def _any_of(names: Iterable[str]) -> str:
@@ -238,5 +238,5 @@ _EXPLAINERS: dict[str, Callable[[_SchemaError, _MisspelledKeys], Iterator[Diagno
     "minProperties": _nothing_there,
 }
 
-#: Every keyword of the schemas that can fail has its words here; a test holds them together.
+#: The keywords with an explanation. A test checks that these are all keywords of the schemas.
 KEYWORDS = frozenset(_EXPLAINERS)

@@ -1,8 +1,8 @@
-"""Whether a value has the shape that a schema wants, and nothing more.
+"""Check whether a value is valid against a schema, and nothing more.
 
-Nearly every file has it, and to see that takes a fraction of the time that jsonschema takes to be
-imported alone. Where and why a file has it not is left to jsonschema to say; a test holds the two
-against each other.
+Most files are valid, and this check takes a fraction of the time that importing jsonschema takes.
+jsonschema then reports where and why an invalid file is wrong. A test compares the results of the
+two.
 """
 
 from __future__ import annotations
@@ -12,20 +12,20 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
-#: Says whether a value is right.
+#: Returns whether a value is valid.
 Check: TypeAlias = Callable[[Any], bool]
 
 _DEFINITIONS = "#/definitions/"
 
 
-def compile_check(whole: dict[str, Any]) -> Check:
-    """Return the test for a schema (draft-07). Raises KeyError for a keyword not known here."""
-    return _Compiler(whole.get("definitions", {})).test(whole)
+def compile_check(schema: dict[str, Any]) -> Check:
+    """Return the check for a schema (draft-07). Raises KeyError for an unsupported keyword."""
+    return _Compiler(schema.get("definitions", {})).test(schema)
 
 
 @dataclass(slots=True)
 class _Compiler:
-    """Makes tests; that of a definition once, however often it is referred to."""
+    """Compiles schemas to checks, each definition once."""
 
     definitions: dict[str, Any]
     _made: dict[str, Check] = field(default_factory=dict)
@@ -36,8 +36,12 @@ class _Compiler:
             if name not in self._made:
                 self._made[name] = self.test(self.definitions[name])
             return self._made[name]
-        makers = [_MAKERS[keyword] for keyword in schema]
-        return _all(made for maker in dict.fromkeys(makers) for made in maker(self, schema))
+        compilers = [_KEYWORDS[keyword] for keyword in schema]
+        return _all(
+            checks
+            for compile_keyword in dict.fromkeys(compilers)
+            for checks in compile_keyword(self, schema)
+        )
 
 
 def _nothing(_: _Compiler, __: dict[str, Any]) -> Iterable[Check]:
@@ -45,10 +49,10 @@ def _nothing(_: _Compiler, __: dict[str, Any]) -> Iterable[Check]:
 
 
 def _type(_: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
-    wanted = schema["type"]
+    allowed = schema["type"]
     kinds = frozenset(
         python
-        for name in ([wanted] if isinstance(wanted, str) else wanted)
+        for name in ([allowed] if isinstance(allowed, str) else allowed)
         for python in _PYTHON_TYPES[name]
     )
     yield lambda value: type(value) in kinds
@@ -128,8 +132,8 @@ def _if(compiler: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
     yield lambda value: then(value) if condition(value) else otherwise(value)
 
 
-def _all(made: Iterable[Check]) -> Check:
-    tests = tuple(made)
+def _all(checks: Iterable[Check]) -> Check:
+    tests = tuple(checks)
     return tests[0] if len(tests) == 1 else lambda value: all(test(value) for test in tests)
 
 
@@ -144,7 +148,7 @@ _PYTHON_TYPES: dict[str, tuple[type, ...]] = {
     "null": (type(None),),
 }
 
-_MAKERS: dict[str, Callable[[_Compiler, dict[str, Any]], Iterable[Check]]] = {
+_KEYWORDS: dict[str, Callable[[_Compiler, dict[str, Any]], Iterable[Check]]] = {
     **dict.fromkeys(("$schema", "title", "description", "default", "examples"), _nothing),
     **dict.fromkeys(("definitions", "then", "else"), _nothing),
     **dict.fromkeys(("minimum", "maximum", "exclusiveMinimum"), _limits),

@@ -1,4 +1,4 @@
-"""The two kinds of file there are, and what is said of one that is neither or the other."""
+"""The two kinds of files, and the diagnostic for a file of the wrong kind."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ RULE = register(
         code="RC040",
         name="wrong-kind-of-file",
         severity=Severity.ERROR,
-        summary="A file is neither a system nor a node type, or not the one that is needed.",
+        summary="A file is neither a system nor a node type, or is the wrong one of the two.",
         why=(
-            "The first key of a file says what it is: `system:` or `node:`. Without it nobody can "
-            "tell what the rest means."
+            "The first key of a file says what it is: `system:` or `node:`. Without it, "
+            "the other keys cannot be checked."
         ),
         bad="nodes: {talker: {}}",
         good="system: demo\nnodes: {talker: {}}",
@@ -31,20 +31,20 @@ _WORDS = {SYSTEM: "a system", NODE: "a node type"}
 def check_kind(
     tree: Mapping, source: SourceFile, allowed: tuple[str, ...] = (SYSTEM, NODE)
 ) -> Diagnostic | None:
-    """Return what is wrong with the kind of a file; None when it is one of ``allowed``."""
+    """Return a diagnostic if the kind of a file is not one of ``allowed``."""
     kind = kind_of(tree)
     if kind in allowed:
         return None
     entry = (tree.entry(kind) if kind is not None else None) or next(iter(tree), None)
-    wanted = " or ".join(_WORDS[name] for name in allowed)
+    expected = " or ".join(_WORDS[name] for name in allowed)
     if kind is None:
         message = f"'{source.path}' is neither a system nor a node type"
     else:
-        message = f"'{source.path}' is {_WORDS.get(kind, kind)}, not {wanted}"
+        message = f"'{source.path}' is {_WORDS.get(kind, kind)}, not {expected}"
     keys = " or ".join(f"'{name}: <name>'" for name in allowed)
     return Diagnostic(
         RULE,
         message,
         entry.key.span if entry is not None else tree.span,
-        hint=f"{wanted} begins with {keys}",
+        hint=f"{expected} begins with {keys}",
     )

@@ -1,4 +1,4 @@
-"""Where in a file the things are that jsonschema names by their path."""
+"""Find values in a tree by the paths that jsonschema reports."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ _WORDS_FOR_NOTHING = ("null", "~")
 
 @dataclass(frozen=True, slots=True)
 class TreeValue:
-    """A value in a tree. ``key`` is what it stands under; None for the root and items of lists."""
+    """A value in a tree. ``key`` is None for the root and for items of lists."""
 
     tree: Tree
     key: Scalar | None
 
     @property
     def owner_span(self) -> Span:
-        """The place of the whole: its key, else where it begins."""
+        """The span of the key, or of the value if it has none."""
         return self.key.span if self.key is not None else self.tree.span
 
     @property
     def value_span(self) -> Span:
-        """The place of the value; that of its key where nothing is written."""
+        """The span of the value, or of its key if the value is empty."""
         span = self.tree.span
         if self.key is None or not isinstance(self.tree, Scalar) or self.tree.value is not None:
             return span
@@ -35,7 +35,7 @@ class TreeValue:
 
 @dataclass(slots=True)
 class TreeIndex:
-    """Finds values by path, each map's keys being looked through once."""
+    """Finds values by path, with an index of the keys of each map."""
 
     root: Mapping
     _entries: dict[int, dict[str, Entry]] = field(default_factory=dict)
@@ -58,7 +58,7 @@ class TreeIndex:
         """Return the entries of a map by name; none for anything else."""
         if not isinstance(tree, Mapping):
             return {}
-        # By identity, for comparing trees is not free; the root keeps every one of them alive.
+        # By identity, since comparing trees is slow; the root keeps them all alive.
         if id(tree) not in self._entries:
             self._entries[id(tree)] = {entry.name: entry for entry in tree}
         return self._entries[id(tree)]

@@ -1,4 +1,4 @@
-"""The rules of shape (RC1xx): keys and values that the language does not have."""
+"""The rules of the schema (RC1xx): keys and values that the language does not have."""
 
 from __future__ import annotations
 
@@ -12,11 +12,8 @@ UNKNOWN_KEY = register(
     _error(
         code="RC101",
         name="unknown-key",
-        summary="A key that the language does not have there.",
-        why=(
-            "A misspelt key that is passed over silently costs an afternoon: what it was to say "
-            "is not done."
-        ),
+        summary="A key is not valid in its context.",
+        why=("A misspelled key that is silently ignored is hard to find: its value has no effect."),
         bad="""\
 system: demo
 nodes:
@@ -33,8 +30,8 @@ MISSING_KEY = register(
     _error(
         code="RC102",
         name="missing-key",
-        summary="A key that must be there is not.",
-        why="Without it the rest means nothing, and there is no value that fits most systems.",
+        summary="A required key is missing.",
+        why="The entry is incomplete without it, and there is no sensible default.",
         bad="""\
 system: demo
 nodes:
@@ -53,8 +50,8 @@ WRONG_TYPE = register(
     _error(
         code="RC103",
         name="wrong-type",
-        summary="A value is of another type than what stands there.",
-        why="Numbers, texts, lists and maps are not turned into each other: that hides mistakes.",
+        summary="A value has the wrong type.",
+        why="Values are not converted to other types, since that hides mistakes.",
         bad="""\
 system: demo
 nodes:
@@ -71,8 +68,8 @@ UNKNOWN_WORD = register(
     _error(
         code="RC104",
         name="unknown-word",
-        summary="A value that is none of the words allowed there.",
-        why="Words are spelled as rclpy spells them, so that what is written is what ROS does.",
+        summary="A value is not one of the allowed words.",
+        why="The words are those of rclpy.",
         bad="""\
 system: demo
 lifecycle: {autostart: activ}
@@ -91,8 +88,8 @@ OUT_OF_RANGE = register(
     _error(
         code="RC105",
         name="out-of-range",
-        summary="A number is too small for what it says.",
-        why="A period, a rate or a number of messages of zero or less means nothing.",
+        summary="A number is outside the allowed range.",
+        why="For example, a period, rate or queue depth must be positive.",
         bad="""\
 system: demo
 nodes:
@@ -109,8 +106,8 @@ KEYS_EXCLUDE_EACH_OTHER = register(
     _error(
         code="RC106",
         name="keys-exclude-each-other",
-        summary="Two keys say the same thing in two ways.",
-        why="One of them would have to win, and nobody could see which.",
+        summary="Two keys that exclude each other are used together.",
+        why="It would be unclear which of the two applies.",
         bad="""\
 system: demo
 nodes:
@@ -127,8 +124,8 @@ NOTHING_THERE = register(
     _error(
         code="RC107",
         name="nothing-there",
-        summary="A map or list that must hold something is empty.",
-        why="A system without nodes does nothing; a connection to no port connects nothing.",
+        summary="A map or list is empty where at least one entry is required.",
+        why="A system without nodes and a connection without ports do nothing.",
         bad="""\
 system: demo
 nodes: {}

@@ -1,4 +1,4 @@
-"""What is wrong with the shape of a file: jsonschema finds it, we say it with its place."""
+"""Validate with jsonschema and explain the errors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _validators: dict[str, Draft7Validator] = {}
 
 
 def explain(content: Plain, tree: Mapping, kind: str, whole: dict[str, Any]) -> list[Diagnostic]:
-    """Return what is wrong with ``content``, which is ``tree`` without index.
+    """Return the diagnostics of ``content``, which is ``tree`` as plain data.
 
     ``whole`` is the schema of ``kind``.
     """
@@ -30,12 +30,12 @@ def explain(content: Plain, tree: Mapping, kind: str, whole: dict[str, Any]) -> 
 def _validator(whole: dict[str, Any]) -> Draft7Validator:
     definitions = whole["definitions"]
     root = {name: part for name, part in whole.items() if name != "definitions"}
-    # 10.0 is an integer to JSON Schema, and not to ROS.
+    # 10.0 is an integer in JSON Schema, but not in ROS.
     types = Draft7Validator.TYPE_CHECKER.redefine("integer", _is_integer)
     strict = extend(Draft7Validator, type_checker=types)  # type: ignore[no-untyped-call]
-    # An empty registry fetches nothing; with references filled in there is nothing to fetch.
-    filled_in = _filled_in(root, definitions)
-    validator: Draft7Validator = strict(filled_in, registry=Registry())
+    # The references are inlined; an empty registry never fetches any.
+    inlined = _inline_references(root, definitions)
+    validator: Draft7Validator = strict(inlined, registry=Registry())
     return validator
 
 
@@ -43,16 +43,18 @@ def _is_integer(_: object, value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
 
 
-def _filled_in(part: Any, definitions: dict[str, Any]) -> Any:
-    """Return ``part`` with definitions in place of references to them: that halves the time.
+def _inline_references(part: Any, definitions: dict[str, Any]) -> Any:
+    """Return ``part`` with references replaced by definitions, which halves the time.
 
-    What stands beside a ``$ref`` describes it, and means nothing to a validator (draft-07).
+    In draft-07, validators ignore the keywords beside a ``$ref``.
     """
     match part:
         case {"$ref": reference}:
-            return _filled_in(definitions[reference.removeprefix(_DEFINITIONS)], definitions)
+            return _inline_references(
+                definitions[reference.removeprefix(_DEFINITIONS)], definitions
+            )
         case dict():
-            return {key: _filled_in(value, definitions) for key, value in part.items()}
+            return {key: _inline_references(value, definitions) for key, value in part.items()}
         case list():
-            return [_filled_in(item, definitions) for item in part]
+            return [_inline_references(item, definitions) for item in part]
     return part

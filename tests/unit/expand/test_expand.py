@@ -147,31 +147,31 @@ def test_what_has_no_variables_stays_the_very_same() -> None:
         ),
         (
             system("{a: 1}", "['${a}', '${}']"),
-            "malformed-variable", "f:3:14", "'${}' is no variable: expected '${name}'", "'$${'",
+            "malformed-variable", "f:3:14", "'${}' is not a variable: expected '${name}'", "'$${'",
         ),
         (
             system("{a: 1}", "['${a}', '${a + 1}']"),
-            "malformed-variable", "f:3:14", "'${a + 1}' is no variable", "expression",
+            "malformed-variable", "f:3:14", "'${a + 1}' is not a variable", "expression",
         ),
         (
             system("{a: 1}", "['${a}', '${a']"),
-            "malformed-variable", "f:3:14", "'${a' is no variable", "",
+            "malformed-variable", "f:3:14", "'${a' is not a variable", "",
         ),
         (
             system("{a: {b: 1}}", "at ${a}"),
-            "variable-not-text", "f:3:7", "'${a}' stands for a map", "",
+            "variable-not-text", "f:3:7", "'${a}' is a map", "",
         ),
         (
             system("{a: [1]}", "at ${a}"),
-            "variable-not-text", "f:3:7", "'${a}' stands for a list", "",
+            "variable-not-text", "f:3:7", "'${a}' is a list", "",
         ),
         (
             system("{a: '${a}'}", "1"),
-            "cyclic-variables", "f:2:13", "variable 'a' stands for itself: a -> a", "",
+            "cyclic-variables", "f:2:13", "variable 'a' is defined by itself: a -> a", "",
         ),
         (
             system("{a: 'x${b}', b: ['${c}'], c: '${a}', d: '${a}'}", "${d}"),
-            "cyclic-variables", "f:2:13", "variable 'a' stands for itself: a -> b -> c -> a", "",
+            "cyclic-variables", "f:2:13", "variable 'a' is defined by itself: a -> b -> c -> a", "",
         ),
         (
             system("{a: 1, b: 2}", "${b}"),

@@ -92,23 +92,23 @@ def test_a_table_in_pyproject_says_the_same_with_places(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "place"),
     [
-        ("nodes: [../elsewhere]", (1, 9, "'../elsewhere' leads out of the project")),
-        ("nodes: [link]", (1, 9, "'link' leads out of the project")),
+        ("nodes: [../elsewhere]", (1, 9, "'../elsewhere' is outside the project")),
+        ("nodes: [link]", (1, 9, "'link' is outside the project")),
         ("nodes:\n  - missing", (2, 5, "'missing' is not a folder")),
         ("nodes: [a.yaml]", (1, 9, "'a.yaml' is not a folder")),
         ('nodes: ["\\t"]', (1, 9, "'\\t' is not a folder")),
         ("nodes: nodes", (1, 8, "expected a list for 'nodes', found text 'nodes'")),
         ("select: [1]", (1, 10, "expected text in 'select', found the number 1")),
-        ("ignore: [no-rule-at-all]", (1, 10, "no rule is called 'no-rule-at-all'")),
+        ("ignore: [no-rule-at-all]", (1, 10, "there is no rule 'no-rule-at-all'")),
         (
             "ignore: [unknown-node]",
-            (1, 10, "'unknown-node' is an error, which cannot be ignored for a whole project"),
+            (1, 10, "'unknown-node' is an error, which cannot be ignored"),
         ),
         (
             "severity: {RC202: info}",
-            (1, 12, "'RC202' is an error, which cannot be made an info for a whole project"),
+            (1, 12, "'RC202' is an error, which cannot be made an info"),
         ),
-        ("severity: {RC2: info}", (1, 12, "no rule is called 'RC2'")),
+        ("severity: {RC2: info}", (1, 12, "there is no rule 'RC2'")),
         ("[", (1, 1, "this '[' is not closed")),
     ],
 )
@@ -129,7 +129,7 @@ def test_a_wrong_setting_is_a_finding_at_its_place(
 def test_settings_may_be_looked_at_alone(tmp_path: Path) -> None:
     path = tmp_path / "composer.yaml"
     path.write_text("strict: true\nignore: [nothing-of-the-kind]\n")
-    assert told(load(path).diagnostics) == [(2, 10, "no rule is called 'nothing-of-the-kind'")]
+    assert told(load(path).diagnostics) == [(2, 10, "there is no rule 'nothing-of-the-kind'")]
     path.write_text("strict: true\n")
     assert load(path).diagnostics == []
 
@@ -140,7 +140,7 @@ def test_a_table_beside_a_file_is_not_read(tmp_path: Path) -> None:
     project = Project.at(tmp_path)
     assert not project.settings.strict
     assert [finding.message for finding in project.diagnostics] == [
-        "the table [tool.composer] is not read: there is a composer.yaml beside it"
+        "the table [tool.composer] is ignored: the folder also has a composer.yaml"
     ]
 
 

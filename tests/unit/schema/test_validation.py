@@ -59,7 +59,7 @@ def profile(text: str) -> str:
         ("system: demo\nnodes: {}", "nothing-there", "nodes", "'nodes' is empty", "at least one"),
         (
             "system: 5\nnodes: {robot: {}}",
-            "wrong-type", "5", "expected text for 'system', found the number 5", "in quotes",
+            "wrong-type", "5", "expected text for 'system', found the number 5", "quote it",
         ),
         (
             "system: demo\nnodes:\n  - robot: {}",
@@ -82,7 +82,7 @@ def profile(text: str) -> str:
         ),
         (
             node("{type: relay, behavior: a:B}"),
-            "unknown-key", "behavior", "'behavior' is not a key of node 'robot'", "leave it out",
+            "unknown-key", "behavior", "'behavior' is not a key of node 'robot'", "remove it",
         ),
         (
             node("{variables: {a: 1}}"),
@@ -165,7 +165,7 @@ def profile(text: str) -> str:
         ),
         (
             subscription("{type: a/msg/B, when: true}"),
-            "wrong-type", "true", "expected text for 'when', found true", "in quotes",
+            "wrong-type", "true", "expected text for 'when', found true", "quote it",
         ),
         (
             subscription("{type: a/msg/B, publish: {out: hello}}"),
