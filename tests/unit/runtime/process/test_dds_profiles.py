@@ -1,4 +1,4 @@
-"""The profile for Fast DDS is chosen only where the user has not chosen."""
+"""A Fast DDS profile is selected only if the user has not configured Fast DDS."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from composer.runtime.process.dds_profiles import (
 )
 
 
-def test_a_profile_is_chosen_that_is_there_and_is_xml(tmp_path: Path) -> None:
+def test_the_default_profile_is_valid_xml(tmp_path: Path) -> None:
     environment: dict[str, str] = {}
     use_discovery_profile(environment, tmp_path)
     root = ElementTree.parse(environment["FASTRTPS_DEFAULT_PROFILES_FILE"]).getroot()
@@ -23,27 +23,27 @@ def test_a_profile_is_chosen_that_is_there_and_is_xml(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "chosen",
+    "configured",
     [
         {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"},
         {"FASTDDS_DEFAULT_PROFILES_FILE": "mine.xml"},
         {"ROS_DISCOVERY_SERVER": "127.0.0.1:11811"},
     ],
 )
-def test_what_the_user_chose_is_left_alone(chosen: dict[str, str], tmp_path: Path) -> None:
-    environment = dict(chosen)
+def test_the_configuration_of_the_user_is_kept(configured: dict[str, str], tmp_path: Path) -> None:
+    environment = dict(configured)
     use_discovery_profile(environment, tmp_path)
-    assert environment == chosen
+    assert environment == configured
 
 
-def test_a_file_that_fast_dds_finds_by_itself_is_left_alone(tmp_path: Path) -> None:
+def test_a_profile_in_the_current_folder_is_kept(tmp_path: Path) -> None:
     (tmp_path / "DEFAULT_FASTRTPS_PROFILES.xml").touch()
     environment: dict[str, str] = {}
     use_discovery_profile(environment, tmp_path)
     assert environment == {}
 
 
-def test_what_concerns_discovery_is_taken_back_of_our_profile_alone(tmp_path: Path) -> None:
+def test_the_profile_for_large_systems_has_the_settings_of_writers_only(tmp_path: Path) -> None:
     environment: dict[str, str] = {}
     use_discovery_profile(environment, tmp_path)
     everything = _settings(environment)
@@ -51,14 +51,16 @@ def test_what_concerns_discovery_is_taken_back_of_our_profile_alone(tmp_path: Pa
     left = _settings(environment)
     assert left == {setting for setting in everything if "data_writer" in setting}
     assert left
-    chosen = {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
-    use_large_system_profile(chosen)
-    assert chosen == {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
+    configured = {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
+    use_large_system_profile(configured)
+    assert configured == {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
 
 
-@pytest.mark.parametrize("reach", [None, "SUBNET", "SYSTEM_DEFAULT"])
-def test_a_command_uses_udp_alone(reach: str | None, tmp_path: Path) -> None:
-    environment = {} if reach is None else {"ROS_AUTOMATIC_DISCOVERY_RANGE": reach}
+@pytest.mark.parametrize("discovery_range", [None, "SUBNET", "SYSTEM_DEFAULT"])
+def test_a_command_uses_udp_only(discovery_range: str | None, tmp_path: Path) -> None:
+    environment = (
+        {} if discovery_range is None else {"ROS_AUTOMATIC_DISCOVERY_RANGE": discovery_range}
+    )
     use_discovery_profile(environment, tmp_path)
     before = dict(environment)
     use_command_profile(environment)
@@ -67,7 +69,7 @@ def test_a_command_uses_udp_alone(reach: str | None, tmp_path: Path) -> None:
     assert environment == before | {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
 
 
-def test_on_this_computer_alone_the_profile_says_what_the_range_would(tmp_path: Path) -> None:
+def test_on_localhost_the_profile_replaces_the_discovery_range(tmp_path: Path) -> None:
     environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     use_discovery_profile(environment, tmp_path)
     use_command_profile(environment)
@@ -78,7 +80,7 @@ def test_on_this_computer_alone_the_profile_says_what_the_range_would(tmp_path: 
 
 
 @pytest.mark.parametrize(
-    "chosen",
+    "configured",
     [
         {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"},
         {"ROS_DISCOVERY_SERVER": "127.0.0.1:11811"},
@@ -87,27 +89,29 @@ def test_on_this_computer_alone_the_profile_says_what_the_range_would(tmp_path: 
         {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_LOCALHOST_ONLY": "1"},
     ],
 )
-def test_a_command_keeps_to_what_the_user_chose(chosen: dict[str, str], tmp_path: Path) -> None:
-    environment = dict(chosen)
+def test_a_command_keeps_the_configuration_of_the_user(
+    configured: dict[str, str], tmp_path: Path
+) -> None:
+    environment = dict(configured)
     use_discovery_profile(environment, tmp_path)
     before = dict(environment)
     use_command_profile(environment)
     assert environment == before
 
 
-def test_each_profile_says_what_the_one_before_it_says_and_more(tmp_path: Path) -> None:
+def test_profiles_for_commands_extend_the_default_profile(tmp_path: Path) -> None:
     environment: dict[str, str] = {}
     use_discovery_profile(environment, tmp_path)
-    of_all = _settings(environment)
-    of_commands, of_commands_here = (
-        _settings(_suited(environment | {"ROS_AUTOMATIC_DISCOVERY_RANGE": reach}))
-        for reach in ("SUBNET", "LOCALHOST")
+    default = _settings(environment)
+    commands, commands_on_localhost = (
+        _settings(_for_command(environment | {"ROS_AUTOMATIC_DISCOVERY_RANGE": value}))
+        for value in ("SUBNET", "LOCALHOST")
     )
-    assert of_all
-    assert of_all < of_commands < of_commands_here
+    assert default
+    assert default < commands < commands_on_localhost
 
 
-def _suited(environment: dict[str, str]) -> dict[str, str]:
+def _for_command(environment: dict[str, str]) -> dict[str, str]:
     use_command_profile(environment)
     return environment
 

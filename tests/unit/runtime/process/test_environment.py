@@ -1,4 +1,4 @@
-"""What is wrong in the environment is said before ROS reads it."""
+"""Errors in the environment are reported before ROS reads it."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ SECURE = {
         {"ROS_DOMAIN_ID": "0"},
         {"ROS_DOMAIN_ID": "232", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
         {"ROS_SECURITY_ENABLE": "false"},
-        {"ROS_SECURITY_ENABLE": "TRUE"},  # rcl takes exactly 'true'
+        {"ROS_SECURITY_ENABLE": "TRUE"},  # rcl requires exactly 'true'
         SECURE,
-        {"RMW_IMPLEMENTATION": "rmw_anything"},  # no prefix is known: nothing can be said
+        {"RMW_IMPLEMENTATION": "rmw_anything"},  # without a prefix, it cannot be checked
     ],
 )
-def test_what_ros_understands_is_left_alone(environment: dict[str, str]) -> None:
+def test_a_valid_environment_is_accepted(environment: dict[str, str]) -> None:
     check_environment(environment)
 
 
@@ -58,9 +58,7 @@ def test_what_ros_understands_is_left_alone(environment: dict[str, str]) -> None
         ),
     ],
 )
-def test_what_ros_would_take_silently_is_refused(
-    environment: dict[str, str], message: str, hint: str
-) -> None:
+def test_invalid_values_are_refused(environment: dict[str, str], message: str, hint: str) -> None:
     with pytest.raises(StartRefused) as refusal:
         check_environment(environment)
     assert message in str(refusal.value)
@@ -68,7 +66,7 @@ def test_what_ros_would_take_silently_is_refused(
 
 
 @pytest.mark.parametrize("below", ["", "log"])
-def test_a_folder_for_logs_that_cannot_be_is_refused(tmp_path: Path, below: str) -> None:
+def test_a_folder_for_logs_that_cannot_be_created_is_refused(tmp_path: Path, below: str) -> None:
     (tmp_path / "file").touch(mode=0o644)
     folder = str(tmp_path / "file" / below)
     check_environment({"ROS_LOG_DIR": str(tmp_path / "new" / "folder")})
@@ -78,7 +76,7 @@ def test_a_folder_for_logs_that_cannot_be_is_refused(tmp_path: Path, below: str)
     assert "ROS_LOG_DIR" in refusal.value.hint
 
 
-def test_logs_go_where_ros_puts_them() -> None:
+def test_the_folder_for_logs_is_that_of_ros() -> None:
     home = {"HOME": "/home/me"}
     assert log_folder({}) is None
     assert log_folder(home) == Path("/home/me/.ros/log")
@@ -86,7 +84,7 @@ def test_logs_go_where_ros_puts_them() -> None:
     assert log_folder({**home, "ROS_HOME": "/ros", "ROS_LOG_DIR": "/logs"}) == Path("/logs")
 
 
-def test_a_middleware_that_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_a_middleware_that_is_not_installed_is_refused(tmp_path: Path) -> None:
     index = tmp_path / "share" / "ament_index" / "resource_index" / "rmw_typesupport"
     index.mkdir(parents=True)
     (index / "rmw_fastrtps_cpp").touch()
@@ -98,7 +96,7 @@ def test_a_middleware_that_is_not_there_is_refused(tmp_path: Path) -> None:
     assert refusal.value.hint == "installed: rmw_fastrtps_cpp"
 
 
-def test_what_is_set_is_kept() -> None:
+def test_variables_that_are_set_are_kept() -> None:
     environment = {"AMENT_PREFIX_PATH": "/opt/ros/jazzy", "RCUTILS_CONSOLE_OUTPUT_FORMAT": "x"}
     complete_environment(environment)
     assert environment == {

@@ -1,3 +1,5 @@
+"""Incomplete shared memory of killed processes is removed."""
+
 from __future__ import annotations
 
 import os
@@ -30,12 +32,12 @@ def segment(folder: Path, name: str, content: bytes, *, old: bool = True) -> Pat
         ("fastrtps_port7411", b"\0" * 52400, False),
         ("fastrtps_port7411", INITIALIZING, False),
         ("fastrtps_port7411", READY, True),
-        ("fastrtps_port7411_el", b"", True),  # a lock: empty is what it should be
-        ("fastrtps_0123456789abcdef", b"", True),  # nobody opens it who was not told of it
-        ("somebody_else", b"", True),
+        ("fastrtps_port7411_el", b"", True),  # a lock file, which is empty
+        ("fastrtps_0123456789abcdef", b"", True),  # not a port: new participants do not open it
+        ("other_program", b"", True),
     ],
 )
-def test_only_half_made_ports_are_removed(
+def test_only_incomplete_ports_are_removed(
     tmp_path: Path, name: str, content: bytes, remains: bool
 ) -> None:
     path = segment(tmp_path, name, content)
@@ -43,27 +45,27 @@ def test_only_half_made_ports_are_removed(
     assert path.exists() == remains
 
 
-def test_who_is_making_one_just_now_may_finish(tmp_path: Path) -> None:
+def test_a_port_that_is_being_filled_is_kept(tmp_path: Path) -> None:
     path = segment(tmp_path, "fastrtps_port7411", b"", old=False)
-    maker = threading.Timer(0.1, lambda: path.write_bytes(READY))
-    maker.start()
+    writer = threading.Timer(0.1, lambda: path.write_bytes(READY))
+    writer.start()
     remove_incomplete_ports(tmp_path)
-    maker.join()
+    writer.join()
     assert path.read_bytes() == READY
 
 
-def test_one_that_was_just_left_is_removed_too(tmp_path: Path) -> None:
+def test_a_new_incomplete_port_is_removed_after_a_second(tmp_path: Path) -> None:
     path = segment(tmp_path, "fastrtps_port7411", b"", old=False)
     remove_incomplete_ports(tmp_path)
     assert not path.exists()
 
 
-def test_where_there_is_no_shared_memory_there_is_nothing_to_remove(tmp_path: Path) -> None:
+def test_a_missing_folder_is_ignored(tmp_path: Path) -> None:
     remove_incomplete_ports(tmp_path / "nowhere")
 
 
 @pytest.mark.skipif(os.getuid() == 0, reason="root may remove everything")
-def test_what_may_not_be_removed_is_named(tmp_path: Path) -> None:
+def test_a_port_of_another_user_is_an_error(tmp_path: Path) -> None:
     path = segment(tmp_path, "fastrtps_port7411", b"")
     tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
     try:

@@ -1,4 +1,4 @@
-"""Signals that ask for the end are heard, whenever they come."""
+"""Signals end the wait of the main thread whenever they arrive."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ with stop_signals(main_queue.request_stop, main_queue.wakeup, ends_process=True)
 """
 
 
-def test_no_signal_slips_past_a_thread_that_is_about_to_sleep() -> None:
+def test_a_signal_just_before_a_wait_ends_it() -> None:
     ended = subprocess.run(
         [sys.executable, "-c", RECEIVER], capture_output=True, text=True, timeout=60.0, check=False
     )

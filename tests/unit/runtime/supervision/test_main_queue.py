@@ -1,4 +1,4 @@
-"""The main thread's main_queue: nothing is lost, nothing waits longer than it may."""
+"""The main queue keeps the order of items, and waits are limited in time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from composer.runtime.supervision import main_queue as module
 from composer.runtime.supervision.main_queue import MainQueue
 
 
-def test_items_come_in_the_order_they_were_put() -> None:
+def test_items_are_returned_in_order() -> None:
     main_queue: MainQueue[int] = MainQueue()
     for number in range(3):
         main_queue.put(number)
@@ -20,7 +20,7 @@ def test_items_come_in_the_order_they_were_put() -> None:
     assert main_queue.get(time.monotonic()) is None
 
 
-def test_what_comes_while_something_else_is_waited_for_is_kept() -> None:
+def test_items_are_kept_during_a_wait() -> None:
     main_queue: MainQueue[str] = MainQueue()
     main_queue.put("later")
     done = []
@@ -37,17 +37,17 @@ def test_a_wait_ends_in_time() -> None:
     assert 0.1 <= time.monotonic() - began_s < 10.0
 
 
-def test_a_request_to_stop_ends_what_may_be_stopped_and_a_second_one_hurries(
+def test_a_stop_ends_stoppable_waits_and_a_second_one_shortens_the_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(module, "_SAME_REQUEST_S", 60.0)
     main_queue: MainQueue[str] = MainQueue()
-    main_queue.put("never dealt with")
+    main_queue.put("never handled")
     main_queue.request_stop("SIGINT")
     assert main_queue.stopping
     assert main_queue.get() is None
     assert not main_queue.wait(lambda: False, time.monotonic() + 60.0, stoppable=True)
-    main_queue.request_stop("SIGINT")  # forwarded by somebody who got the same one
+    main_queue.request_stop("SIGINT")  # the same signal, forwarded
     assert (main_queue.stop_reason, main_queue.urgent) == ("SIGINT", False)
     monkeypatch.setattr(module, "_SAME_REQUEST_S", 0.1)
     until_s = time.monotonic() + 20.0
@@ -60,7 +60,7 @@ def test_a_request_to_stop_ends_what_may_be_stopped_and_a_second_one_hurries(
 
 
 @pytest.mark.parametrize("left_s", [1e9, math.inf])
-def test_an_end_may_be_years_away(left_s: float) -> None:
+def test_the_end_of_a_wait_may_be_years_away(left_s: float) -> None:
     main_queue: MainQueue[str] = MainQueue()
     main_queue.wake()
     assert main_queue.wakeup.wait(time.monotonic() + left_s)

@@ -1,4 +1,4 @@
-"""What is told of a system as a whole."""
+"""Whether a system as a whole is active."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ CAMERA = NodeStatus("/camera", "inactive", starts_active=False, state="inactive"
     [
         ((PLANNER, CAMERA), True),
         ((PLANNER, replace(CAMERA, state="active")), True),
-        ((PLANNER, replace(CAMERA, state="unconfigured")), True),  # moved by hand
+        ((PLANNER, replace(CAMERA, state="unconfigured")), True),  # by an external transition
         ((replace(PLANNER, state="inactive"), CAMERA), False),
         ((replace(PLANNER, state="deactivating"), CAMERA), False),
         ((PLANNER, replace(CAMERA, state="unconfigured", held_down="no lens")), False),
         ((replace(PLANNER, held_down="its executor hangs"), CAMERA), False),
-        ((CAMERA,), False),  # nothing is to be active, and nothing is
+        ((CAMERA,), False),  # no node starts active
     ],
 )
-def test_a_system_is_active_when_all_is_that_ought_to_be(
+def test_a_system_is_active_if_all_nodes_that_start_active_are(
     nodes: tuple[NodeStatus, ...], is_active: bool
 ) -> None:
     status = SystemStatus("robot", "running", nodes, "host", 1, 0.0)
