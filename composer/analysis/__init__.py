@@ -1,1 +1,1 @@
-"""What several rules compute: rates, wiring, periods, publications, parameter values."""
+"""What several rules compute: rates, delays, unconnected ports, parameter values."""

@@ -1,4 +1,4 @@
-"""The Python behaviours of a system, read as syntax, and the handlers they should have."""
+"""Behaviors read as syntax: their handlers, calls and unbound methods."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from composer.analysis.context import Context, is_opaque
-from composer.behavior_source import BehaviorSource, find_behavior
+from composer.analysis.context import Context, is_unresolved
+from composer.behavior_source import BehaviorSource, Call, Method, find_behavior
 from composer.model import BehaviorReference, Node, Port, PortKind
 from composer.source import Located
 
-#: Handlers that every behaviour may have, and the arguments each is called with.
+#: Handlers that every behavior may have, with the arguments they are called with.
 GENERAL_HANDLERS: Mapping[str, tuple[str, ...]] = {
     "on_configure": (),
     "on_activate": (),
@@ -31,9 +31,9 @@ _ARGUMENTS: Mapping[PortKind, tuple[str, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class Handler:
-    """A method that a port or a timer may have in the behaviour.
+    """A method that the behavior may define for a port or a timer.
 
-    ``needed`` is true when nothing else says what is to happen.
+    ``needed`` is true if the port or timer has no reaction of its own.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Handler:
 
 
 def behaviors(context: Context) -> tuple[tuple[Node, BehaviorSource], ...]:
-    """Return every node that names a behaviour, with what is known of it; each file read once."""
+    """Return every node that names a behavior, with its source; each file is read once."""
     read: dict[tuple[str, Path], BehaviorSource] = {}
     found = []
     for node in context.system.nodes:
@@ -59,14 +59,14 @@ def behaviors(context: Context) -> tuple[tuple[Node, BehaviorSource], ...]:
 
 
 def complete_behaviors(context: Context) -> Iterator[tuple[Node, BehaviorSource]]:
-    """Yield the nodes whose behaviour is known down to its last method."""
+    """Yield the nodes whose behavior is known completely, with its source."""
     for node, source in context.once(behaviors):
         if source.class_found and source.complete and node.complete:
             yield node, source
 
 
 def handlers(node: Node) -> Iterator[Handler]:
-    """Yield the handlers that the ports and timers of a node may have."""
+    """Yield the handlers for the ports and timers of a node."""
     for port in node.ports:
         arguments = _ARGUMENTS.get(port.kind)
         if arguments is None:
@@ -86,5 +86,43 @@ def _is_needed(port: Port) -> bool:
 
 
 def _is_readable(reference: BehaviorReference) -> bool:
-    """Say whether there is something to look for; no colon is the schema's to refuse."""
-    return bool(reference.class_name) and not is_opaque(reference.text.value)
+    """Return whether the class can be looked up; the schema reports a missing colon."""
+    return bool(reference.class_name) and not is_unresolved(reference.text.value)
+
+
+_PREFIXES = ("on_", "accept_")
+
+
+def unbound_handlers(node: Node, source: BehaviorSource) -> list[Method]:
+    """Return the methods called ``on_...`` or ``accept_...`` that nothing of the node calls."""
+    called = {handler.name for handler in handlers(node)} | GENERAL_HANDLERS.keys()
+    return [
+        method
+        for method in source.methods
+        if method.name.startswith(_PREFIXES) and method.name not in called
+    ]
+
+
+def calls_of(source: BehaviorSource, method: Method) -> Iterator[Call]:
+    """Yield the calls of ``method``, and those of the methods of its class that it calls."""
+    for reached in _reached(source, method):
+        yield from reached.calls
+
+
+def escaping_publishers(source: BehaviorSource) -> frozenset[str]:
+    """Return the publishers that the behavior passes on or stores; their uses are unknown."""
+    return frozenset(port for method in source.methods for port in method.publishing.passed_on)
+
+
+def _reached(source: BehaviorSource, method: Method) -> Iterator[Method]:
+    pending, seen = [method], {method.name}
+    while pending:
+        current = pending.pop()
+        yield current
+        for call in current.calls:
+            name = call.name.removeprefix("self.")
+            is_own = call.name.startswith("self.") and not call.deferred
+            callee = source.method(name) if is_own else None
+            if callee is not None and name not in seen:
+                seen.add(name)
+                pending.append(callee)

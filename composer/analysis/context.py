@@ -1,4 +1,4 @@
-"""What a check may look at, each question worked out once for all checks of a run."""
+"""The input of the rules, with a cache for what several rules compute."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _DEFINITIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """A system, and what there is to hold it against.
+    """A system, and the interfaces and node types it can refer to.
 
-    ``refused`` are the places of the errors that earlier stages found: what they stand in came into
-    the model in part or not at all. With ``is_partial`` that may be whole nodes, profiles and
-    executors, so that no name is known to be wrong.
+    ``refused`` are the spans of the errors that earlier stages reported. What contains them is
+    missing from the model, entirely or in part. If ``is_partial``, whole nodes, profiles and
+    executors may be missing, so an unknown name may not be an error.
     """
 
     system: System
@@ -34,38 +34,38 @@ class Context:
     node_types: NodeTypes
     refused: tuple[Span, ...] = ()
     is_partial: bool = False
-    _answers: dict[Callable[[Context], Any], Any] = field(
+    _cache: dict[Callable[[Context], Any], Any] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
 
-    def once(self, question: Callable[[Context], T]) -> T:
-        """Return ``question(self)``, worked out by whichever check asks first."""
-        if question not in self._answers:
-            self._answers[question] = question(self)
-        answer: T = self._answers[question]
-        return answer
+    def once(self, compute: Callable[[Context], T]) -> T:
+        """Return ``compute(self)``, computed once per context."""
+        if compute not in self._cache:
+            self._cache[compute] = compute(self)
+        result: T = self._cache[compute]
+        return result
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Every topic, service and action whose name is known, with its ends."""
+        """Every topic, service and action whose name is known, with its endpoints."""
         return self.once(_channels)
 
     def interface(self, port: Port) -> Message | Service | Action | None:
-        """Return the definition of a port's type; None when it is unknown or of another kind."""
+        """Return the definition of a port's type; None if it is unknown or of another kind."""
         found = self.interfaces.find(port.interface.value)
         return found if isinstance(found, _DEFINITIONS[port.kind.channel]) else None
 
 
-def is_opaque(text: str) -> bool:
-    """Say whether ``text`` holds a variable that has no value yet, so that nobody may judge it."""
+def is_unresolved(text: str) -> bool:
+    """Return whether ``text`` contains a variable without a value, so it cannot be checked."""
     return "${" in text
 
 
-def place(span: Span) -> tuple[str, int, int]:
-    """Return what tells one place from another, across files."""
+def location(span: Span) -> tuple[str, int, int]:
+    """Return the file, line and column of ``span``."""
     return (span.file.path, span.line, span.column)
 
 
 def _channels(context: Context) -> tuple[Channel, ...]:
     found = channels(context.system.nodes)
-    return tuple(channel for channel in found if not is_opaque(channel.name))
+    return tuple(channel for channel in found if not is_unresolved(channel.name))

@@ -1,13 +1,18 @@
-"""What makes a node publish: which timers and subscriptions, in YAML and in its behaviour."""
+"""Which callbacks of a node publish, according to its YAML and its behavior."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from composer.analysis.behaviors import GENERAL_HANDLERS, behaviors, handlers
+from composer.analysis.behaviors import (
+    GENERAL_HANDLERS,
+    behaviors,
+    calls_of,
+    escaping_publishers,
+    handlers,
+)
 from composer.analysis.context import Context
-from composer.analysis.python_calls import calls_of, handed_on
 from composer.behavior_source import BehaviorSource, Call, published_port
 from composer.model import Node, Port, PortKind, Reaction, Timer
 
@@ -16,20 +21,20 @@ _ENTRIES = ("on_", "accept_")
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """The callback that publishes: of a timer, or of a port."""
+    """A callback that publishes: that of a timer or of a port."""
 
     timer: Timer | None = None
     port: Port | None = None
 
 
-#: For each node and publisher the callbacks that publish through it; what nobody knows is missing.
+#: For each node and publisher, the callbacks that publish through it; unknown ones are left out.
 Causes = Mapping[tuple[str, str], tuple[Cause, ...]]
 
 
 def causes(context: Context) -> Causes:
-    """Return what makes every publisher publish, where that is known.
+    """Return the causes of every publisher for which they are known.
 
-    What is published once, at a transition of the node's lifecycle, is left out of account.
+    Messages that are published once, in a lifecycle transition, are ignored.
     """
     sources = {node.name.value: source for node, source in context.once(behaviors)}
     published: dict[int, Mapping[str, frozenset[str]]] = {}
@@ -56,7 +61,7 @@ def _of_node(
         port.name.value: [] for port in node.ports_of(PortKind.PUBLISHER)
     }
     bound = {handler.name for handler in handlers(node)}
-    # Neither a handler nor a transition: a thread, perhaps, which publishes when it likes.
+    # Neither a handler nor a transition: it may publish at any time, for example from a thread.
     for name, ports in by_method.items():
         if name not in bound and name not in GENERAL_HANDLERS:
             for port_name in ports:
@@ -72,7 +77,7 @@ def _of_node(
 def _callbacks(
     node: Node, by_method: Mapping[str, frozenset[str]]
 ) -> Iterator[tuple[Cause, frozenset[str]]]:
-    """Yield every callback with the ports that it publishes through."""
+    """Yield every callback with the names of the ports that it publishes through."""
     for timer in node.timers:
         reactions = [timer.reaction] if timer.reaction is not None else []
         ports = _published(reactions) | by_method.get(f"on_{timer.name}", frozenset())
@@ -88,13 +93,13 @@ def _published(reactions: list[Reaction]) -> frozenset[str]:
 
 
 def _published_by_method(source: BehaviorSource) -> Mapping[str, frozenset[str]]:
-    """Return the publishers that the methods of a behaviour use.
+    """Return the publishers that the methods of a behavior use.
 
-    A method that handlers lead to is not listed on its own. What a function within a method
-    publishes, or who got hold of a publisher, is listed under no name: it may run at any time.
+    Methods called by handlers are not listed separately. Publishers used by nested functions,
+    passed on or stored are listed under the name "", because they may publish at any time.
     """
     calls = {method.name: tuple(calls_of(source, method)) for method in source.methods}
-    handled = {
+    called_by_handlers = {
         call.name.removeprefix("self.")
         for name, found in calls.items()
         if name.startswith(_ENTRIES)
@@ -104,14 +109,14 @@ def _published_by_method(source: BehaviorSource) -> Mapping[str, frozenset[str]]
     direct = {
         name: _ports_in(call for call in found if not call.deferred)
         for name, found in calls.items()
-        if name.startswith(_ENTRIES) or name not in handled
+        if name.startswith(_ENTRIES) or name not in called_by_handlers
     }
     deferred = _ports_in(call for found in calls.values() for call in found if call.deferred)
-    whenever = deferred | handed_on(source)
+    whenever = deferred | escaping_publishers(source)
     return {name: ports for name, ports in {**direct, "": whenever}.items() if ports}
 
 
 def _ports_in(calls: Iterable[Call]) -> frozenset[str]:
-    """Return the ports of calls such as ``self.publishers.status.publish``."""
+    """Return the ports of calls like ``self.publishers.status.publish``."""
     found = (published_port(call.name) for call in calls)
     return frozenset(port for port in found if port is not None)

@@ -1,6 +1,6 @@
-"""How often messages come: publishers, topics and callbacks, as far as the declaration tells.
+"""The rates of publishers, topics and callbacks, as far as the declaration determines them.
 
-A rate is the highest there can be: what depends on a condition may come less often.
+A rate is a maximum: messages that depend on a condition may be less frequent.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from composer.model import ChannelKind, Node, PortKind, PortOfNode
 
 
 def timed_publishers(context: Context) -> tuple[tuple[PortOfNode, float], ...]:
-    """Return every publisher that only timers publish through, with their shortest period.
+    """Return every publisher that only timers publish through, with the shortest period.
 
     The period is in seconds.
     """
@@ -33,21 +33,21 @@ def timed_publishers(context: Context) -> tuple[tuple[PortOfNode, float], ...]:
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """Rates in hertz; None where they are not known."""
+    """Rates in hertz; None if unknown."""
 
     causes: Causes
     topics: Mapping[str, float | None]
 
     def topic_hz(self, name: str) -> float | None:
-        """Return how many messages a second come on a topic."""
+        """Return the rate of messages on a topic."""
         return self.topics.get(name)
 
-    def publisher_hz(self, end: PortOfNode) -> float | None:
-        """Return how many messages a second a publisher sends."""
-        return _publisher_hz(self.causes, self.topics, end)
+    def publisher_hz(self, endpoint: PortOfNode) -> float | None:
+        """Return the rate of messages from a publisher."""
+        return _publisher_hz(self.causes, self.topics, endpoint)
 
     def callback_hz(self, node: Node, cause: Cause) -> float | None:
-        """Return how often the callback of a timer or a subscription runs."""
+        """Return the rate of the callback of a timer or a subscription."""
         return _callback_hz(self.topics, node, cause)
 
 
@@ -59,50 +59,54 @@ def rates(context: Context) -> Rates:
         for channel in context.channels
         if channel.kind is ChannelKind.TOPIC
         and channel.sources
-        and not any(end.port.external for end in channel.sinks)  # others publish there, too
+        and not any(
+            endpoint.port.external for endpoint in channel.sinks
+        )  # external nodes publish there, too
     }
     topics: dict[str, float | None] = {}
     for name in _in_order_of_cause(known, publishers):
-        topics[name] = _total(_publisher_hz(known, topics, end) for end in publishers[name])
+        topics[name] = _total(
+            _publisher_hz(known, topics, endpoint) for endpoint in publishers[name]
+        )
     return Rates(known, topics)
 
 
 def _in_order_of_cause(
     known: Causes, publishers: Mapping[str, tuple[PortOfNode, ...]]
 ) -> Iterator[str]:
-    """Yield the topics, each behind those whose messages make others on it.
+    """Yield the topics, each after those whose messages cause messages on it.
 
-    What goes round in a circle is left out: it has no rate.
+    Topics in a cycle are left out: they have no rate.
     """
-    waits: dict[str, int] = {}
-    makes: dict[str, list[str]] = {}
+    missing_causes: dict[str, int] = {}
+    effects: dict[str, list[str]] = {}
     for name, ends in publishers.items():
-        before = {
+        causing = {
             cause.port.full_name
-            for end in ends
-            for cause in known.get(_key(end), ())
+            for endpoint in ends
+            for cause in known.get(_key(endpoint), ())
             if cause.port is not None and cause.port.full_name in publishers
         }
-        waits[name] = len(before)
-        for other in before:
-            makes.setdefault(other, []).append(name)
-    ready = [name for name, count in waits.items() if not count]
+        missing_causes[name] = len(causing)
+        for other in causing:
+            effects.setdefault(other, []).append(name)
+    ready = [name for name, count in missing_causes.items() if not count]
     while ready:
         name = ready.pop()
         yield name
-        for made in makes.get(name, ()):
-            waits[made] -= 1
-            if not waits[made]:
-                ready.append(made)
+        for effect in effects.get(name, ()):
+            missing_causes[effect] -= 1
+            if not missing_causes[effect]:
+                ready.append(effect)
 
 
 def _publisher_hz(
-    known: Causes, topics: Mapping[str, float | None], end: PortOfNode
+    known: Causes, topics: Mapping[str, float | None], endpoint: PortOfNode
 ) -> float | None:
-    found = known.get(_key(end))
+    found = known.get(_key(endpoint))
     if found is None:
         return None
-    return _total(_callback_hz(topics, end.node, cause) for cause in found)
+    return _total(_callback_hz(topics, endpoint.node, cause) for cause in found)
 
 
 def _callback_hz(topics: Mapping[str, float | None], node: Node, cause: Cause) -> float | None:
@@ -116,7 +120,7 @@ def _callback_hz(topics: Mapping[str, float | None], node: Node, cause: Cause) -
 
 
 def _total(found: Iterable[float | None]) -> float | None:
-    """Return the sum; None when a part of it is not known."""
+    """Return the sum; None if any term is unknown."""
     total = 0.0
     for rate_hz in found:
         if rate_hz is None:
@@ -125,5 +129,5 @@ def _total(found: Iterable[float | None]) -> float | None:
     return total
 
 
-def _key(end: PortOfNode) -> tuple[str, str]:
-    return end.node.name.value, end.port.name.value
+def _key(endpoint: PortOfNode) -> tuple[str, str]:
+    return endpoint.node.name.value, endpoint.port.name.value

@@ -1,13 +1,12 @@
-"""Python behaviours read as syntax: what a class has is known without importing anything.
+"""Python behaviors, parsed instead of imported.
 
-Validating must not run user code, and must work where ROS is not installed. So classes, methods
-and their arguments are read from the text; what syntax cannot tell (a base class out of reach, a
-class decorator, ``__getattr__``) is said to be unknown, and nobody may then claim that something
-is missing.
+Validation must not run user code, and must work without ROS. So classes, methods and arguments are
+read from the syntax tree. What syntax does not determine (a base class in another package, a class
+decorator, ``__getattr__``) is marked as unknown, and rules do not report it as missing.
 """
 
-from composer.behavior_source.bodies import Call
-from composer.behavior_source.finding import BehaviorSource, find_behavior
+from composer.behavior_source.lookup import BehaviorSource, find_behavior
+from composer.behavior_source.method_body import Call
 from composer.behavior_source.publishing import published_port
 from composer.behavior_source.syntax import Method
 

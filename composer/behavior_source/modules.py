@@ -1,4 +1,4 @@
-"""Where the file of a Python module is, and its text, without importing it or its parents."""
+"""Finds and reads the file of a Python module, without importing it or its parents."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from composer.project import Project
 
 MAXIMUM_BYTES = 250_000
 
-#: Some of Python's codecs take time that grows with the square of the text, or are none for text.
+#: Other codecs of Python may take quadratic time, or do not encode text.
 _ENCODINGS = frozenset({"utf-8", "utf-8-sig", "ascii", "us-ascii", "iso-8859-1", "iso-8859-15"})
 
 
 class Unreadable(Exception):
-    """The file of a module cannot be read as Python; the text says why."""
+    """The file of a module cannot be read as Python; the message is the reason."""
 
 
 def module_file(module: str, folder: Path, project: Project) -> Path | None:
@@ -34,12 +34,12 @@ def module_file(module: str, folder: Path, project: Project) -> Path | None:
     for base in dict.fromkeys((folder, *project.node_folders)):
         found = _below(base, parts)
         if found is not None:
-            return _held(found, project)
+            return _checked(found, project)
     return _installed(parts)
 
 
 def is_compiled(module: str) -> bool:
-    """Say whether Python has ``module`` in a form without syntax to read: compiled or built in."""
+    """Return whether ``module`` exists without Python source: compiled or built in."""
     parts = module.split(".")
     spec = _spec(parts[0]) if all(part.isidentifier() for part in parts) else None
     if spec is None or len(parts) == 1:
@@ -88,7 +88,7 @@ def _below(base: Path, parts: Sequence[str]) -> Path | None:
     return next((file for file in candidates if _exists(file)), None)
 
 
-def _held(path: Path, project: Project) -> Path:
+def _checked(path: Path, project: Project) -> Path:
     if not project.holds(path):
         raise Unreadable("is a symbolic link out of the project")
     return path
@@ -119,8 +119,8 @@ def _submodules(spec: importlib.machinery.ModuleSpec, parts: list[str]) -> Itera
 
 
 def _spec(name: str) -> importlib.machinery.ModuleSpec | None:
-    """Ask Python where a top-level module is: that looks at folders and imports nothing."""
+    """Return the spec of a top-level module, without importing it."""
     try:
         return importlib.util.find_spec(name)
-    except Exception:  # import hooks of installed packages may raise whatever they like
+    except Exception:  # import hooks of installed packages may raise anything
         return None

@@ -1,4 +1,4 @@
-"""To which ports a method publishes: on every call, and at all."""
+"""The ports that a method publishes to, on every call or at all."""
 
 from __future__ import annotations
 
@@ -7,38 +7,38 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from composer.behavior_source.bodies import Body, Function
+from composer.behavior_source.method_body import Body, Function
 
-#: What may end a method before its last statement.
-_WAYS_OUT = (ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Assert)
+#: Statements that may leave a method early.
+_EXITS = (ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Assert)
 _PUBLISHER = re.compile(r"self\.publishers\.(?P<port>\w+)(?P<rest>(\..+)?)")
 _PUBLISH = ".publish"
 
 
 @dataclass(frozen=True, slots=True)
-class Publishing:
+class PublisherUses:
     """Names of publishers, as in ``self.publishers.<name>.publish(...)``.
 
-    ``always`` are those that each call publishes to once, if nothing in it fails; ``somewhere``
-    are all that the method names. ``handed_on`` are those that it gives away or keeps: who gets
-    hold of one may publish whenever he likes.
+    ``always`` are those that each call publishes to exactly once unless it fails; ``anywhere`` are
+    all that the method names. ``passed_on`` are those that it passes on or stores: they may publish
+    at any time.
     """
 
     always: tuple[str, ...] = ()
-    somewhere: tuple[str, ...] = ()
-    handed_on: tuple[str, ...] = ()
+    anywhere: tuple[str, ...] = ()
+    passed_on: tuple[str, ...] = ()
 
 
-def publishing_of(function: Function, body: Body) -> Publishing:
-    """Return to what a method publishes, as far as its text tells."""
+def publisher_uses(function: Function, body: Body) -> PublisherUses:
+    """Return the publishers that a method uses."""
     named = [*body.names.values(), *(call.name for call in body.calls), *body.mentioned]
-    somewhere = tuple(dict.fromkeys(port for port, _ in _publishers(named)))
-    if not somewhere:
-        return Publishing()
-    return Publishing(
-        always=_once_each(_straight_on(function, body)),
-        somewhere=somewhere,
-        handed_on=tuple(
+    anywhere = tuple(dict.fromkeys(port for port, _ in _publishers(named)))
+    if not anywhere:
+        return PublisherUses()
+    return PublisherUses(
+        always=_once_each(_unconditional(function, body)),
+        anywhere=anywhere,
+        passed_on=tuple(
             dict.fromkeys(
                 port for port, rest in _publishers(body.mentioned) if rest in {"", _PUBLISH}
             )
@@ -52,21 +52,21 @@ def published_port(name: str) -> str | None:
 
 
 def _publishers(names: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Yield the ports that names begin with, and what follows in the name."""
+    """Yield the ports in names of publishers, with the rest of the name."""
     for name in names:
         match = _PUBLISHER.fullmatch(name)
         if match is not None:
             yield match["port"], match["rest"]
 
 
-def _straight_on(function: Function, body: Body) -> Iterator[str]:
-    """Yield what statements of the method itself publish to, up to where it may end early."""
+def _unconditional(function: Function, body: Body) -> Iterator[str]:
+    """Yield the ports that unconditional statements publish to, up to the first possible exit."""
     for statement in function.body:
         if isinstance(statement, ast.Expr):
             name = _published(statement.value, body)
             if name is not None:
                 yield name
-        elif any(isinstance(inner, _WAYS_OUT) for inner in ast.walk(statement)):
+        elif any(isinstance(inner, _EXITS) for inner in ast.walk(statement)):
             return
 
 

@@ -1,4 +1,4 @@
-"""One Python file as syntax: its classes, their bases and methods, and what it imports."""
+"""The syntax of one Python file: its classes with their bases and methods, and its imports."""
 
 from __future__ import annotations
 
@@ -10,48 +10,47 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from composer.behavior_source.bodies import Call, Function, dotted, imported_names, read_body
+from composer.behavior_source.method_body import Call, Function, dotted, imported_names, read_body
 from composer.behavior_source.modules import Unreadable, read_text
-from composer.behavior_source.places import start_of
-from composer.behavior_source.publishing import Publishing, publishing_of
+from composer.behavior_source.publishing import PublisherUses, publisher_uses
+from composer.behavior_source.spans import start_span
 from composer.source import SourceFile, Span
 
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A method of a behaviour.
+    """A method of a behavior.
 
-    ``arguments`` are the names that can be given by position, without ``self``; the last
-    ``optional`` of them have defaults. ``known`` is false when a decorator or an assignment hides
-    the signature. ``calls`` is what it calls, ``publishing`` what it publishes to.
+    ``arguments`` are the positional arguments without ``self``; the last ``optional`` of them have
+    defaults. ``known`` is false if a decorator or an assignment hides the signature.
     """
 
     name: str
     span: Span = field(compare=False)
     arguments: tuple[str, ...] = ()
     optional: int = 0
-    variadic: bool = False  # takes *arguments
+    variadic: bool = False  # accepts *arguments
     keywords: tuple[str, ...] = ()  # keyword-only arguments without a default
     is_async: bool = False
     known: bool = True
     calls: tuple[Call, ...] = field(default=(), compare=False)
-    publishing: Publishing = field(default_factory=Publishing)
+    publishing: PublisherUses = field(default_factory=PublisherUses)
 
     def accepts(self, count: int) -> bool:
-        """Say whether it can be called with ``count`` arguments by position."""
+        """Return whether it can be called with ``count`` positional arguments."""
         if not self.known:
             return True
-        most = count if self.variadic else len(self.arguments)
-        return not self.keywords and len(self.arguments) - self.optional <= count <= most
+        maximum = count if self.variadic else len(self.arguments)
+        return not self.keywords and len(self.arguments) - self.optional <= count <= maximum
 
 
 @dataclass(frozen=True, slots=True)
 class Class:
-    """A class as it is written. ``dynamic`` is true when syntax does not tell all it has."""
+    """A class. ``dynamic`` is true if it may have members that its syntax does not show."""
 
     name: str
     span: Span
-    bases: tuple[str, ...]  # dotted, as written; "" for what is not a name
+    bases: tuple[str, ...]  # dotted, as written; "" for other expressions
     methods: tuple[Method, ...]
     dynamic: bool
 
@@ -67,21 +66,21 @@ class Import:
 
 @dataclass(frozen=True, slots=True)
 class Module:
-    """What a Python file defines and imports at its top."""
+    """The top-level definitions and imports of a Python file."""
 
     path: Path
     classes: dict[str, Class]
     imports: dict[str, Import]
     assigned: frozenset[str]
-    dynamic: bool  # it has names that syntax does not show
+    dynamic: bool  # it may have names that its syntax does not show
 
     def may_have(self, name: str) -> bool:
-        """Say whether ``name`` may be there without being a class statement of this file."""
+        """Return whether ``name`` may exist without a class statement in this file."""
         return self.dynamic or name in self.imports or name in self.assigned
 
 
 def read_module(path: Path, shown: str) -> Module:
-    """Read a Python file; ``shown`` is its path as people know it. Raises Unreadable."""
+    """Read a Python file; ``shown`` is its path in messages. Raises Unreadable."""
     try:
         status = path.stat()
     except OSError as error:
@@ -113,11 +112,11 @@ def _parse(text: str) -> list[ast.stmt]:
     except SyntaxError as error:
         raise Unreadable(f"is not Python: {error.msg} (line {error.lineno})") from None
     except (ValueError, RecursionError, MemoryError):
-        raise Unreadable("is not Python that can be read") from None
+        raise Unreadable("is not Python that can be parsed") from None
 
 
 def _top_level(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
-    """Yield the statements of a body, and those under an if, a try or a with."""
+    """Yield the statements of a body, including those in an if, a try or a with."""
     pending = list(body)[::-1]
     while pending:
         statement = pending.pop()
@@ -169,11 +168,11 @@ def _methods(statement: ast.stmt, names: Mapping[str, str], source: SourceFile) 
         yield _method(statement, names, source)
         return
     for target in _assigned(statement):
-        yield Method(target.id, start_of(target, len(target.id), source), known=False)
+        yield Method(target.id, start_span(target, len(target.id), source), known=False)
 
 
 def _assigned(statement: ast.stmt) -> Iterator[ast.Name]:
-    """Yield the names that a statement assigns a value to."""
+    """Yield the names that a statement assigns."""
     targets: list[ast.expr] = []
     if isinstance(statement, ast.Assign):
         targets = statement.targets
@@ -205,7 +204,7 @@ def _method(node: Function, names: Mapping[str, str], source: SourceFile) -> Met
         is_async=isinstance(node, ast.AsyncFunctionDef),
         known=decorators <= _TRANSPARENT and bool(positional or static),
         calls=body.calls,
-        publishing=publishing_of(node, body),
+        publishing=publisher_uses(node, body),
     )
 
 
@@ -213,12 +212,12 @@ _TRANSPARENT = frozenset({"staticmethod", "classmethod", "override", "typing.ove
 
 
 def _dotted(node: ast.expr) -> str:
-    """Return a dotted name as written; the subscript of ``Base[T]`` left out; "" for the rest."""
+    """Return a dotted name as written, without the subscript of ``Base[T]``; "" for other nodes."""
     return dotted(node.value if isinstance(node, ast.Subscript) else node)
 
 
 def _name_span(node: Function | ast.ClassDef, keyword: str, source: SourceFile) -> Span:
-    """Return the place of the name behind ``def`` or ``class``."""
-    span = start_of(node, len(node.name), source)
+    """Return the span of the name after ``def`` or ``class``."""
+    span = start_span(node, len(node.name), source)
     found = re.search(rf"{keyword}\s+({re.escape(node.name)})\b", source.line(span.line))
     return Span(source, span.line, found.start(1) + 1, span.length) if found else span

@@ -1,28 +1,28 @@
-"""Do the values fit? Types of field paths, of expressions and of templates, before anything runs.
+"""Static types of field paths, expressions and templates.
 
-How a check uses it::
+Example::
 
-    scope = {"message": definition, "count": INTEGER, "now": NUMBER, "node": TEXT,
+    scope = {"message": definition, "count": INTEGER, "now": NUMBER, "node": STRING,
              "parameters": {"rate_hz": parameter_type("double")},
              "state": {"last_s": type_of(0.0)}}
-    judge = Judge(context.interfaces, scope)
-    yield from judge.template(send.content, definition)   # publish, call, respond, result
-    yield from judge.text(reaction.log)                   # log: only the expressions in it
-    yield from judge.condition(reaction.when, span)       # when, accept: true or false
-    yield from judge.expression(expression, span)         # anything else
+    checker = FieldChecker(context.interfaces, scope)
+    yield from checker.template(send.content, definition)   # publish, call, respond, result
+    yield from checker.text(reaction.log)                   # log: checks only the expressions
+    yield from checker.condition(reaction.when, span)       # when, accept: true or false
+    yield from checker.expression(expression, span)         # anything else
 
-Each yields ``Problem(message, span, hint)``. A scope maps the names an expression may use to their
-types: a ``Message``, a ``FieldType``, a map of names to types, or ``ANYTHING`` where it is not
-known. What is not known is never a problem, and one mistake gives one problem.
+Each yields ``Problem(message, span, hint)``. A scope maps the names that an expression can use to
+their types: a ``Message``, a ``FieldType``, a map of names to types, or ``ANYTHING`` if the type is
+unknown. Unknown types never cause a problem, and one mistake causes one problem.
 """
 
-from composer.field_types.judge import Judge
+from composer.field_types.checker import FieldChecker
 from composer.field_types.types import (
     ANYTHING,
     BOOL,
     INTEGER,
     NUMBER,
-    TEXT,
+    STRING,
     Anything,
     PathProblem,
     Problem,
@@ -38,9 +38,9 @@ __all__ = [
     "BOOL",
     "INTEGER",
     "NUMBER",
-    "TEXT",
+    "STRING",
     "Anything",
-    "Judge",
+    "FieldChecker",
     "PathProblem",
     "Problem",
     "Scope",

@@ -1,4 +1,4 @@
-"""Whether a value written in YAML fits a field."""
+"""Checks constants in YAML against the types of message fields."""
 
 from __future__ import annotations
 
@@ -14,18 +14,20 @@ _LARGEST_SECONDS = 2**31
 def constant_problem(
     value: ScalarValue, type_: FieldType, interfaces: Interfaces
 ) -> tuple[str, str | None] | None:
-    """Return what keeps ``value`` from being put into a field, and a hint; None when it fits."""
+    """Return why ``value`` does not fit a field, and a hint; None if it fits."""
     if type_.is_array:
-        return f"{_what(value)} where {type_} is expected", "write a list: [...]"
+        return f"{_describe(value)} where {type_} is expected", "write a list: [...]"
     if not type_.is_primitive:
         return _message_problem(value, type_, interfaces)
     if type_.name == "bool":
         fits = isinstance(value, bool)
-        return None if fits else (f"{_what(value)} where bool is expected", "write true or false")
+        return (
+            None if fits else (f"{_describe(value)} where bool is expected", "write true or false")
+        )
     if type_.name in TEXTS:
-        return _text_problem(value, type_)
+        return _string_problem(value, type_)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        return f"{_what(value)} where {type_} is expected", None
+        return f"{_describe(value)} where {type_} is expected", None
     return (
         _integer_problem(value, type_)
         if type_.name in INTEGER_RANGES
@@ -42,15 +44,15 @@ def _message_problem(
     definition = interfaces.message(type_.name)
     names = ", ".join(definition.field_names) if definition is not None else ""
     hint = f"write a map of its fields: {names}" if names else "write a map of its fields"
-    return f"{_what(value)} where {type_} is expected", hint
+    return f"{_describe(value)} where {type_} is expected", hint
 
 
-def _text_problem(value: ScalarValue, type_: FieldType) -> tuple[str, str | None] | None:
+def _string_problem(value: ScalarValue, type_: FieldType) -> tuple[str, str | None] | None:
     if not isinstance(value, str):
         hint = f'write it in quotes: "{value}"' if value is not None else None
-        return f"{_what(value)} where {type_} is expected", hint
+        return f"{_describe(value)} where {type_} is expected", hint
     if type_.string_bound is not None and len(value) > type_.string_bound:
-        return f"a text of {len(value)} characters does not fit {type_}", None
+        return f"a string of {len(value)} characters does not fit {type_}", None
     return None
 
 
@@ -58,9 +60,9 @@ def _integer_problem(value: int | float, type_: FieldType) -> tuple[str, str | N
     low, high = INTEGER_RANGES[type_.name]
     if isinstance(value, float):
         hint = f"write {int(value)}" if value.is_integer() else None
-        return f"{value} is not an integer, as {type_} is", hint
+        return f"{type_} must be an integer, not {value}", hint
     if not low <= value <= high:
-        return f"{value} is outside the range of {type_}", f"{low} to {high} is allowed"
+        return f"{value} is outside the range of {type_}", f"allowed: {low} to {high}"
     return None
 
 
@@ -70,13 +72,13 @@ def _float_problem(value: int | float, type_: FieldType) -> tuple[str, str | Non
     return None
 
 
-def _what(value: ScalarValue) -> str:
+def _describe(value: ScalarValue) -> str:
     match value:
         case None:
-            return "nothing"
+            return "null"
         case bool():
             return "true" if value else "false"
         case str():
-            return f"the text '{shown(value)}'"
+            return f"the string '{shown(value)}'"
         case _:
             return f"the number {value}"

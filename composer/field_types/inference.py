@@ -1,4 +1,4 @@
-"""The type of an expression's value, worked out from its syntax and the types of the names."""
+"""Type inference for expressions, from their syntax and the types of the names in scope."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from composer.field_types.types import (
     BOOL,
     INTEGER,
     NUMBER,
-    TEXT,
+    STRING,
     PathProblem,
     Scope,
     ValueType,
@@ -24,7 +24,7 @@ from composer.field_types.types import (
     is_bool,
     is_integer,
     is_number,
-    is_text,
+    is_string,
     resolve_path,
 )
 from composer.interfaces import FieldType, Interfaces
@@ -33,13 +33,13 @@ _CONVERSIONS: Mapping[str, ValueType] = {
     "bool": BOOL,
     "float": NUMBER,
     "int": INTEGER,
-    "str": TEXT,
+    "str": STRING,
 }
 
 
 @dataclass(frozen=True, slots=True)
-class Complaint:
-    """What is wrong with a part of an expression, in characters of its source."""
+class ExpressionProblem:
+    """A problem with a part of an expression; offset and length are in characters."""
 
     message: str
     offset: int
@@ -50,19 +50,19 @@ class Complaint:
 
 @dataclass(slots=True)
 class Inference:
-    """The type of one expression's value, and what was found wrong on the way to it."""
+    """The state of the inference for one expression."""
 
     interfaces: Interfaces
     scope: Scope
-    complaints: list[Complaint] = field(default_factory=list)
+    problems: list[ExpressionProblem] = field(default_factory=list)
 
 
 def infer(
     expression: Expression, scope: Scope, interfaces: Interfaces
-) -> tuple[ValueType, list[Complaint]]:
-    """Return the type of the expression's value, and all that cannot work in it."""
+) -> tuple[ValueType, list[ExpressionProblem]]:
+    """Return the type of the expression's value, and the problems in the expression."""
     inference = Inference(interfaces, scope)
-    return _infer(expression.tree, inference), inference.complaints
+    return _infer(expression.tree, inference), inference.problems
 
 
 def _infer(node: ast.expr, inference: Inference) -> ValueType:
@@ -78,7 +78,7 @@ def _constant(node: ast.Constant, _: Inference) -> ValueType:
         case float():
             return NUMBER
         case _:
-            return TEXT
+            return STRING
 
 
 def _name(node: ast.Name, inference: Inference) -> ValueType:
@@ -91,22 +91,22 @@ def _path(node: ast.expr, inference: Inference) -> ValueType:
     path = path_of(node)
     if path.root not in inference.scope:
         hint = suggestion(path.root, inference.scope)
-        message = f"there is no '{path.root}' here"
-        inference.complaints.append(
-            Complaint(message, path.offset, len(path.root), hint, missing=True)
+        message = f"name '{path.root}' is not available here"
+        inference.problems.append(
+            ExpressionProblem(message, path.offset, len(path.root), hint, missing=True)
         )
         return ANYTHING
     found = resolve_path(inference.scope[path.root], path.parts[1:], inference.interfaces)
     if isinstance(found, PathProblem):
         offset, length = _part(path, found.index + 1)
-        complaint = Complaint(found.message, offset, length, found.hint, missing=True)
-        inference.complaints.append(complaint)
+        problem = ExpressionProblem(found.message, offset, length, found.hint, missing=True)
+        inference.problems.append(problem)
         return ANYTHING
     return found
 
 
 def _part(path: FieldPath, index: int) -> tuple[int, int]:
-    """Return offset and length of one part of a path; of all of it where it has spaces in it."""
+    """Return offset and length of one part of a path; of the whole path if it contains spaces."""
     if len(str(path)) != path.length:
         return path.offset, path.length
     before = len(str(FieldPath(path.parts[:index], 0, 0)))
@@ -130,16 +130,16 @@ def _unary(node: ast.UnaryOp, inference: Inference) -> ValueType:
 
 
 def _number(node: ast.expr, inference: Inference) -> ValueType:
-    """Return the type of an operand, which must be a number."""
+    """Return the type of an operand, and report it unless it is a number."""
     found = _infer(node, inference)
     if found is ANYTHING or is_number(found):
         return found
     hint = None
-    if is_text(found):
-        hint = "use float(...), or several {...} in a text to join texts"
+    if is_string(found):
+        hint = "use float(...); to join strings, write several {...} in one string"
     elif is_bool(found):
         hint = "use int(...)"
-    return _complain(node, inference, f"{described(found)} where a number is expected", hint)
+    return _report(node, inference, f"{described(found)} where a number is expected", hint)
 
 
 def _common_number(types: list[ValueType]) -> ValueType:
@@ -173,8 +173,8 @@ def _comparison(node: ast.Compare, inference: Inference) -> ValueType:
         if len(kinds) > 1:
             message = f"{described(left)} and {described(right)} are never equal"
             if not isinstance(operator, ast.Eq | ast.NotEq):
-                message = f"{described(left)} and {described(right)} have no order"
-            _complain(right_node, inference, message)
+                message = f"{described(left)} and {described(right)} cannot be ordered"
+            _report(right_node, inference, message)
     return BOOL
 
 
@@ -183,12 +183,12 @@ def _comparable(node: ast.expr, inference: Inference) -> ValueType:
     if found is ANYTHING or _kind(found):
         return found
     hint = "compare its fields or elements"
-    return _complain(node, inference, f"{described(found)} cannot be compared", hint)
+    return _report(node, inference, f"{described(found)} cannot be compared", hint)
 
 
 def _kind(type_: ValueType) -> str:
-    """Return number, text or bool; nothing where the type is none of them or not known."""
-    kinds = (("number", is_number), ("text", is_text), ("bool", is_bool))
+    """Return "number", "string" or "bool"; "" for other and unknown types."""
+    kinds = (("number", is_number), ("string", is_string), ("bool", is_bool))
     return next((kind for kind, belongs in kinds if belongs(type_)), "")
 
 
@@ -196,17 +196,17 @@ def _membership(node: ast.Compare, inference: Inference) -> None:
     item = _comparable(node.left, inference)
     container = node.comparators[0]
     if isinstance(container, ast.Tuple | ast.List):
-        kinds = {_kind(_literal(element, inference)) for element in container.elts}
+        kinds = {_kind(_element_type(element, inference)) for element in container.elts}
         if _kind(item) and _kind(item) not in kinds:
-            _complain(node.left, inference, f"{described(item)} is never in this list")
+            _report(node.left, inference, f"{described(item)} is never in this list")
         return
     found = _infer(container, inference)
-    if found is ANYTHING or is_text(found) or is_array(found):
+    if found is ANYTHING or is_string(found) or is_array(found):
         return
-    _complain(container, inference, f"{described(found)} is neither a list nor a text")
+    _report(container, inference, f"{described(found)} is neither a list nor a string")
 
 
-def _literal(node: ast.expr, inference: Inference) -> ValueType:
+def _element_type(node: ast.expr, inference: Inference) -> ValueType:
     return _infer(node.operand if isinstance(node, ast.UnaryOp) else node, inference)
 
 
@@ -217,7 +217,7 @@ def _call(node: ast.Call, inference: Inference) -> ValueType:
     if name in _CONVERSIONS:
         return _conversion(name, node.args[0], inference)
     if name in ("min", "max") and len(node.args) == 1:
-        return _extreme_of_list(node.args[0], inference)
+        return _extremum_of_list(node.args[0], inference)
     arguments = [_number(argument, inference) for argument in node.args]
     if name in ("abs", "clamp", "min", "max"):
         return _common_number(arguments)
@@ -228,34 +228,34 @@ def _call(node: ast.Call, inference: Inference) -> ValueType:
 
 def _length(argument: ast.expr, inference: Inference) -> ValueType:
     found = _infer(argument, inference)
-    if not (found is ANYTHING or is_text(found) or is_array(found)):
-        _complain(argument, inference, f"{described(found)} has no length")
+    if not (found is ANYTHING or is_string(found) or is_array(found)):
+        _report(argument, inference, f"{described(found)} has no length")
     return INTEGER
 
 
 def _conversion(name: str, argument: ast.expr, inference: Inference) -> ValueType:
     found = _comparable(argument, inference)
-    if name == "bool" and is_text(found):
-        _complain(argument, inference, f"{described(found)} where a number is expected")
+    if name == "bool" and is_string(found):
+        _report(argument, inference, f"{described(found)} where a number is expected")
     return _CONVERSIONS[name]
 
 
-def _extreme_of_list(argument: ast.expr, inference: Inference) -> ValueType:
+def _extremum_of_list(argument: ast.expr, inference: Inference) -> ValueType:
     found = _infer(argument, inference)
     if isinstance(found, FieldType) and found.is_array:
         if is_number(found.element):
             return _common_number([found.element])
     elif found is ANYTHING or is_number(found):
         return found
-    return _complain(argument, inference, f"{described(found)} where numbers are expected")
+    return _report(argument, inference, f"{described(found)} where numbers are expected")
 
 
-def _complain(
+def _report(
     node: ast.expr, inference: Inference, message: str, hint: str | None = None
 ) -> ValueType:
     end = node.end_col_offset if node.end_col_offset is not None else node.col_offset + 1
     length = end - node.col_offset
-    inference.complaints.append(Complaint(message, node.col_offset, length, hint))
+    inference.problems.append(ExpressionProblem(message, node.col_offset, length, hint))
     return ANYTHING
 
 

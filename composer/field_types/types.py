@@ -1,4 +1,4 @@
-"""The types of values, and what a field path leads to."""
+"""The types of values, and the types that field paths lead to."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from composer.tree import Plain
 
 @dataclass(frozen=True, slots=True)
 class Anything:
-    """The type of what is not known before it runs. It fits everywhere."""
+    """A type that is unknown before run time. It fits everywhere."""
 
 
 ANYTHING = Anything()
 BOOL = FieldType("bool")
 INTEGER = FieldType("int64")
 NUMBER = FieldType("float64")
-TEXT = FieldType("string")
+STRING = FieldType("string")
 
 ValueType: TypeAlias = "FieldType | Message | Mapping[str, ValueType] | Anything"
 Scope: TypeAlias = Mapping[str, ValueType]
@@ -40,7 +40,7 @@ _PARAMETER_TYPES: Mapping[str, FieldType] = {
     "bool": BOOL,
     "integer": INTEGER,
     "double": NUMBER,
-    "string": TEXT,
+    "string": STRING,
     "byte_array": FieldType("byte", is_array=True),
     "bool_array": FieldType("bool", is_array=True),
     "integer_array": FieldType("int64", is_array=True),
@@ -52,9 +52,10 @@ _SECONDS = frozenset(("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Dur
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What is wrong, where, and how to mend it.
+    """A problem, its span and a hint.
 
-    ``missing`` tells a field or element that is not there from a value that does not fit.
+    ``missing`` is true for a field or element that does not exist, false for a value that does not
+    fit.
     """
 
     message: str
@@ -65,7 +66,7 @@ class Problem:
 
 @dataclass(frozen=True, slots=True)
 class PathProblem:
-    """A path that leads nowhere: ``index`` is the part that is wrong."""
+    """A path that cannot be resolved; ``index`` is the invalid part."""
 
     message: str
     index: int
@@ -78,9 +79,9 @@ def parameter_type(declared: str) -> ValueType:
 
 
 def type_of(value: Plain) -> ValueType:
-    """Return the type of a value written in YAML: what a node's state starts with.
+    """Return the type of a value in YAML, such as the initial state of a node.
 
-    An integer may become 0.5 later; until then it fits wherever a number does.
+    An integer state may become 0.5 later; until then it fits wherever a number does.
     """
     match value:
         case bool():
@@ -90,7 +91,7 @@ def type_of(value: Plain) -> ValueType:
         case float():
             return NUMBER
         case str() if "${" not in value:
-            return TEXT
+            return STRING
         case dict():
             return {name: type_of(content) for name, content in value.items()}
         case _:
@@ -100,19 +101,19 @@ def type_of(value: Plain) -> ValueType:
 def resolve_path(
     root: ValueType, parts: tuple[str | int, ...], interfaces: Interfaces
 ) -> ValueType | PathProblem:
-    """Return the type of what ``parts`` lead to from ``root``, or where they go wrong."""
+    """Return the type that ``parts`` lead to from ``root``, or the problem."""
     found, index = root, 0
     while index < len(parts):
         name, taken = _next_name(found, parts[index:])
         step = _element(found, name) if isinstance(name, int) else _field(found, name, interfaces)
-        if isinstance(step, _Refused):
+        if isinstance(step, _Failure):
             return PathProblem(step.message, index, step.hint)
         found, index = step, index + taken
     return found
 
 
 def _next_name(type_: ValueType, parts: tuple[str | int, ...]) -> tuple[str | int, int]:
-    """Return the next field, key or index of a path, and how many parts it takes."""
+    """Return the next field, key or index of a path, and the number of its parts."""
     if not isinstance(type_, Mapping) or isinstance(parts[0], int):
         return parts[0], 1
     names = takewhile(lambda part: isinstance(part, str), parts)
@@ -120,7 +121,7 @@ def _next_name(type_: ValueType, parts: tuple[str | int, ...]) -> tuple[str | in
 
 
 def fields_of(type_: ValueType, interfaces: Interfaces) -> Message | None:
-    """Return the definition of a message type; None for all else, and for unknown messages."""
+    """Return the definition of a message type; None for other types and unknown messages."""
     if isinstance(type_, Message):
         return type_
     if isinstance(type_, FieldType) and not type_.is_array and not type_.is_primitive:
@@ -129,86 +130,84 @@ def fields_of(type_: ValueType, interfaces: Interfaces) -> Message | None:
 
 
 def is_number(type_: ValueType) -> bool:
-    """Say whether values of the type are numbers."""
+    """Return whether values of the type are numbers."""
     return is_integer(type_) or (
         isinstance(type_, FieldType) and not type_.is_array and type_.name in FLOATS
     )
 
 
 def is_integer(type_: ValueType) -> bool:
-    """Say whether values of the type are integers."""
+    """Return whether values of the type are integers."""
     return isinstance(type_, FieldType) and not type_.is_array and type_.name in INTEGER_RANGES
 
 
-def is_text(type_: ValueType) -> bool:
-    """Say whether values of the type are texts."""
+def is_string(type_: ValueType) -> bool:
+    """Return whether values of the type are strings."""
     return isinstance(type_, FieldType) and not type_.is_array and type_.name in TEXTS
 
 
 def is_bool(type_: ValueType) -> bool:
-    """Say whether values of the type are true or false."""
+    """Return whether values of the type are bools."""
     return isinstance(type_, FieldType) and not type_.is_array and type_.name == "bool"
 
 
 def is_array(type_: ValueType) -> bool:
-    """Say whether values of the type are lists."""
+    """Return whether values of the type are lists."""
     return isinstance(type_, FieldType) and type_.is_array
 
 
 def is_seconds(type_: ValueType) -> bool:
-    """Say whether a number put there means seconds: Time and Duration."""
+    """Return whether a number is converted to it as seconds: Time and Duration."""
     return isinstance(type_, FieldType) and not type_.is_array and type_.name in _SECONDS
 
 
 def described(type_: ValueType) -> str:
-    """Return how a message to people speaks of the type."""
+    """Return the name of the type in messages."""
     match type_:
         case Message(name=name):
             return name
         case FieldType():
             return str(type_)
         case Anything():
-            return "of unknown type"
+            return "unknown type"
         case _:
             return "a map"
 
 
 @dataclass(frozen=True, slots=True)
-class _Refused:
+class _Failure:
     message: str
     hint: str | None = None
 
 
-def _field(type_: ValueType, name: str, interfaces: Interfaces) -> ValueType | _Refused:
+def _field(type_: ValueType, name: str, interfaces: Interfaces) -> ValueType | _Failure:
     if isinstance(type_, Mapping):
         found = type_.get(name)
         return (
             found
             if found is not None
-            else _Refused(f"there is no '{name}'", suggestion(name, type_))
+            else _Failure(f"'{name}' does not exist", suggestion(name, type_))
         )
     if isinstance(type_, FieldType) and type_.is_array:
-        return _Refused(
-            f"{type_} has no field '{name}'", "it is a list: name an element, as in [0]"
-        )
+        return _Failure(f"{type_} has no field '{name}'", "it is a list: use an index, as in [0]")
     if isinstance(type_, FieldType) and type_.is_primitive:
-        return _Refused(f"{type_} has no field '{name}'", "it is a value, not a message")
+        return _Failure(f"{type_} has no field '{name}'", "it is a value, not a message")
     message = fields_of(type_, interfaces)
-    if message is None:  # not known, or a message nobody defines
+    if message is None:  # an unknown type or message
         return ANYTHING
     field = message.field(name)
     if field is not None:
         return field.type
     hint = suggestion(name, message.field_names)
-    return _Refused(f"{message.name} has no field '{name}'", hint)
+    return _Failure(f"{message.name} has no field '{name}'", hint)
 
 
-def _element(type_: ValueType, index: int) -> ValueType | _Refused:
+def _element(type_: ValueType, index: int) -> ValueType | _Failure:
     if isinstance(type_, Anything):
         return ANYTHING
     if not isinstance(type_, FieldType) or not type_.is_array:
-        return _Refused(f"{described(type_)} has no elements")
+        return _Failure(f"{described(type_)} has no elements")
     limit = type_.array_size if type_.array_size is not None else type_.array_bound
     if limit is not None and not -limit <= index < limit:
-        return _Refused(f"there is no element {index} in {type_}")
+        return _Failure(f"{type_} has no element {index}")
     return type_.element

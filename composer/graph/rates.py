@@ -17,7 +17,7 @@ def timer_rate_hz(node: Node, timer: Timer) -> float | None:
 def publishing_rates_hz(node: Node) -> dict[str, float]:
     """Return, by port, the rate of the one timer that publishes to it each time it fires.
 
-    What a behaviour does is read from its text. Ports are left out where it depends on a
+    What a behavior does is read from its text. Ports are left out where it depends on a
     condition, or where several timers or anything else publish to them.
     """
     handlers = _handlers(node)
@@ -25,7 +25,7 @@ def publishing_rates_hz(node: Node) -> dict[str, float]:
     for port in node.ports_of(PortKind.PUBLISHER):
         name = port.name.value
         timers = [timer for timer in node.timers if _always_publishes(timer, name, handlers)]
-        elsewhere = sum(name in method.publishing.somewhere for method in handlers.values())
+        elsewhere = sum(name in method.publishing.anywhere for method in handlers.values())
         by_handler = sum(timer.reaction is None for timer in timers)
         if len(timers) != 1 or elsewhere != by_handler or _is_answered_with(node, name):
             continue
@@ -36,7 +36,7 @@ def publishing_rates_hz(node: Node) -> dict[str, float]:
 
 
 def _is_answered_with(node: Node, port: str) -> bool:
-    """Say whether something that comes in makes the node publish to the port."""
+    """Return whether something that comes in makes the node publish to the port."""
     return any(
         send.port.value == port
         for other in node.ports

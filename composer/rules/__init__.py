@@ -1,8 +1,8 @@
-"""What can be wrong with a system: one rule, one file.
+"""The rules: one rule, one file.
 
-A module here that has a function ``check`` is a rule: it is found by being here. It has ``RULE``
-too, with all that people are told of it (CONTRIBUTING says how to add one). A check looks at one
-thing only, and stays silent where what it needs is itself wrong: that finding is another rule's.
+Every module here with a function ``check`` is a rule and is found automatically. Its ``RULE`` holds
+the documentation (see CONTRIBUTING for how to add a rule). A check reports one kind of problem and
+skips input that is itself invalid, because another rule reports that.
 """
 
 from __future__ import annotations
@@ -12,30 +12,30 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-from composer.analysis.context import Context, place
-from composer.analysis.words import with_short_echoes
+from composer.analysis.context import Context, location
+from composer.analysis.formatting import with_short_values
 from composer.diagnostics import Diagnostic, in_order
 
 Check = Callable[[Context], Iterator[Diagnostic]]
 
 
 def run_checks(context: Context) -> list[Diagnostic]:
-    """Return every finding of every rule, sorted by place.
+    """Return the diagnostics of all rules, sorted by location.
 
-    What an earlier stage refused is not found fault with again.
+    Locations that an earlier stage reported are skipped.
     """
-    refused = {place(span) for span in context.refused}
+    refused = {location(span) for span in context.refused}
     return in_order(
-        with_short_echoes(finding)
+        with_short_values(diagnostic)
         for check in all_checks()
-        for finding in check(context)
-        if place(finding.primary) not in refused
+        for diagnostic in check(context)
+        if location(diagnostic.primary) not in refused
     )
 
 
 @cache
 def all_checks() -> tuple[Check, ...]:
-    """Return the ``check`` function of every rule, by the names of their modules."""
+    """Return the ``check`` function of every rule, sorted by module name."""
     names = sorted(path.stem for path in Path(__file__).parent.glob("[a-z]*.py"))
     modules = (import_module(f"{__name__}.{name}") for name in names)
     return tuple(module.check for module in modules if hasattr(module, "check"))

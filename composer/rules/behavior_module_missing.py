@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.behaviors import behaviors
 from composer.analysis.context import Context
-from composer.analysis.places import part_of
+from composer.analysis.spans import part_of
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(

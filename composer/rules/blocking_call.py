@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import GENERAL_HANDLERS, behaviors, handlers
+from composer.analysis.behaviors import GENERAL_HANDLERS, behaviors, calls_of, handlers
 from composer.analysis.context import Context
-from composer.analysis.python_calls import calls_of
 from composer.behavior_source import BehaviorSource, Call
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.source import Span

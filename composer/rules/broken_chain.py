@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 
-from composer.analysis.chains import inputs
+from composer.analysis.chains import input_ports
 from composer.analysis.context import Context
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import PortKind
@@ -53,7 +53,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 continue
             if node is None or not node.complete or system.port(after) is None:
                 continue
-            if not any(inputs(node, port.full_name)):
+            if not any(input_ports(node, port.full_name)):
                 yield Diagnostic(
                     RULE,
                     f"node '{node.name}' does not subscribe to '{port.full_name}', "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.words import end_name
+from composer.analysis.formatting import port_name
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Channel, ChannelKind, PortOfNode
 from composer.model.dependencies import (
@@ -67,7 +67,8 @@ def _diagnostic(channel: Channel, client: PortOfNode, server: PortOfNode) -> Dia
     place = cause.node.span if cause is not None else server.port.name.span
     return Diagnostic(
         RULE,
-        f"'{end_name(client)}' starts before '{end_name(server)}', the server of '{channel.name}'",
+        f"'{port_name(client)}' starts before '{port_name(server)}', "
+        f"the server of '{channel.name}'",
         client.port.name.span,
         (Label(place, f"'{server.node.name}' starts later"),),
         f"make '{client.node.name}' depend on '{server.node.name}'",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
+from composer.analysis.formatting import number
 from composer.analysis.rates import timed_publishers
-from composer.analysis.words import number
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(
@@ -38,13 +38,13 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Compare offered deadlines with the periods of the publishing timers."""
-    for end, period_s in context.once(timed_publishers):
-        qos = end.port.qos
+    for endpoint, period_s in context.once(timed_publishers):
+        qos = endpoint.port.qos
         deadline_ms = qos.profile.deadline_ms
         if qos.known and deadline_ms is not None and deadline_ms < period_s * 1000.0:
             yield Diagnostic(
                 RULE,
-                f"publisher '{end.port.name}' offers a deadline of {number(deadline_ms)} ms, "
+                f"publisher '{endpoint.port.name}' offers a deadline of {number(deadline_ms)} ms, "
                 f"but publishes every {number(period_s * 1000.0)} ms",
                 qos.policy_span("deadline_ms"),
                 hint="make the deadline longer than the period, with some margin",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
+from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.names import namespace_problem
 
@@ -39,7 +39,11 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for node in context.system.nodes:
         namespace = node.namespace
         levels = namespace.value.strip("/").count("/") + 1
-        if levels <= DEEPEST or is_opaque(namespace.value) or namespace_problem(namespace.value):
+        if (
+            levels <= DEEPEST
+            or is_unresolved(namespace.value)
+            or namespace_problem(namespace.value)
+        ):
             continue
         yield Diagnostic(
             RULE,

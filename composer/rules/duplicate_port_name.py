@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
-from composer.analysis.words import a
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.formatting import a
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Port
 
@@ -43,7 +43,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
         first: dict[str, Port] = {}
         for port in node.ports:
             earlier = first.setdefault(port.name.value, port)
-            if earlier is not port and not is_opaque(port.name.value):
+            if earlier is not port and not is_unresolved(port.name.value):
                 yield Diagnostic(
                     RULE,
                     f"'{port.name}' names both {a(port.kind)} and {a(earlier.kind)} of one node",

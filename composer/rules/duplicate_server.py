@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.words import end_name
+from composer.analysis.formatting import port_name
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import ChannelKind
 
@@ -46,8 +46,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
         for other in channel.sources[1:]:
             yield Diagnostic(
                 RULE,
-                f"{channel.kind} '{channel.name}' is provided by both '{end_name(other)}' "
-                f"and '{end_name(first)}'",
+                f"{channel.kind} '{channel.name}' is provided by both '{port_name(other)}' "
+                f"and '{port_name(first)}'",
                 other.port.name.span,
                 (Label(first.port.name.span, "the other server"),),
                 f"rename one of them, for example to '~/{other.port.name}'",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.load import loads
+from composer.analysis.executor_load import executor_loads
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(
@@ -43,7 +43,7 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Add up the budgets of every executor."""
-    for load in context.once(loads):
+    for load in context.once(executor_loads):
         if load.ratio > 1.0:
             yield Diagnostic(
                 RULE,

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import complete_behaviors, handlers
+from composer.analysis.behaviors import complete_behaviors, handlers, unbound_handlers
 from composer.analysis.context import Context
-from composer.analysis.orphans import orphans
-from composer.analysis.words import a
+from composer.analysis.formatting import a
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, nearest, register, suggestion
 from composer.model import Node
 
@@ -62,7 +61,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             for handler in known
             if handler.needed and source.method(handler.name) is None
         }
-        for method in orphans(node, source):
+        for method in unbound_handlers(node, source):
             if nearest(method.name, missing) is not None:
                 continue  # shown by the diagnostic about the missing handler
             yield Diagnostic(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
+from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.names import is_hidden, topic_name_problem
 from composer.source import Located
@@ -40,7 +40,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for word, name in _names(context):
         if (
             is_hidden(name.value)
-            and not is_opaque(name.value)
+            and not is_unresolved(name.value)
             and not topic_name_problem(name.value)
         ):
             yield Diagnostic(

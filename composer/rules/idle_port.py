@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.behaviors import handlers
 from composer.analysis.context import Context
-from composer.analysis.doubt import doubt
+from composer.analysis.earlier_errors import earlier_errors
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import Node, PortKind
 
@@ -44,9 +44,9 @@ _HINTS = {
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the nodes that have no behavior."""
-    suspects = context.once(doubt).nodes
+    affected = context.once(earlier_errors).nodes
     for node in context.system.nodes:
-        if node.behavior is None and node.complete and node.name.value not in suspects:
+        if node.behavior is None and node.complete and node.name.value not in affected:
             yield from _node(node)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
-from composer.analysis.words import safe_name
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.formatting import safe_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import System
 from composer.names import join, namespace_problem, node_name_problem
@@ -41,13 +41,13 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for node in context.system.nodes:
         namespace = node.namespace
         problem = namespace_problem(namespace.value)
-        if problem is not None and not is_opaque(namespace.value):
+        if problem is not None and not is_unresolved(namespace.value):
             yield Diagnostic(RULE, f"namespace '{namespace}' {problem}", namespace.span)
 
 
 def _name_of_system(system: System) -> Iterator[Diagnostic]:
     name = system.name
-    if system.node_type or is_opaque(name.value):
+    if system.node_type or is_unresolved(name.value):
         return
     problem = node_name_problem(name.value)
     if problem is None and namespace_problem(system.namespace) is None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
-from composer.analysis.words import safe_name
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.formatting import safe_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.names import node_name_problem
 
@@ -38,7 +38,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for node in context.system.nodes:
         name = node.name
         problem = node_name_problem(name.value)
-        if problem is not None and not is_opaque(name.value):
+        if problem is not None and not is_unresolved(name.value):
             yield Diagnostic(
                 RULE,
                 f"node name '{name}' {problem}",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
-from composer.analysis.words import safe_name
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.formatting import safe_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.names import parameter_name_problem
 
@@ -41,7 +41,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
         for parameter in node.parameters:
             name = parameter.name
             problem = parameter_name_problem(name.value)
-            if problem is not None and not is_opaque(name.value):
+            if problem is not None and not is_unresolved(name.value):
                 better = ".".join(safe_name(part) for part in name.value.split(".") if part)
                 yield Diagnostic(
                     RULE,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
+from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.names import topic_name_problem
 from composer.source import Located
@@ -43,7 +43,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Check the names of ports, of connections, and in remappings."""
     for kind, name in _names(context):
         problem = topic_name_problem(name.value)
-        if problem is not None and not is_opaque(name.value):
+        if problem is not None and not is_unresolved(name.value):
             yield Diagnostic(RULE, f"{kind} name '{name}' {problem}", name.span)
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.chains import delays
+from composer.analysis.chains import chain_delays
 from composer.analysis.context import Context
-from composer.analysis.words import number
+from composer.analysis.formatting import number
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 
 RULE = register(
@@ -52,7 +52,7 @@ chains:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Add up the delays along every chain."""
     for chain in context.system.chains:
-        found = list(delays(context, chain))
+        found = list(chain_delays(context, chain))
         total_ms = sum(delay.milliseconds for delay in found)
         if total_ms > chain.latency_ms.value:
             yield Diagnostic(

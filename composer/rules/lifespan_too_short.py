@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
+from composer.analysis.formatting import number
 from composer.analysis.rates import timed_publishers
-from composer.analysis.words import number
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(
@@ -41,13 +41,13 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Compare lifespans with the periods of the publishing timers."""
-    for end, period_s in context.once(timed_publishers):
-        qos = end.port.qos
+    for endpoint, period_s in context.once(timed_publishers):
+        qos = endpoint.port.qos
         lifespan_ms = qos.profile.lifespan_ms
         if qos.known and lifespan_ms is not None and lifespan_ms < period_s * 1000.0:
             yield Diagnostic(
                 RULE,
-                f"messages of '{end.port.name}' expire after {number(lifespan_ms)} ms, "
+                f"messages of '{endpoint.port.name}' expire after {number(lifespan_ms)} ms, "
                 f"but are published every {number(period_s * 1000.0)} ms",
                 qos.policy_span("lifespan_ms"),
                 hint="make the lifespan longer than the period",

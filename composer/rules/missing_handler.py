@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import Handler, complete_behaviors, handlers
+from composer.analysis.behaviors import Handler, complete_behaviors, handlers, unbound_handlers
 from composer.analysis.context import Context
-from composer.analysis.orphans import orphans
 from composer.behavior_source import BehaviorSource, Method
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, nearest, register
 
@@ -51,7 +50,7 @@ class Counter:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Compare the ports and timers with the methods of the behavior."""
     for node, source in complete_behaviors(context):
-        unbound = {method.name: method for method in orphans(node, source)}
+        unbound = {method.name: method for method in unbound_handlers(node, source)}
         for handler in handlers(node):
             if handler.needed and source.method(handler.name) is None:
                 yield _diagnostic(source, handler, unbound)

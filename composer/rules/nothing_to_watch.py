@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.doubt import PORT_SECTIONS, doubt
+from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import PortKind
 
@@ -36,12 +36,12 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check every node that is watched as a whole."""
-    doubts = context.once(doubt)
+    errors = context.once(earlier_errors)
     for node in context.system.nodes:
         limit = node.supervision.watch.silence_ms
         if limit is None or not node.complete or node.ports_of(PortKind.PUBLISHER):
             continue
-        if doubts.may_have(node.name.value, *PORT_SECTIONS):
+        if errors.may_declare(node.name.value, *PORT_SECTIONS):
             continue
         yield Diagnostic(
             RULE,

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.judged_parameters import typed_values
-from composer.analysis.parameter_values import describe
+from composer.analysis.parameters import describe, valid_values
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, suggestion
 
 RULE = register(
@@ -34,7 +33,7 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check values against the choices; each element of a list must be one of them."""
-    for parameter, value in typed_values(context):
+    for parameter, value in valid_values(context):
         choices = parameter.choices
         if choices is None or value.value in choices.value:
             continue

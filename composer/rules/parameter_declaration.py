@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.parameter_values import KNOWN_TYPES, describe, type_problem
+from composer.analysis.parameters import KNOWN_TYPES, describe, type_problem
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import USE_SIM_TIME, Parameter, ParameterType
 

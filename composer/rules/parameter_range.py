@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.judged_parameters import typed_values
-from composer.analysis.parameter_values import range_problem
+from composer.analysis.parameters import range_problem, valid_values
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Parameter
 
@@ -37,7 +36,7 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check numbers against the declared range."""
-    for parameter, value in typed_values(context):
+    for parameter, value in valid_values(context):
         if _is_contradictory(parameter):
             continue
         problem = range_problem(parameter, value.value)

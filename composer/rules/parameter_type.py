@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.judged_parameters import judged_values
-from composer.analysis.parameter_values import type_problem
+from composer.analysis.parameters import known_values, type_problem
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 
 RULE = register(
@@ -37,7 +36,7 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the defaults and the values that instances set."""
-    for parameter, value in judged_values(context):
+    for parameter, value in known_values(context):
         problem = type_problem(value.value, parameter.type.value)
         if problem is None:
             continue

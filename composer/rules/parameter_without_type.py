@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.parameter_values import describe
+from composer.analysis.parameters import describe
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(

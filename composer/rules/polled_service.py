@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.words import number
+from composer.analysis.formatting import number
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import PortKind
 

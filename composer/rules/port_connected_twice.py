@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
+from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Connection, Endpoint
 
@@ -52,7 +52,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     first: dict[str, tuple[Connection, Endpoint]] = {}
     for connection in context.system.connections:
         for endpoint in (*connection.sources, *connection.sinks):
-            if context.system.port(endpoint) is None or is_opaque(connection.name.value):
+            if context.system.port(endpoint) is None or is_unresolved(connection.name.value):
                 continue
             earlier, place = first.setdefault(endpoint.text.value, (connection, endpoint))
             difference = _difference(earlier, connection)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.doubt import doubt
+from composer.analysis.earlier_errors import earlier_errors
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import ChannelKind
 
@@ -38,9 +38,9 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check publishers and subscriptions; services and actions have one usual profile."""
-    suspects = context.once(doubt).nodes
+    affected = context.once(earlier_errors).nodes
     for node in context.system.nodes:
-        for port in node.ports if node.name.value not in suspects else ():
+        for port in node.ports if node.name.value not in affected else ():
             if port.kind.channel is ChannelKind.TOPIC and not port.qos.explicit:
                 yield Diagnostic(
                     RULE,

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 
 from composer.analysis.context import Context
-from composer.analysis.words import end_name
+from composer.analysis.formatting import port_name
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Channel, ChannelKind, PortOfNode
 from composer.qos import Incompatibility, QosProfile, incompatibilities
@@ -61,14 +61,14 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 def _one_type(channel: Channel) -> bool:
     """Return whether all endpoints have one type; another rule reports different types."""
-    return len({end.port.interface.value for end in channel.ends}) == 1
+    return len({endpoint.port.interface.value for endpoint in channel.ends}) == 1
 
 
 def _by_profile(ends: Iterable[PortOfNode]) -> Groups:
     groups: dict[QosProfile, list[PortOfNode]] = defaultdict(list)
-    for end in ends:
-        if end.port.qos.known:
-            groups[end.port.qos.profile].append(end)
+    for endpoint in ends:
+        if endpoint.port.qos.known:
+            groups[endpoint.port.qos.profile].append(endpoint)
     return groups
 
 
@@ -89,22 +89,22 @@ def _diagnostic(
     policy = problem.policy
     labels = [
         Label(
-            end.port.qos.policy_span(policy),
-            f"{end.port.kind} '{end_name(end)}' offers {problem.offered}",
+            endpoint.port.qos.policy_span(policy),
+            f"{endpoint.port.kind} '{port_name(endpoint)}' offers {problem.offered}",
         )
-        for end in offers[: 1 + _SHOWN]
+        for endpoint in offers[: 1 + _SHOWN]
     ]
     labels += [
         Label(
-            end.port.qos.policy_span(policy),
-            f"{end.port.kind} '{end_name(end)}' requests {problem.requested} too",
+            endpoint.port.qos.policy_span(policy),
+            f"{endpoint.port.kind} '{port_name(endpoint)}' requests {problem.requested} too",
         )
-        for end in requests[1 : 1 + _SHOWN]
+        for endpoint in requests[1 : 1 + _SHOWN]
     ]
     return Diagnostic(
         RULE,
-        f"{request.port.kind} '{end_name(request)}' requests {policy} {problem.requested} on "
-        f"'{channel.name}', but {offer.port.kind} '{end_name(offer)}' offers {problem.offered}",
+        f"{request.port.kind} '{port_name(request)}' requests {policy} {problem.requested} on "
+        f"'{channel.name}', but {offer.port.kind} '{port_name(offer)}' offers {problem.offered}",
         request.port.qos.policy_span(policy),
         tuple(labels),
         f"offer {problem.requested}, or request {problem.offered}",

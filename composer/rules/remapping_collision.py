@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
-from composer.analysis.remapped import matched_ports, own_name
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.references import matched_ports, own_name
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Node, Port, PortKind, Remapping
 
@@ -62,7 +62,7 @@ def _remapping(
     reported: set[tuple[PortKind, str]],
 ) -> Iterator[Diagnostic]:
     """Report each name once, for the first remapping that causes it."""
-    if is_opaque(remapping.target.value):
+    if is_unresolved(remapping.target.value):
         return
     target = own_name(node, remapping.target.value)
     for port in matched_ports(node, remapping):

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.near_miss import COUNTERPARTS, nearest_channel
-from composer.analysis.wiring import lonely_ends
-from composer.analysis.words import end_name
+from composer.analysis.formatting import port_name
+from composer.analysis.unconnected import COUNTERPARTS, nearest_channel, unconnected_ports
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import PortKind
 
@@ -42,13 +41,13 @@ nodes:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the ports that are declared as required."""
     for kind in PortKind:
-        for end in lonely_ends(context, kind):
-            if end.port.required:
+        for endpoint in unconnected_ports(context, kind):
+            if endpoint.port.required:
                 yield Diagnostic(
                     RULE,
-                    f"port '{end_name(end)}' must be connected, "
-                    f"but '{end.port.full_name}' has no {COUNTERPARTS[end.port.kind]}",
-                    end.node.name.span,
-                    (Label(end.port.name.span, "declared as required"),),
-                    nearest_channel(context, end),
+                    f"port '{port_name(endpoint)}' must be connected, "
+                    f"but '{endpoint.port.full_name}' has no {COUNTERPARTS[endpoint.port.kind]}",
+                    endpoint.node.name.span,
+                    (Label(endpoint.port.name.span, "declared as required"),),
+                    nearest_channel(context, endpoint),
                 )

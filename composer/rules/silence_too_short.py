@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
+from composer.analysis.formatting import number
 from composer.analysis.rates import timed_publishers
-from composer.analysis.words import number
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Node, PortKind, PortOfNode
 from composer.source import Located
@@ -44,9 +44,9 @@ nodes:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Compare the watched limits with the periods of the publishing timers."""
     periods: dict[str, dict[str, tuple[PortOfNode, float]]] = {}
-    for end, period_s in context.once(timed_publishers):
-        of_node = periods.setdefault(end.node.name.value, {})
-        of_node[end.port.name.value] = (end, period_s)
+    for endpoint, period_s in context.once(timed_publishers):
+        of_node = periods.setdefault(endpoint.node.name.value, {})
+        of_node[endpoint.port.name.value] = (endpoint, period_s)
     for node in context.system.nodes:
         known = periods.get(node.name.value, {})
         watch = node.supervision.watch
@@ -62,15 +62,15 @@ def _publishers(node: Node) -> int:
     return len(node.ports_of(PortKind.PUBLISHER))
 
 
-def _compare(limit: Located[float], end: PortOfNode, period_s: float) -> Iterator[Diagnostic]:
+def _compare(limit: Located[float], endpoint: PortOfNode, period_s: float) -> Iterator[Diagnostic]:
     period_ms = period_s * 1000.0
     if limit.value > period_ms:
         return
     yield Diagnostic(
         RULE,
-        f"node '{end.node.name}' counts as silent after {number(limit.value)} ms, but publishes "
-        f"'{end.port.name}' every {number(period_ms)} ms",
+        f"node '{endpoint.node.name}' counts as silent after {number(limit.value)} ms, "
+        f"but publishes '{endpoint.port.name}' every {number(period_ms)} ms",
         limit.span,
-        (Label(end.port.name.span, "the watched publisher"),),
+        (Label(endpoint.port.name.span, "the watched publisher"),),
         f"allow for late messages, for example {number(3 * period_ms)}",
     )

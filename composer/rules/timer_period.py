@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.words import number
+from composer.analysis.formatting import number
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.expressions import Expression
 from composer.model import Node, PeriodError, PeriodUnit, Timer

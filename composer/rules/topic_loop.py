@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
-from composer.analysis.wiring import place_of
-from composer.analysis.words import end_name
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.formatting import port_name
+from composer.analysis.unconnected import diagnostic_location
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Event, Port, PortKind, PortOfNode
 
@@ -68,7 +68,7 @@ def _steps(context: Context) -> _Steps:
     for node in context.system.nodes:
         for port in node.ports_of(PortKind.SUBSCRIPTION):
             for target in _republished(node.ports_of(PortKind.PUBLISHER), port):
-                if not is_opaque(port.full_name) and not is_opaque(target):
+                if not is_unresolved(port.full_name) and not is_unresolved(target):
                     steps.setdefault(port.full_name, {})[target] = PortOfNode(node, port)
     return steps
 
@@ -92,15 +92,15 @@ def _cycle(steps: _Steps, start: str, done: set[str]) -> list[tuple[str, PortOfN
     if start not in done:
         path.append(start)
     while path:
-        target, end = next(rest[path[-1]], (None, None))
-        if target is None or end is None:
+        target, endpoint = next(rest[path[-1]], (None, None))
+        if target is None or endpoint is None:
             done.add(path.pop())
             steps_taken = steps_taken[: max(len(path) - 1, 0)]
         elif target in path:
             done.update(path)
-            return [*steps_taken[path.index(target) :], (target, end)]
+            return [*steps_taken[path.index(target) :], (target, endpoint)]
         elif target not in done:
-            steps_taken.append((target, end))
+            steps_taken.append((target, endpoint))
             path.append(target)
             rest[target] = iter(steps.get(target, {}).items())
     return []
@@ -109,11 +109,13 @@ def _cycle(steps: _Steps, start: str, done: set[str]) -> list[tuple[str, PortOfN
 def _diagnostic(cycle: list[tuple[str, PortOfNode]]) -> Diagnostic:
     names = [topic for topic, _ in cycle]
     path = " -> ".join((names[-1], *names))
-    first, *others = [(end, place_of(end)[0]) for _, end in cycle]
+    first, *others = [(endpoint, diagnostic_location(endpoint)[0]) for _, endpoint in cycle]
     return Diagnostic(
         RULE,
         f"messages circulate forever: {path}",
         first[1],
-        tuple(Label(place, f"'{end_name(end)}' republishes them") for end, place in others),
+        tuple(
+            Label(place, f"'{port_name(endpoint)}' republishes them") for endpoint, place in others
+        ),
         "publish from a timer, or add a 'when' condition that breaks the cycle",
     )

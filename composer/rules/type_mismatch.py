@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.words import end_name
+from composer.analysis.formatting import port_name
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Channel, PortOfNode
 
@@ -51,9 +51,9 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 def _channel(context: Context, channel: Channel) -> Iterator[Diagnostic]:
     by_type: dict[str, list[PortOfNode]] = defaultdict(list)
-    for end in channel.ends:
-        if context.interface(end.port) is not None:
-            by_type[end.port.interface.value].append(end)
+    for endpoint in channel.ends:
+        if context.interface(endpoint.port) is not None:
+            by_type[endpoint.port.interface.value].append(endpoint)
     if len(by_type) < 2:
         return
     common = max(by_type, key=lambda name: len(by_type[name]))  # the first one in case of a tie
@@ -61,15 +61,18 @@ def _channel(context: Context, channel: Channel) -> Iterator[Diagnostic]:
     for name, ends in by_type.items():
         odd = ends[0]
         labels = [
-            Label(usual.port.interface.span, f"{usual.port.kind} '{end_name(usual)}': {common}")
+            Label(usual.port.interface.span, f"{usual.port.kind} '{port_name(usual)}': {common}")
         ]
         labels += [
-            Label(end.port.interface.span, f"{end.port.kind} '{end_name(end)}' too: {name}")
-            for end in ends[1 : 1 + _SHOWN]
+            Label(
+                endpoint.port.interface.span,
+                f"{endpoint.port.kind} '{port_name(endpoint)}' too: {name}",
+            )
+            for endpoint in ends[1 : 1 + _SHOWN]
         ]
         yield Diagnostic(
             RULE,
-            f"{odd.port.kind} '{end_name(odd)}' has type '{name}', "
+            f"{odd.port.kind} '{port_name(odd)}' has type '{name}', "
             f"but {channel.kind} '{channel.name}' has '{common}'",
             odd.port.interface.span,
             tuple(labels),

@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.near_miss import nearest_channel
-from composer.analysis.wiring import external_hint, lonely_ends, place_of
-from composer.analysis.words import end_name
+from composer.analysis.formatting import port_name
+from composer.analysis.unconnected import (
+    diagnostic_location,
+    external_hint,
+    nearest_channel,
+    unconnected_ports,
+)
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import PortKind
 
@@ -44,14 +48,14 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check for topics that have only subscriptions."""
-    for end in lonely_ends(context, PortKind.SUBSCRIPTION):
-        if end.port.required is None:
-            place, labels = place_of(end)
+    for endpoint in unconnected_ports(context, PortKind.SUBSCRIPTION):
+        if endpoint.port.required is None:
+            place, labels = diagnostic_location(endpoint)
             yield Diagnostic(
                 RULE,
-                f"no node in this system publishes '{end.port.full_name}', "
-                f"which '{end_name(end)}' subscribes to",
+                f"no node in this system publishes '{endpoint.port.full_name}', "
+                f"which '{port_name(endpoint)}' subscribes to",
                 place,
                 labels,
-                nearest_channel(context, end) or external_hint(end),
+                nearest_channel(context, endpoint) or external_hint(endpoint),
             )

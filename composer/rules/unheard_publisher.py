@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.wiring import external_hint, lonely_ends, place_of
-from composer.analysis.words import end_name
+from composer.analysis.formatting import port_name
+from composer.analysis.unconnected import diagnostic_location, external_hint, unconnected_ports
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import PortKind
 
@@ -38,14 +38,14 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check for topics that have only publishers."""
-    for end in lonely_ends(context, PortKind.PUBLISHER):
-        if end.port.required is None:
-            place, labels = place_of(end)
+    for endpoint in unconnected_ports(context, PortKind.PUBLISHER):
+        if endpoint.port.required is None:
+            place, labels = diagnostic_location(endpoint)
             yield Diagnostic(
                 RULE,
-                f"no node in this system subscribes to '{end.port.full_name}', "
-                f"which '{end_name(end)}' publishes",
+                f"no node in this system subscribes to '{endpoint.port.full_name}', "
+                f"which '{port_name(endpoint)}' publishes",
                 place,
                 labels,
-                external_hint(end),
+                external_hint(endpoint),
             )

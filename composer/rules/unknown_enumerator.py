@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from composer.analysis.contents import contents
 from composer.analysis.context import Context
+from composer.analysis.reactions import message_templates
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.interfaces import Interfaces, Message
 from composer.templates import Constant, Items, Record, Template
@@ -43,7 +43,7 @@ _SHOWN = 6
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the numbers that message fields are set to."""
-    for template, message in contents(context):
+    for template, message in message_templates(context):
         yield from _template(template, message, context.interfaces)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
+from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.model import DEFAULT_EXECUTOR
 
@@ -40,7 +40,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     known = {executor.name.value for executor in context.system.executors} | {DEFAULT_EXECUTOR}
     for node in context.system.nodes if not context.is_partial else ():
         name = node.executor
-        if name is None or name.value in known or is_opaque(name.value):
+        if name is None or name.value in known or is_unresolved(name.value):
             continue
         yield Diagnostic(
             RULE,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
+from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.interfaces.similar import similar_interface
 from composer.model import Port
@@ -40,7 +40,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for node in context.system.nodes:
         for port in node.ports:
             name = port.interface
-            if is_opaque(name.value) or context.interfaces.find(name.value) is not None:
+            if is_unresolved(name.value) or context.interfaces.find(name.value) is not None:
                 continue
             problem = context.interfaces.problem(name.value)
             if problem is not None:

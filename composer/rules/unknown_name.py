@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.places import part_of_path
-from composer.analysis.sites import EVENT_NAMES, Site, sites
+from composer.analysis.expressions import EVENT_NAMES, ExpressionSite, expression_sites
+from composer.analysis.spans import part_of_path
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 
 RULE = register(
@@ -40,7 +40,7 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the first part of every path."""
-    for site in context.once(sites):
+    for site in context.once(expression_sites):
         for path in site.expression.paths:
             if path.root in site.names:
                 continue
@@ -52,7 +52,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             )
 
 
-def _hint(name: str, site: Site) -> str | None:
+def _hint(name: str, site: ExpressionSite) -> str | None:
     if site.node.parameter(name) is not None and "parameters" in site.names:
         return f"write 'parameters.{name}'"
     if any(known.value == name for known, _ in site.node.state) and "state" in site.names:

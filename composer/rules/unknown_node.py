@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
-from composer.analysis.endpoints import endpoints
-from composer.analysis.places import part_of
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.references import endpoints
+from composer.analysis.spans import part_of
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.model import Endpoint, Node
 
@@ -52,7 +52,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 def _endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
     name = endpoint.node
-    if is_opaque(endpoint.text.value) or context.system.node(name) is not None:
+    if is_unresolved(endpoint.text.value) or context.system.node(name) is not None:
         return
     if not name:
         message = f"'{endpoint.text}' is not of the form 'node.port'"
@@ -69,7 +69,7 @@ def _endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
 def _dependencies(context: Context, node: Node) -> Iterator[Diagnostic]:
     for dependency in node.depends_on:
         name = dependency.node
-        if is_opaque(name.value) or context.system.node(name.value) is not None:
+        if is_unresolved(name.value) or context.system.node(name.value) is not None:
             continue
         yield Diagnostic(
             RULE,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
+from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 
 RULE = register(
@@ -36,7 +36,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Check the type of every node that names one."""
     for node in context.system.nodes:
         name = node.type_name
-        if name is None or node.type_found or is_opaque(name.value):
+        if name is None or node.type_found or is_unresolved(name.value):
             continue
         if context.node_types.find(name.value) is not None:
             continue  # the file exists but is invalid, which is reported elsewhere

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from composer.analysis.context import Context
-from composer.analysis.doubt import doubt
-from composer.analysis.places import part_of_path
-from composer.analysis.sites import sites
+from composer.analysis.earlier_errors import earlier_errors
+from composer.analysis.expressions import expression_sites
+from composer.analysis.spans import part_of_path
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.source import Span
 
@@ -54,14 +54,14 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     unknown.name.span,
                     hint=suggestion(unknown.name.value, unknown.known),
                 )
-    doubts = context.once(doubt)
+    errors = context.once(earlier_errors)
     known = {
         node.name.value: [parameter.name.value for parameter in node.parameters]
         for node in context.system.nodes
     }
     names = {node: frozenset(declared) for node, declared in known.items()}
     for node_name, name, span in _uses(context, names):
-        if name not in names[node_name] and not doubts.may_have(node_name, "parameters"):
+        if name not in names[node_name] and not errors.may_declare(node_name, "parameters"):
             yield Diagnostic(
                 RULE,
                 f"the node does not declare parameter '{name}'",
@@ -71,7 +71,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 
 def _uses(context: Context, known: Mapping[str, frozenset[str]]) -> Iterator[tuple[str, str, Span]]:
-    for site in context.once(sites):
+    for site in context.once(expression_sites):
         for path in site.expression.paths:
             if path.root == "parameters" and len(path.parts) > 1:
                 span = part_of_path(site.span, site.expression, path, 1)

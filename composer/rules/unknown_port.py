@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
-from composer.analysis.doubt import PORT_SECTIONS, doubt
-from composer.analysis.endpoints import endpoints
-from composer.analysis.places import part_of
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
 from composer.analysis.reactions import sends
+from composer.analysis.references import endpoints
+from composer.analysis.spans import part_of
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.model import Endpoint, Node, PortKind
 
@@ -45,15 +45,15 @@ _SENDERS = {
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the ports that connections, chains, reactions and overrides refer to."""
-    doubts = context.once(doubt)
+    errors = context.once(earlier_errors)
     for endpoint in endpoints(context.system):
-        if not doubts.may_have(endpoint.node, *PORT_SECTIONS):
+        if not errors.may_declare(endpoint.node, *PORT_SECTIONS):
             yield from _endpoint(context, endpoint)
     for site, key, send in sends(context.system):
         name = send.port
-        if not site.node.complete or is_opaque(name.value):
+        if not site.node.complete or is_unresolved(name.value):
             continue
-        if doubts.may_have(site.node.name.value, *PORT_SECTIONS):
+        if errors.may_declare(site.node.name.value, *PORT_SECTIONS):
             continue
         if site.node.port(name.value) is not None:
             continue
@@ -73,7 +73,7 @@ def _endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
     if node is None or not node.complete or node.port(endpoint.port) is not None:
         return
     name = endpoint.port
-    if is_opaque(endpoint.text.value):
+    if is_unresolved(endpoint.text.value):
         return
     yield Diagnostic(
         RULE,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
+from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.qos import PRESETS
 from composer.source import Located
@@ -54,7 +54,7 @@ def unknown_profiles(context: Context) -> tuple[Located[str], ...]:
     return tuple(
         reference.name
         for reference in context.system.qos_references
-        if reference.name.value not in known and not is_opaque(reference.name.value)
+        if reference.name.value not in known and not is_unresolved(reference.name.value)
     )
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
-from composer.analysis.remapped import matched_ports, own_name
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.references import matched_ports, own_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.model import Node, Remapping
 from composer.names import topic_name_problem
@@ -59,7 +59,7 @@ _EVERY_NODE = (
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the name that each remapping replaces."""
     for node in context.system.nodes:
-        if not node.complete or any(is_opaque(port.ros_name.value) for port in node.ports):
+        if not node.complete or any(is_unresolved(port.ros_name.value) for port in node.ports):
             continue
         for remapping in node.remappings:
             if not _known(node, remapping):
@@ -74,7 +74,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 def _known(node: Node, remapping: Remapping) -> bool:
     source = remapping.source.value
-    if is_opaque(source) or topic_name_problem(source) is not None:
+    if is_unresolved(source) or topic_name_problem(source) is not None:
         return True  # cannot be checked, or is reported by another rule
     return any(matched_ports(node, remapping)) or own_name(node, source) in {
         own_name(node, name) for name in _EVERY_NODE

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.doubt import doubt
-from composer.analysis.places import part_of_path
+from composer.analysis.earlier_errors import earlier_errors
+from composer.analysis.expressions import expression_sites
 from composer.analysis.reactions import reactions
-from composer.analysis.sites import sites
+from composer.analysis.spans import part_of_path
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.model import Node
 from composer.source import Span
@@ -40,14 +40,14 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the state that reactions set and expressions read."""
-    doubts = context.once(doubt)
+    errors = context.once(earlier_errors)
     known = {
         node.name.value: frozenset(name.value for name, _ in node.state)
         for node in context.system.nodes
     }
     for node, name, span in _uses(context):
         of_node = node.name.value
-        if name not in known[of_node] and not doubts.may_have(of_node, "state"):
+        if name not in known[of_node] and not errors.may_declare(of_node, "state"):
             names = [declared.value for declared, _ in node.state]
             hint = suggestion(name, names) or f"declare it: 'state: {{{name}: 0}}'"
             yield Diagnostic(RULE, f"the node does not declare state '{name}'", span, hint=hint)
@@ -57,7 +57,7 @@ def _uses(context: Context) -> Iterator[tuple[Node, str, Span]]:
     for found in reactions(context.system):
         for name, _ in found.reaction.state:
             yield found.node, name.value, name.span
-    for site in context.once(sites):
+    for site in context.once(expression_sites):
         for path in site.expression.paths:
             if path.root == "state" and "state" in site.names and len(path.parts) > 1:
                 span = part_of_path(site.span, site.expression, path, 1)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
-from composer.analysis.doubt import PORT_SECTIONS, doubt
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.model import PortKind
 
@@ -36,13 +36,13 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Compare the watched publishers with the declared ones."""
-    doubts = context.once(doubt)
+    errors = context.once(earlier_errors)
     for node in context.system.nodes:
-        if not node.complete or doubts.may_have(node.name.value, *PORT_SECTIONS):
+        if not node.complete or errors.may_declare(node.name.value, *PORT_SECTIONS):
             continue
         known = [port.name.value for port in node.ports_of(PortKind.PUBLISHER)]
         for name, _ in node.supervision.watch.topics:
-            if name.value not in known and not is_opaque(name.value):
+            if name.value not in known and not is_unresolved(name.value):
                 yield Diagnostic(
                     RULE,
                     f"node '{node.name}' has no publisher '{name}' to watch",

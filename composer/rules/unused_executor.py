@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.doubt import doubt
+from composer.analysis.earlier_errors import earlier_errors
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import DEFAULT_EXECUTOR
 
@@ -40,7 +40,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
         node.executor.value if node.executor else DEFAULT_EXECUTOR for node in context.system.nodes
     }
     known = {executor.name.value for executor in context.system.executors} | {DEFAULT_EXECUTOR}
-    if not used <= known or context.once(doubt).any:
+    if not used <= known or context.once(earlier_errors).any:
         return  # an unknown name may be a misspelling of the unused one
     for executor in context.system.executors:
         if executor.name.value not in used:

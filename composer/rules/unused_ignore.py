@@ -45,7 +45,7 @@ nodes:
 )
 
 _MARK = "compose:"
-#: A comment, not the end of a quoted string: no quote follows.
+#: A comment, not the endpoint of a quoted string: no quote follows.
 _COMMENT = re.compile(r"""(?:^|\s)\#\s*compose:\s*ignore\[(?P<names>[^\]]*)\][^"']*$""")
 _NAME = re.compile(r"[^\s,]+")
 _ONLY_COMMENT = re.compile(r"\s*(#.*)?$")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.doubt import doubt
+from composer.analysis.earlier_errors import earlier_errors
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.rules.unknown_qos_profile import unknown_profiles
 
@@ -41,7 +41,7 @@ nodes:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Compare the profiles with the references to them."""
     if (
-        context.once(doubt).any
+        context.once(earlier_errors).any
         or context.once(unknown_profiles)
         or not all(node.complete for node in context.system.nodes)
     ):

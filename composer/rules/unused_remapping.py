@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_opaque
-from composer.analysis.remapped import matched_ports, own_name
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.references import matched_ports, own_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import Node, Remapping
 
@@ -54,7 +54,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
 def _remapping(node: Node, remapping: Remapping) -> Iterator[Diagnostic]:
     target = remapping.target.value
     ports = list(matched_ports(node, remapping))
-    if not ports or is_opaque(target):
+    if not ports or is_unresolved(target):
         return
     expected = own_name(node, target)
     actual = sorted({port.full_name for port in ports} - {expected})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.words import a
+from composer.analysis.formatting import a
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.interfaces import Action, Message, Service
 from composer.model import ChannelKind

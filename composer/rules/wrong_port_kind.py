@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from composer.analysis.context import Context
+from composer.analysis.formatting import a, either
 from composer.analysis.reactions import sends
-from composer.analysis.words import a, either
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Chain, ChannelKind, Connection, Endpoint, Port, PortKind
 

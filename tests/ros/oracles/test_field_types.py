@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from composer.expressions import EvaluationError
-from composer.field_types import INTEGER, NUMBER, TEXT, Judge, Scope, type_of
+from composer.field_types import INTEGER, NUMBER, STRING, FieldChecker, Scope, type_of
 from composer.interfaces import Interfaces
 from composer.runtime.ros.messages import MessageError, compile_message, interface_class
 from tests.unit.support.field_types import template
@@ -30,7 +30,7 @@ MESSAGES = (
 SCOPE: Scope = {
     "count": INTEGER,
     "now": NUMBER,
-    "node": TEXT,
+    "node": STRING,
     "state": {"last": type_of(1.0), "on": type_of(True)},
 }
 VALUES: dict[str, Any] = {
@@ -78,7 +78,7 @@ def taken_by_the_runtime(value: Any, name: str) -> bool:
 def test_judge_and_runtime_agree(value: dict[str, Any], name: str) -> None:
     message = INTERFACES.message(name)
     assert message is not None
-    judged = list(Judge(INTERFACES, SCOPE).template(template(value), message))
+    judged = list(FieldChecker(INTERFACES, SCOPE).template(template(value), message))
     assert taken_by_the_runtime(value, name) == (not judged), judged
 
 
@@ -90,5 +90,5 @@ def test_judge_and_runtime_agree_on_fields(value: Any, name: str, data: st.DataO
     if not message.fields:
         return
     field = data.draw(st.sampled_from(message.field_names))
-    judged = list(Judge(INTERFACES, SCOPE).template(template({field: value}), message))
+    judged = list(FieldChecker(INTERFACES, SCOPE).template(template({field: value}), message))
     assert taken_by_the_runtime({field: value}, name) == (not judged), judged

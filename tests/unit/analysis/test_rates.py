@@ -98,7 +98,7 @@ PUBLISH = "self.publishers.chatter.publish(None)"
         ({"on_configure": "self.send = self.publishers.chatter.publish"}, None),
     ],
 )
-def test_behaviours_are_read_for_what_they_publish(
+def test_behaviors_are_read_for_what_they_publish(
     bodies: dict[str, str], rate_hz: float | None, tmp_path: Path
 ) -> None:
     (tmp_path / "robot.py").write_text(behavior(**bodies), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""How often a node publishes, as far as its YAML and the text of its behaviour tell."""
+"""How often a node publishes, as far as its YAML and the text of its behavior tell."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from textwrap import dedent, indent
 
 import pytest
 
-from composer.behavior_source.bodies import read_body
-from composer.behavior_source.publishing import Publishing, publishing_of
+from composer.behavior_source.method_body import read_body
+from composer.behavior_source.publishing import PublisherUses, publisher_uses
 from composer.graph.rates import publishing_rates_hz
 from composer.source import SourceFile
 from tests.unit.support.resolving import system_of
 
 
-def publishing(body: str) -> Publishing:
+def publishing(body: str) -> PublisherUses:
     text = f"def on_tick(self):\n{indent(dedent(body), '    ')}"
     (function,) = ast.parse(text).body
     assert isinstance(function, ast.FunctionDef)
-    return publishing_of(function, read_body(function, {}, SourceFile("a.py", text)))
+    return publisher_uses(function, read_body(function, {}, SourceFile("a.py", text)))
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def publishing(body: str) -> Publishing:
     ],
 )
 def test_a_statement_that_is_always_reached_publishes_each_time(body: str) -> None:
-    assert publishing(body) == Publishing(("out",), ("out",))
+    assert publishing(body) == PublisherUses(("out",), ("out",))
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_a_statement_that_is_always_reached_publishes_each_time(body: str) -> No
     ],
 )
 def test_what_depends_on_something_is_only_named(body: str) -> None:
-    assert publishing(body) == Publishing((), ("out",))
+    assert publishing(body) == PublisherUses((), ("out",))
 
 
 @pytest.mark.parametrize(
@@ -64,12 +64,12 @@ def test_what_depends_on_something_is_only_named(body: str) -> None:
     ],
 )
 def test_what_is_kept_or_given_away_may_be_used_by_anybody(body: str) -> None:
-    assert publishing(body) == Publishing((), ("out",), ("out",))
+    assert publishing(body) == PublisherUses((), ("out",), ("out",))
 
 
 @pytest.mark.parametrize("body", ["out.publish(x)", "self.out.publish(x)", "self.publishers"])
 def test_what_is_no_publisher_is_not_named(body: str) -> None:
-    assert publishing(body) == Publishing()
+    assert publishing(body) == PublisherUses()
 
 
 SENDER = """

@@ -11,9 +11,9 @@ from tests.unit.support.field_types import INTERFACES, SCOPE
 
 
 def inferred(source: str) -> tuple[str, list[str]]:
-    found, complaints = infer(compile_expression(source), SCOPE, INTERFACES)
+    found, problems = infer(compile_expression(source), SCOPE, INTERFACES)
     marked = [
-        f"{source[item.offset : item.offset + item.length]}: {item.message}" for item in complaints
+        f"{source[item.offset : item.offset + item.length]}: {item.message}" for item in problems
     ]
     return described(found), marked
 
@@ -31,14 +31,14 @@ TYPES = [
     ("message.single % 2", "float64"),
     ("-message.small", "int64"),
     ("message.small", "uint8"),
-    ("count + state.free", "of unknown type"),
+    ("count + state.free", "unknown type"),
     ("now + state.free", "float64"),
     ("not node", "bool"),
     ("message.on and count > 1", "bool"),
-    ("message.on or count", "of unknown type"),
+    ("message.on or count", "unknown type"),
     ("1 if message.on else 2.0", "float64"),
     ("'a' if message.on else node", "string"),
-    ("1 if message.on else node", "of unknown type"),
+    ("1 if message.on else node", "unknown type"),
     ("point if message.on else message.point", "geometry_msgs/msg/Point"),
     ("1 < count <= now", "bool"),
     ("state.free == 'a'", "bool"),
@@ -46,7 +46,7 @@ TYPES = [
     ("'a' in message.many", "bool"),
     ("'a' in node", "bool"),
     ("1 in state.free", "bool"),
-    ("missing", "of unknown type"),
+    ("missing", "unknown type"),
     ("message", "demo_msgs/msg/Everything"),
     ("parameters", "a map"),
     ("parameters.camera.fps", "int64"),
@@ -64,7 +64,7 @@ TYPES = [
     ("len(message.many)", "int64"),
     ("len(state.free)", "int64"),
     ("max(message.three)", "float64"),
-    ("max(state.free)", "of unknown type"),
+    ("max(state.free)", "unknown type"),
     ("min(message.few)", "int64"),
     ("min(1, 2)", "int64"),
     ("radians(1)", "float64"),
@@ -79,9 +79,11 @@ TYPES = [
 
 @pytest.mark.parametrize(("source", "expected"), TYPES)
 def test_type(source: str, expected: str) -> None:
-    found, complaints = inferred(source)
+    found, problems = inferred(source)
     assert found == expected
-    assert complaints == ([] if source != "missing" else ["missing: there is no 'missing' here"])
+    assert problems == (
+        [] if source != "missing" else ["missing: name 'missing' is not available here"]
+    )
 
 
 def test_every_function_has_a_type() -> None:
@@ -89,7 +91,7 @@ def test_every_function_has_a_type() -> None:
 
 
 @pytest.mark.parametrize(
-    ("source", "complaint"),
+    ("source", "problem"),
     [
         ("node + 'a'", "node: string where a number is expected"),
         ("1 + message.on", "message.on: bool where a number is expected"),
@@ -97,23 +99,23 @@ def test_every_function_has_a_type() -> None:
         ("1 + message.three", "message.three: float64[3] where a number is expected"),
         ("sqrt(node)", "node: string where a number is expected"),
         ("node == 1", "1: string and int64 are never equal"),
-        ("1 < now < node", "node: float64 and string have no order"),
+        ("1 < now < node", "node: float64 and string cannot be ordered"),
         ("point == 1", "point: geometry_msgs/msg/Point cannot be compared"),
         ("message.three == 1", "message.three: float64[3] cannot be compared"),
         ("node in (1, 2)", "node: string is never in this list"),
-        ("1 in count", "count: int64 is neither a list nor a text"),
+        ("1 in count", "count: int64 is neither a list nor a string"),
         ("len(count)", "count: int64 has no length"),
         ("str(point)", "point: geometry_msgs/msg/Point cannot be compared"),
         ("bool(node)", "node: string where a number is expected"),
         ("max(message.many)", "message.many: string[] where numbers are expected"),
     ],
 )
-def test_what_can_never_work(source: str, complaint: str) -> None:
-    assert complaint in inferred(source)[1]
+def test_what_can_never_work(source: str, problem: str) -> None:
+    assert problem in inferred(source)[1]
 
 
 @pytest.mark.parametrize(
     "source", ["1 + (node + 1)", "sqrt(-node)", "mesage.x == 'a'", "abs(point) == 'a'"]
 )
-def test_one_mistake_is_one_complaint(source: str) -> None:
+def test_one_mistake_is_one_problem(source: str) -> None:
     assert len(inferred(source)[1]) == 1

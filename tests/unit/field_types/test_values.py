@@ -18,10 +18,10 @@ from composer.field_types import (
 from composer.interfaces import FieldType, Message
 from composer.source import Span
 from tests.unit.support.field_types import (
+    CHECKER,
     EVERYTHING,
     FILE,
     INTERFACES,
-    JUDGE,
     definition,
     problems_of,
     template,
@@ -80,22 +80,22 @@ def test_fits(field: str, value: object) -> None:
 
 NOT_FITTING: list[tuple[str, Any, str, str | None]] = [
     ("on", 1, "the number 1 where bool is expected", "write true or false"),
-    ("on", "true", "the text 'true' where bool is expected", "write true or false"),
-    ("on", None, "nothing where bool is expected", "write true or false"),
-    ("small", 256, "256 is outside the range of uint8", "0 to 255 is allowed"),
-    ("small", -1, "-1 is outside the range of uint8", "0 to 255 is allowed"),
-    ("small", 2.0, "2.0 is not an integer, as uint8 is", "write 2"),
-    ("small", 2.5, "2.5 is not an integer, as uint8 is", None),
+    ("on", "true", "the string 'true' where bool is expected", "write true or false"),
+    ("on", None, "null where bool is expected", "write true or false"),
+    ("small", 256, "256 is outside the range of uint8", "allowed: 0 to 255"),
+    ("small", -1, "-1 is outside the range of uint8", "allowed: 0 to 255"),
+    ("small", 2.0, "uint8 must be an integer, not 2.0", "write 2"),
+    ("small", 2.5, "uint8 must be an integer, not 2.5", None),
     ("small", True, "true where uint8 is expected", None),
-    ("double", "1", "the text '1' where float64 is expected", None),
+    ("double", "1", "the string '1' where float64 is expected", None),
     ("single", 1e39, "1e+39 is outside the range of float32", None),
     ("text", 5, "the number 5 where string is expected", 'write it in quotes: "5"'),
-    ("text", None, "nothing where string is expected", None),
-    ("short_text", "abcd", "a text of 4 characters does not fit string<=3", None),
+    ("text", None, "null where string is expected", None),
+    ("short_text", "abcd", "a string of 4 characters does not fit string<=3", None),
     ("three", 1.0, "the number 1.0 where float64[3] is expected", "write a list: [...]"),
-    ("three", [1, 2], "a list of 2 does not fit float64[3]", None),
-    ("few", [1, 2, 3], "a list of 3 does not fit int8[<=2]", None),
-    ("few", [128], "128 is outside the range of int8", "-128 to 127 is allowed"),
+    ("three", [1, 2], "a list of 2 elements does not fit float64[3]", None),
+    ("few", [1, 2, 3], "a list of 3 elements does not fit int8[<=2]", None),
+    ("few", [128], "128 is outside the range of int8", "allowed: -128 to 127"),
     ("double", [1.0], "a list where float64 is expected", None),
     ("double", {"x": 1}, "a map of fields where float64 is expected", None),
     ("stamp", 1e12, "1000000000000.0 seconds do not fit builtin_interfaces/msg/Time", None),
@@ -107,7 +107,7 @@ NOT_FITTING: list[tuple[str, Any, str, str | None]] = [
     ),
     ("point", {"xx": 1}, "geometry_msgs/msg/Point has no field 'xx'", "did you mean 'x'?"),
     ("poin", 1, "demo_msgs/msg/Everything has no field 'poin'", "did you mean 'point'?"),
-    ("double", "{now} s", "a text where float64 is expected", None),
+    ("double", "{now} s", "a string where float64 is expected", None),
     ("small", "{now}", "float64 where uint8 is expected", "use {round(now)}"),
     ("small", "{count / 2}", "float64 where uint8 is expected", "use {round(count / 2)}"),
     ("text", "{count}", "int64 where string is expected", "use {str(count)}"),
@@ -133,8 +133,8 @@ def test_does_not_fit(field: str, value: object, message: str, hint: str | None)
 @pytest.mark.parametrize("value", ["text", "a {count}", 3, None, ["{count}"]])
 def test_a_message_is_made_of_a_map(value: object) -> None:
     (problem,) = problems_of(value, definition("geometry_msgs/msg/Point"))
-    assert problem.message == "geometry_msgs/msg/Point is made of a map of fields"
-    assert problem.hint == "its fields: x, y, z"
+    assert problem.message == "geometry_msgs/msg/Point must be a map of its fields"
+    assert problem.hint == "fields: x, y, z"
 
 
 def test_a_whole_message_can_be_passed_on() -> None:
@@ -154,7 +154,7 @@ def test_every_problem_is_found_once() -> None:
     assert [problem.message for problem in problems_of(value)] == [
         "300 is outside the range of uint8",
         "demo_msgs/msg/Everything has no field 'poin'",
-        "there is no 'mesage' here",
+        "name 'mesage' is not available here",
         "demo_msgs/msg/Everything has no field 'doubl'",
         "string where a number is expected",
         "geometry_msgs/msg/Point has no field 'q'",
@@ -175,7 +175,7 @@ def test_every_problem_is_found_once() -> None:
     ],
 )
 def test_the_very_part_is_marked(text: str, marked: str) -> None:
-    (problem,) = JUDGE.text(template(text))
+    (problem,) = CHECKER.text(template(text))
     start = problem.span.column - 1
     assert text[start : start + problem.span.length] == marked
 
@@ -188,45 +188,45 @@ def test_the_very_part_is_marked(text: str, marked: str) -> None:
     ],
 )
 def test_a_value_that_can_be_written_in_its_format(text: str) -> None:
-    assert list(JUDGE.text(template(["", {"a": text}]))) == []
+    assert list(CHECKER.text(template(["", {"a": text}]))) == []
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{node:.2f} s", "string cannot be written as '.2f'"),
-        ("{now:d}", "float64 cannot be written as 'd'"),
-        ("{point:.2f}", "geometry_msgs/msg/Point cannot be written as '.2f'"),
-        ("{message.three:.2f}", "float64[3] cannot be written as '.2f'"),
+        ("{node:.2f} s", "string cannot be formatted as '.2f'"),
+        ("{now:d}", "float64 cannot be formatted as 'd'"),
+        ("{point:.2f}", "geometry_msgs/msg/Point cannot be formatted as '.2f'"),
+        ("{message.three:.2f}", "float64[3] cannot be formatted as '.2f'"),
     ],
 )
 def test_a_value_that_cannot(text: str, message: str) -> None:
-    (problem,) = JUDGE.text(template(text))
+    (problem,) = CHECKER.text(template(text))
     assert problem.message == message
 
 
 def test_where_the_file_does_not_spell_the_text_out_the_whole_is_marked() -> None:
     span = Span(FILE, 4, 7, 40)
-    (problem,) = JUDGE.expression(compile_expression("message.doubl"), span)
+    (problem,) = CHECKER.expression(compile_expression("message.doubl"), span)
     assert problem.span == span
 
 
 @pytest.mark.parametrize("source", ["message.on", "count > 1", "state.free", "true", "'a' in node"])
 def test_a_condition_is_true_or_false(source: str) -> None:
-    assert list(JUDGE.condition(compile_expression(source), Span(FILE, 1, 1))) == []
+    assert list(CHECKER.condition(compile_expression(source), Span(FILE, 1, 1))) == []
 
 
 @pytest.mark.parametrize(
     ("source", "message", "hint"),
     [
-        ("count", "a condition is true or false, this is int64", "compare it, as in '... > 0'"),
-        ("node", "a condition is true or false, this is string", None),
-        ("point", "a condition is true or false, this is geometry_msgs/msg/Point", None),
+        ("count", "a condition must be a bool, not int64", "compare it, as in '... > 0'"),
+        ("node", "a condition must be a bool, not string", None),
+        ("point", "a condition must be a bool, not geometry_msgs/msg/Point", None),
         ("message.ok", "demo_msgs/msg/Everything has no field 'ok'", None),
     ],
 )
 def test_a_condition_that_is_something_else(source: str, message: str, hint: str | None) -> None:
-    (problem,) = JUDGE.condition(compile_expression(source), Span(FILE, 1, 1))
+    (problem,) = CHECKER.condition(compile_expression(source), Span(FILE, 1, 1))
     assert problem.message == message
     assert hint in (None, problem.hint)
 
@@ -259,14 +259,14 @@ def test_a_path_leads_to_a_type(parts: tuple[str | int, ...], expected: str | No
             PathProblem("float64 has no field 'x'", 1, "it is a value, not a message"),
         ),
         (("double", 0), PathProblem("float64 has no elements", 1)),
-        (("three", -4), PathProblem("there is no element -4 in float64[3]", 1)),
-        (("few", 2), PathProblem("there is no element 2 in int8[<=2]", 1)),
+        (("three", -4), PathProblem("float64[3] has no element -4", 1)),
+        (("few", 2), PathProblem("int8[<=2] has no element 2", 1)),
         (
             ("points", "x"),
             PathProblem(
                 "geometry_msgs/msg/Point[] has no field 'x'",
                 1,
-                "it is a list: name an element, as in [0]",
+                "it is a list: use an index, as in [0]",
             ),
         ),
     ],

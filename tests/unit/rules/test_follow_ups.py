@@ -32,7 +32,7 @@ MISTAKES = {
         ),
         ["unknown-port"],
     ),
-    "nor is the one of a node whose name is misspelt": (
+    "nor is the one of a node whose name is misspelled": (
         system(
             TALKER,
             LISTENER,
@@ -40,7 +40,7 @@ MISTAKES = {
         ),
         ["unknown-node"],
     ),
-    "a misspelt section takes its ports with it": (
+    "a misspelled section takes its ports with it": (
         system(
             "talker: {publisher: {chatter: {type: std_msgs/msg/String, qos: command}}, "
             "timers: {tick: {period_ms: 100, publish: {chatter: {data: hello}}}}}",
@@ -49,25 +49,25 @@ MISTAKES = {
         ),
         ["unknown-key"],
     ),
-    "a misspelt section takes its parameters with it": (
+    "a misspelled section takes its parameters with it": (
         system(
             "motor: {paramters: {rate_hz: 10.0}, "
             'timers: {tick: {rate_hz: "{parameters.rate_hz}", log: tick}}}'
         ),
         ["unknown-key"],
     ),
-    "a misspelt section takes its state with it": (
+    "a misspelled section takes its state with it": (
         system(
             "motor: {stat: {last: 0.0}, timers: {tick: {period_ms: 100, set: {last: 1.0}, "
             "when: state.last < 1.0}}}"
         ),
         ["unknown-key"],
     ),
-    "a misspelt reaction does not make its timer idle": (
+    "a misspelled reaction does not make its timer idle": (
         system("motor: {timers: {tick: {period_ms: 100, lgo: hello}}}"),
         ["unknown-key"],
     ),
-    "a misspelt policy makes the profile a guess": (
+    "a misspelled policy makes the profile a guess": (
         system(
             "talker: {publishers: {chatter: {type: std_msgs/msg/String, "
             "qos: {reliabilty: reliable, durability: transient_local}}}}",

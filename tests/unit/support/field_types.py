@@ -1,12 +1,12 @@
-"""A scope and the definitions that the tests of static typing judge against."""
+"""A scope and the definitions that the tests of static typing use."""
 
 from __future__ import annotations
 
 from composer.field_types import (
     INTEGER,
     NUMBER,
-    TEXT,
-    Judge,
+    STRING,
+    FieldChecker,
     Problem,
     Scope,
     parameter_type,
@@ -54,7 +54,7 @@ SCOPE: Scope = {
     "point": FieldType("geometry_msgs/msg/Point"),
     "count": INTEGER,
     "now": NUMBER,
-    "node": TEXT,
+    "node": STRING,
     "parameters": {
         "rate_hz": parameter_type("double"),
         "names": parameter_type("string_array"),
@@ -68,7 +68,7 @@ SCOPE: Scope = {
         "free": type_of(None),
     },
 }
-JUDGE = Judge(INTERFACES, SCOPE)
+CHECKER = FieldChecker(INTERFACES, SCOPE)
 
 
 def tree(value: object) -> Tree:
@@ -96,4 +96,4 @@ def template(value: object) -> Template:
 
 
 def problems_of(value: object, message: Message = EVERYTHING) -> list[Problem]:
-    return list(JUDGE.template(template(value), message))
+    return list(CHECKER.template(template(value), message))

@@ -1,4 +1,4 @@
-"""How much of its time an executor may need, by the budgets of its callbacks."""
+"""The load of executors, from the rates and budgets of their callbacks."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from composer.analysis.context import Context
+from composer.analysis.formatting import number
 from composer.analysis.publications import Cause
 from composer.analysis.rates import Rates, rates
-from composer.analysis.words import number
 from composer.diagnostics import Label
 from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, Timer
 from composer.source import Located, Span
 
-#: So many callbacks are named in a message and shown beside it, those with most to do first.
+#: Maximum number of callbacks in a message and its labels, highest load first.
 SHOWN = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Share:
-    """What one callback may take: ``rate_hz`` times ``budget_ms``."""
+class CallbackLoad:
+    """The load of one callback: ``rate_hz`` times ``budget_ms``."""
 
     name: str  # "motor.step"
     rate_hz: float
@@ -27,8 +27,8 @@ class Share:
     reentrant: bool
 
     @property
-    def seconds(self) -> float:
-        """Seconds a second."""
+    def load(self) -> float:
+        """Seconds per second."""
         return self.rate_hz * self.budget_ms.value / 1000.0
 
     def __str__(self) -> str:
@@ -36,18 +36,18 @@ class Share:
 
 
 @dataclass(frozen=True, slots=True)
-class Load:
-    """What callbacks may take together; ``threads`` is what there is for them."""
+class ExecutorLoad:
+    """The total load of callbacks that share ``threads`` threads."""
 
     what: str  # "executor 'control'"
     span: Span
     threads: int
-    shares: tuple[Share, ...]
+    shares: tuple[CallbackLoad, ...]
 
     @property
     def ratio(self) -> float:
-        """Time that may be needed, in terms of the time there is."""
-        return sum(share.seconds for share in self.shares) / self.threads
+        """The load relative to the available threads."""
+        return sum(share.load for share in self.shares) / self.threads
 
     @property
     def formula(self) -> str:
@@ -61,25 +61,25 @@ class Load:
 
     @property
     def labels(self) -> tuple[Label, ...]:
-        """Where the budgets stand."""
+        """The budgets of the callbacks with the highest load."""
         return tuple(
-            Label(share.budget_ms.span, f"{share} = {number(share.seconds * 100)} %")
+            Label(share.budget_ms.span, f"{share} = {number(share.load * 100)} %")
             for share in self._ordered()[:SHOWN]
         )
 
-    def _ordered(self) -> list[Share]:
-        return sorted(self.shares, key=lambda share: (-share.seconds, share.name))
+    def _ordered(self) -> list[CallbackLoad]:
+        return sorted(self.shares, key=lambda share: (-share.load, share.name))
 
 
-def loads(context: Context) -> tuple[Load, ...]:
+def executor_loads(context: Context) -> tuple[ExecutorLoad, ...]:
     """Return the load of every executor on which a callback has a budget and a known rate.
 
-    Callbacks of a node run one at a time, unless they are reentrant, however many threads there
-    are: on an executor with several threads each node is a load of its own, too.
+    The callbacks of a node run one at a time unless they are reentrant. So on an executor with
+    several threads, each node has a load of its own as well.
     """
     known = context.once(rates)
     declared = {executor.name.value: executor for executor in context.system.executors}
-    shares: dict[str, list[Share]] = {}
+    shares: dict[str, list[CallbackLoad]] = {}
     found = []
     for node in context.system.nodes:
         name = node.executor.value if node.executor is not None else DEFAULT_EXECUTOR
@@ -87,15 +87,17 @@ def loads(context: Context) -> tuple[Load, ...]:
         shares.setdefault(name, []).extend(of_node)
         alone = tuple(share for share in of_node if not share.reentrant)
         if alone and name in declared and _threads(declared[name]) > 1:
-            found.append(Load(f"node '{node.name}' (one at a time)", node.name.span, 1, alone))
+            found.append(
+                ExecutorLoad(f"node '{node.name}' (one at a time)", node.name.span, 1, alone)
+            )
     for name, executor in declared.items():
         of_executor = tuple(shares.pop(name, ()))
         if of_executor:
             what = f"executor '{name}'"
-            found.append(Load(what, executor.name.span, _threads(executor), of_executor))
+            found.append(ExecutorLoad(what, executor.name.span, _threads(executor), of_executor))
     if shares.get(DEFAULT_EXECUTOR):
         what = f"executor '{DEFAULT_EXECUTOR}'"
-        found.append(Load(what, context.system.span, 1, tuple(shares[DEFAULT_EXECUTOR])))
+        found.append(ExecutorLoad(what, context.system.span, 1, tuple(shares[DEFAULT_EXECUTOR])))
     return tuple(found)
 
 
@@ -103,7 +105,7 @@ def _threads(executor: Executor) -> int:
     return max(executor.threads, 1) if executor.kind is ExecutorKind.MULTI_THREADED else 1
 
 
-def _shares(known: Rates, node: Node) -> Iterator[Share]:
+def _shares(known: Rates, node: Node) -> Iterator[CallbackLoad]:
     callbacks: list[tuple[Timer | Port, Cause]] = []
     callbacks += [(timer, Cause(timer=timer)) for timer in node.timers]
     callbacks += [(port, Cause(port=port)) for port in node.ports]
@@ -111,4 +113,6 @@ def _shares(known: Rates, node: Node) -> Iterator[Share]:
         budget_ms = callback.budget_ms
         rate_hz = known.callback_hz(node, cause) if budget_ms is not None else None
         if budget_ms is not None and rate_hz is not None:
-            yield Share(f"{node.name}.{callback.name}", rate_hz, budget_ms, callback.reentrant)
+            yield CallbackLoad(
+                f"{node.name}.{callback.name}", rate_hz, budget_ms, callback.reentrant
+            )

@@ -1,4 +1,4 @@
-"""Places in Python files, in characters: Python itself counts columns in UTF-8 bytes."""
+"""Spans in Python files, in characters: Python counts columns in UTF-8 bytes."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import ast
 
 from composer.source import SourceFile, Span
 
-#: Columns are not counted exactly in a line that nobody can read: it costs its square.
+#: Columns in longer lines are not exact, because counting takes quadratic time.
 _LONGEST_LINE = 10_000
 
 
-def place_of(node: ast.stmt | ast.expr, source: SourceFile) -> Span:
-    """Return the place of a node; of what goes on in other lines, its first character."""
+def span_of(node: ast.stmt | ast.expr, source: SourceFile) -> Span:
+    """Return the span of a node; of one with several lines, its first character."""
     line = source.line(node.lineno)
     start = _characters(line, node.col_offset)
     if node.end_lineno != node.lineno or node.end_col_offset is None:
@@ -20,8 +20,8 @@ def place_of(node: ast.stmt | ast.expr, source: SourceFile) -> Span:
     return Span(source, node.lineno, start + 1, max(length, 1))
 
 
-def start_of(node: ast.stmt | ast.expr, length: int, source: SourceFile) -> Span:
-    """Return the place of the first ``length`` characters of a node."""
+def start_span(node: ast.stmt | ast.expr, length: int, source: SourceFile) -> Span:
+    """Return the span of the first ``length`` characters of a node."""
     start = _characters(source.line(node.lineno), node.col_offset)
     return Span(source, node.lineno, start + 1, length)
 

@@ -1,4 +1,4 @@
-"""How messages put things."""
+"""Formatting of names, numbers and lists in messages."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import replace
 from composer.diagnostics import LONGEST_ECHO, Diagnostic, shown
 from composer.model import PortKind, PortOfNode
 
-_LONG_ECHO = re.compile(rf"'([^']{{{LONGEST_ECHO + 1},}})'")
+_LONG_VALUE = re.compile(rf"'([^']{{{LONGEST_ECHO + 1},}})'")
 
 
 def a(kind: PortKind) -> str:
@@ -24,7 +24,7 @@ def either(kinds: Sequence[PortKind]) -> str:
 
 
 def listed(names: Sequence[str], limit: int = 3) -> str:
-    """Return names in quotes, with ``and``; of many the first ones and how many more."""
+    """Return quoted names joined with ``and``; of a long list, the first ones and a count."""
     quoted = [f"'{name}'" for name in names]
     if len(quoted) > limit:
         quoted[limit - 1 :] = [f"{len(quoted) - limit + 1} others"]
@@ -34,39 +34,45 @@ def listed(names: Sequence[str], limit: int = 3) -> str:
 
 
 def number(value: float) -> str:
-    """Return a number without needless digits: ``50``, not ``50.0``; ``0.1``."""
+    """Return a number without trailing zeros: ``50``, not ``50.0``; ``0.1``."""
     return f"{value:.6g}"
 
 
-def with_short_echoes(finding: Diagnostic) -> Diagnostic:
-    """Return the finding with every quoted value cut to the length that messages echo."""
-    texts = [finding.message, finding.hint or "", *(label.message for label in finding.related)]
+def with_short_values(diagnostic: Diagnostic) -> Diagnostic:
+    """Return the diagnostic with every quoted value shortened to the maximum length."""
+    texts = [
+        diagnostic.message,
+        diagnostic.hint or "",
+        *(label.message for label in diagnostic.related),
+    ]
     if all(len(text) <= LONGEST_ECHO for text in texts):
-        return finding
+        return diagnostic
     return replace(
-        finding,
-        message=_cut_echoes(finding.message),
-        hint=_cut_echoes(finding.hint) if finding.hint is not None else None,
+        diagnostic,
+        message=_shorten_values(diagnostic.message),
+        hint=_shorten_values(diagnostic.hint) if diagnostic.hint is not None else None,
         related=tuple(
-            replace(label, message=_cut_echoes(label.message)) for label in finding.related
+            replace(label, message=_shorten_values(label.message)) for label in diagnostic.related
         ),
     )
 
 
-def _cut_echoes(text: str) -> str:
-    return _LONG_ECHO.sub(lambda found: f"'{shown(found[1])}'", text)
+def _shorten_values(text: str) -> str:
+    return _LONG_VALUE.sub(lambda match: f"'{shown(match[1])}'", text)
 
 
 def safe_name(name: str) -> str:
-    """Return a valid ROS name made of what can be kept of ``name``."""
+    """Return a valid ROS name similar to ``name``."""
     plain = unicodedata.normalize("NFKD", name)
-    kept = "".join(character if _is_safe(character) else "_" for character in _base(plain))
+    kept = "".join(
+        character if _is_safe(character) else "_" for character in _without_accents(plain)
+    )
     joined = re.sub("__+", "_", kept).strip("_")
     return f"n{joined}" if not joined or joined[0].isdigit() else joined
 
 
-def _base(text: str) -> str:
-    """Return ``text`` without the accents that were taken off its letters."""
+def _without_accents(text: str) -> str:
+    """Return ``text`` without combining characters such as accents."""
     return "".join(character for character in text if not unicodedata.combining(character))
 
 
@@ -74,6 +80,6 @@ def _is_safe(character: str) -> bool:
     return character.isascii() and (character.isalnum() or character == "_")
 
 
-def end_name(end: PortOfNode) -> str:
-    """Return a port as connections name it: ``planner.sensor_data``."""
+def port_name(end: PortOfNode) -> str:
+    """Return the name of a port in connections: ``planner.sensor_data``."""
     return f"{end.node.name}.{end.port.name}"

@@ -1,18 +1,50 @@
-"""Which values fit a parameter."""
+"""Parameter values, and whether they fit the declared type and range."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from composer.analysis.context import Context, is_unresolved
 from composer.model import Parameter, ParameterType
 from composer.source import Located
 from composer.tree import Plain
 
+
+def known_values(context: Context) -> Iterator[tuple[Parameter, Located[Plain]]]:
+    """Yield every default and every set value of the parameters with a known type."""
+    for node in context.system.nodes:
+        for parameter in node.parameters:
+            if parameter.type.value not in KNOWN_TYPES:
+                continue
+            for value in _values(parameter):
+                if not _is_unresolved_value(value.value):
+                    yield parameter, value
+
+
+def valid_values(context: Context) -> Iterator[tuple[Parameter, Located[Plain]]]:
+    """Yield the known values that have the type of their parameter."""
+    for parameter, value in known_values(context):
+        if type_problem(value.value, parameter.type.value) is None:
+            yield parameter, value
+
+
+def _values(parameter: Parameter) -> Iterator[Located[Plain]]:
+    if parameter.default is not None:
+        yield parameter.default
+    if parameter.value is not None and parameter.value is not parameter.default:
+        yield parameter.value
+
+
+def _is_unresolved_value(value: Plain) -> bool:
+    items = value if isinstance(value, list) else [value]
+    return any(isinstance(item, str) and is_unresolved(item) for item in items)
+
+
 _INTEGERS = (-(2**63), 2**63 - 1)
 _BYTES = (0, 255)
-#: How far from a whole number of steps a double may be, in steps.
+#: Tolerance for a whole number of steps, in steps.
 _TOLERANCE = 1e-6
 
 _ELEMENTS = {
@@ -26,7 +58,7 @@ _ELEMENTS = {
 
 @dataclass(frozen=True, slots=True)
 class RangeProblem:
-    """What is wrong with a number, and the limit that it breaks."""
+    """A number outside its range, and the limit that it violates."""
 
     message: str
     limit: Located[float]
@@ -36,7 +68,7 @@ KNOWN_TYPES = frozenset(kind.value for kind in ParameterType)
 
 
 def type_problem(value: Plain, kind: str) -> str | None:
-    """Return what ``value`` is instead of a ``kind`` (a ParameterType), or None."""
+    """Describe ``value`` if it does not have the ParameterType ``kind``; None if it has."""
     element = _ELEMENTS.get(ParameterType(kind))
     if element is None:
         return None if _is_element(value, kind) else describe(value)
@@ -44,12 +76,12 @@ def type_problem(value: Plain, kind: str) -> str | None:
         return describe(value)
     for index, item in enumerate(value):
         if not _is_element(item, element):
-            return f"a list with {describe(item)} at place {index}"
+            return f"a list with {describe(item)} at index {index}"
     return None
 
 
 def range_problem(parameter: Parameter, value: Plain) -> RangeProblem | None:
-    """Return how a number, or one of several, is out of the parameter's range, or None."""
+    """Return the first number in ``value`` outside the parameter's range, or None."""
     for item in numbers(value):
         problem = _range_problem(parameter, item)
         if problem is not None:
@@ -58,13 +90,13 @@ def range_problem(parameter: Parameter, value: Plain) -> RangeProblem | None:
 
 
 def numbers(value: Plain) -> Iterable[float]:
-    """Return the numbers that ``value`` is or holds."""
+    """Return the numbers in ``value``: itself, or its elements."""
     items = value if isinstance(value, list) else [value]
     return [item for item in items if _is_number(item)]  # type: ignore[misc]
 
 
 def describe(value: Plain) -> str:
-    """Return a value with the word for its type: ``the string 'fast'``."""
+    """Return a value with its type: ``the string 'fast'``."""
     match value:
         case bool():
             return f"the bool {str(value).lower()}"
@@ -75,7 +107,7 @@ def describe(value: Plain) -> str:
         case str():
             return f"the string '{_cut(value)}'"
         case _:
-            return "nothing" if value is None else "a list" if isinstance(value, list) else "a map"
+            return "null" if value is None else "a list" if isinstance(value, list) else "a map"
 
 
 def _cut(text: str) -> str:
@@ -96,8 +128,8 @@ def _is_element(value: Plain, kind: str) -> bool:
             return isinstance(value, str)
 
 
-def _is_integer(value: Plain, least: int, most: int) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most
+def _is_integer(value: Plain, minimum: int, maximum: int) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and minimum <= value <= maximum
 
 
 def _is_number(value: Plain) -> bool:

@@ -1,4 +1,4 @@
-"""What a method calls and which publishers it names, from one walk over its text."""
+"""The calls and names in the body of a method, collected in one walk over its syntax tree."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from composer.behavior_source.places import place_of
+from composer.behavior_source.spans import span_of
 from composer.source import SourceFile, Span
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 _PUBLISHERS = "self.publishers"
-#: What is in one of them may run later, or in a thread.
+#: Code in one of these may run later, or in a thread.
 _SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
-#: A name may stand for one that stands for another, and so on.
-_LONGEST_ALIAS = 4
+#: Maximum number of aliases to follow from a name.
+_MAXIMUM_ALIASES = 4
 
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A call: the dotted name of what is called, and whether it is awaited.
+    """A call: the dotted name of the callee, and whether it is awaited.
 
-    Imports are followed in the name, and local names of publishers. ``deferred`` is true in a
-    function within the method: it may run later, or in a thread.
+    Imports and local names of publishers are resolved in the name. ``deferred`` is true in a nested
+    function, which may run later, or in a thread.
     """
 
     name: str
@@ -35,10 +35,10 @@ class Call:
 
 @dataclass(slots=True)
 class Body:
-    """What a method does, as far as its text tells.
+    """The calls and names in a method.
 
-    ``calls`` are in the order of the text; ``mentioned`` are names that it uses otherwise: hands
-    on, keeps, asks. ``names`` are what its own short names stand for.
+    ``calls`` are in source order. ``mentioned`` are the names that the method uses without calling
+    them. ``names`` maps its imports and local names to full names.
     """
 
     calls: tuple[Call, ...]
@@ -46,37 +46,40 @@ class Body:
     names: Mapping[str, str]
 
     def full_name(self, node: ast.expr) -> str:
-        """Return the dotted name of an expression, names followed; "" for what is none."""
-        return _followed(dotted(node), self.names)
+        """Return the full dotted name of an expression; "" for other expressions."""
+        return _resolved(dotted(node), self.names)
 
 
 def read_body(function: Function, imports: Mapping[str, str], source: SourceFile) -> Body:
-    """Read a method; ``imports`` says what names of its file stand for."""
-    seen = _Seen(dict(imports))
-    seen.assigned.update(
+    """Read a method; ``imports`` maps the names in its file to full names."""
+    visitor = _BodyVisitor(dict(imports))
+    visitor.assigned.update(
         inner.arg for inner in ast.walk(function.args) if isinstance(inner, ast.arg)
     )
     pending: list[tuple[ast.AST, bool]] = [(node, False) for node in reversed(function.body)]
     while pending:
         node, deferred = pending.pop()
-        children = seen.take(node, deferred)
+        children = visitor.visit(node, deferred)
         within = deferred or isinstance(node, _SCOPES)
         pending.extend((child, within) for child in reversed(children))
-    names = seen.names()
+    names = visitor.names()
     return Body(
         calls=tuple(
             Call(
-                _followed(name, names), place_of(node.func, source), id(node) in seen.awaited, late
+                _resolved(name, names),
+                span_of(node.func, source),
+                id(node) in visitor.awaited,
+                deferred,
             )
-            for name, node, late in seen.calls
+            for name, node, deferred in visitor.calls
         ),
-        mentioned=tuple(_followed(name, names) for name in seen.mentioned_but(names)),
+        mentioned=tuple(_resolved(name, names) for name in visitor.mentioned_except(names)),
         names=names,
     )
 
 
 def dotted(node: ast.expr) -> str:
-    """Return a dotted name as written; "" for what is not one."""
+    """Return a dotted name as written; "" for other expressions."""
     parts: list[str] = []
     while isinstance(node, ast.Attribute):
         parts.append(node.attr)
@@ -87,8 +90,8 @@ def dotted(node: ast.expr) -> str:
 
 
 @dataclass(slots=True)
-class _Seen:
-    """What the walk has come across; names are as written."""
+class _BodyVisitor:
+    """The names and calls collected so far; names are as written."""
 
     imports: dict[str, str]
     calls: list[tuple[str, ast.Call, bool]] = field(default_factory=list)
@@ -97,8 +100,8 @@ class _Seen:
     aliases: list[tuple[str, str]] = field(default_factory=list)
     assigned: Counter[str] = field(default_factory=Counter)
 
-    def take(self, node: ast.AST, deferred: bool) -> list[ast.AST]:
-        """Note what ``node`` is, and return what is in it that is still to be looked at."""
+    def visit(self, node: ast.AST, deferred: bool) -> list[ast.AST]:
+        """Record ``node``, and return the children that remain to be visited."""
         children: list[ast.AST] = []
         match node:
             case ast.Name(id=name, ctx=ast.Load()):
@@ -122,12 +125,12 @@ class _Seen:
         return children
 
     def names(self) -> Mapping[str, str]:
-        """Return what names stand for: imports, and local names of publishers.
+        """Return the full names of imports and of local names of publishers.
 
-        A name that is given twice may stand for either, and is left as it is.
+        A name that is assigned twice is ambiguous, so it is not resolved.
         """
         local = {name: value for name, value in self.aliases if self.assigned[name] == 1}
-        followed = {name: _followed(value, local) for name, value in local.items()}
+        followed = {name: _resolved(value, local) for name, value in local.items()}
         publishers = {
             name: value
             for name, value in followed.items()
@@ -135,8 +138,8 @@ class _Seen:
         }
         return self.imports | publishers
 
-    def mentioned_but(self, names: Mapping[str, str]) -> Iterator[str]:
-        """Yield what is mentioned otherwise than to give it one of ``names``."""
+    def mentioned_except(self, names: Mapping[str, str]) -> Iterator[str]:
+        """Yield the mentioned names, except those assigned to one of ``names``."""
         yield from self.mentioned
         yield from (value for name, value in self.aliases if name not in names)
 
@@ -157,7 +160,7 @@ class _Seen:
 
 
 def imported_names(node: ast.Import | ast.ImportFrom) -> Iterator[tuple[str, str]]:
-    """Yield what imported names stand for: ``sleep`` for ``time.sleep``."""
+    """Yield imported names with their full names: ``sleep`` with ``time.sleep``."""
     if isinstance(node, ast.Import):
         yield from ((item.asname, item.name) for item in node.names if item.asname)
     elif node.module and not node.level:
@@ -165,8 +168,8 @@ def imported_names(node: ast.Import | ast.ImportFrom) -> Iterator[tuple[str, str
             yield item.asname or item.name, f"{node.module}.{item.name}"
 
 
-def _followed(name: str, names: Mapping[str, str]) -> str:
-    for _ in range(_LONGEST_ALIAS):
+def _resolved(name: str, names: Mapping[str, str]) -> str:
+    for _ in range(_MAXIMUM_ALIASES):
         head, dot, rest = name.partition(".")
         if head not in names:
             break

@@ -1,4 +1,4 @@
-"""What is known of the class that ``behavior: module:Class`` names."""
+"""Looks up the class that ``behavior: module:Class`` refers to."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from composer.model import BehaviorReference
 from composer.project import Project
 from composer.source import Span, shown_path
 
-#: A behaviour that reaches into more files than this is not followed further.
+#: Maximum number of files to read for one behavior.
 MAXIMUM_MODULES = 32
 
-#: Bases that add no handlers: the root of behaviours, and what Python's own typing needs.
+#: Bases without handlers: the base class of behaviors, and those of the standard library.
 _PLAIN_BASES = frozenset(
     {
         ("composer.behavior", "Behavior"),
@@ -34,10 +34,10 @@ _PLAIN_BASES = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class BehaviorSource:
-    """A behaviour as syntax.
+    """The syntax of a behavior.
 
-    ``complete`` is true when ``methods`` are all there are; only then may one be called missing.
-    ``problem`` says why a module that was found cannot be read.
+    ``complete`` is true if ``methods`` contains all methods; only then can one be missing.
+    ``problem`` is the reason why a module that exists cannot be read.
     """
 
     reference: BehaviorReference
@@ -51,12 +51,12 @@ class BehaviorSource:
     methods: tuple[Method, ...] = ()
 
     def method(self, name: str) -> Method | None:
-        """Return the method called ``name``, inherited or not; None when there is none in sight."""
+        """Return the method ``name``, own or inherited; None if it is not known."""
         return next((method for method in self.methods if method.name == name), None)
 
 
 def find_behavior(reference: BehaviorReference) -> BehaviorSource:
-    """Read what ``reference`` names as far as syntax tells. Never raises, never imports."""
+    """Read the class that ``reference`` names. Never raises, never imports."""
     reader = _Reader(reference.folder, Project.at(reference.folder))
     try:
         path = module_file(reference.module, reference.folder, reader.project)
@@ -78,7 +78,7 @@ def find_behavior(reference: BehaviorReference) -> BehaviorSource:
         )
     methods: dict[str, Method] = {}
     complete = True
-    for known in reader.lineage(*start):
+    for known in reader.with_bases(*start):
         complete = complete and known is not None and not known.dynamic
         for method in known.methods if known is not None else ():
             methods.setdefault(method.name, method)
@@ -94,12 +94,12 @@ def find_behavior(reference: BehaviorReference) -> BehaviorSource:
     )
 
 
-Place = tuple[Module, Class]
+_ClassInModule = tuple[Module, Class]
 
 
 @dataclass(slots=True)
 class _Reader:
-    """Follows names from module to module."""
+    """Resolves names across modules."""
 
     folder: Path
     project: Project
@@ -109,14 +109,14 @@ class _Reader:
         """Return a module, read once. Raises Unreadable."""
         if path not in self.modules:
             if len(self.modules) >= MAXIMUM_MODULES:
-                raise Unreadable("is behind too many other files")
+                raise Unreadable("depends on too many other files")
             self.modules[path] = read_module(path, shown_path(path))
         return self.modules[path]
 
-    def lineage(self, module: Module, start: Class) -> Iterator[Class | None]:
-        """Yield a class and all its bases, nearest first; None for a base out of reach."""
+    def with_bases(self, module: Module, start: Class) -> Iterator[Class | None]:
+        """Yield a class and all its bases, nearest first; None for a base that cannot be found."""
         seen: set[tuple[Path, str]] = set()
-        pending: list[Place] = [(module, start)]
+        pending: list[_ClassInModule] = [(module, start)]
         while pending:
             home, known = pending.pop()
             if (home.path, known.name) in seen:
@@ -132,8 +132,8 @@ class _Reader:
                 else:
                     pending.append(found)
 
-    def lookup(self, module: Module, name: str) -> Place | None:
-        """Return the class that ``name`` stands for in ``module``, or None out of reach."""
+    def lookup(self, module: Module, name: str) -> _ClassInModule | None:
+        """Return the class that ``name`` refers to in ``module``, or None if it cannot be found."""
         for _ in range(MAXIMUM_MODULES):
             if name in module.classes:
                 return module, module.classes[name]
@@ -156,8 +156,8 @@ class _Reader:
     def _imported_file(self, module: Module, imported: Import) -> Path | None:
         if not imported.level:
             home = module.path.parent
-            beside = module_file(imported.module, home, Project.at(home))
-            return beside or module_file(imported.module, self.folder, self.project)
+            sibling = module_file(imported.module, home, Project.at(home))
+            return sibling or module_file(imported.module, self.folder, self.project)
         path = relative_module_file(imported.module, imported.level, module.path)
         if path is None or (self.project.holds(module.path) and not self.project.holds(path)):
             return None
@@ -171,7 +171,7 @@ class _Reader:
 
 
 def _imported(module: Module, name: str) -> Import | None:
-    """Return where a name that ``module`` imports comes from: ``Base``, or ``package.Base``."""
+    """Return the origin of a name that ``module`` imports: ``Base``, or ``package.Base``."""
     if name in module.imports:
         found = module.imports[name]
         return found if found.name else None

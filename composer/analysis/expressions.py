@@ -1,4 +1,4 @@
-"""Every expression of a system, with the names it may use."""
+"""The expressions of a system, with the names in their scope."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from composer.model import Event, Node, Port, Reaction, System
 from composer.source import Span
 from composer.templates import Template, expressions_in
 
-#: What every reaction can use, whatever it reacts to.
+#: Names that every reaction can use.
 COMMON_NAMES = ("parameters", "state", "count", "now", "node")
-#: What it can use besides, by what it reacts to.
+#: Further names that a reaction can use, by event.
 EVENT_NAMES: dict[Event, tuple[str, ...]] = {
     Event.MESSAGE: ("message",),
     Event.REQUEST: ("request",),
@@ -24,15 +24,15 @@ EVENT_NAMES: dict[Event, tuple[str, ...]] = {
     Event.RESULT: ("result", "status"),
     Event.FAILURE: ("failure",),
 }
-#: What a timer's period can use: it is worked out before anything happens.
+#: Names that a timer's period can use; it is evaluated before any event.
 PERIOD_NAMES = ("parameters",)
 
 
 @dataclass(frozen=True, slots=True)
-class Site:
-    """An expression, its place, the node it belongs to and the names in scope.
+class ExpressionSite:
+    """An expression with its span, its node and the names in scope.
 
-    ``event`` and ``port`` tell what the names that come with an event are.
+    ``event`` and ``port`` determine the types of the names that belong to an event.
     """
 
     node: Node
@@ -43,23 +43,23 @@ class Site:
     port: Port | None = None
 
 
-def sites(context: Context) -> tuple[Site, ...]:
+def expression_sites(context: Context) -> tuple[ExpressionSite, ...]:
     """Return every expression: in reactions, action servers and periods."""
     return tuple(_sites(context.system))
 
 
-def _sites(system: System) -> Iterator[Site]:
+def _sites(system: System) -> Iterator[ExpressionSite]:
     for found in reactions(system):
         names = names_at(found.event)
         for expression, span in reaction_expressions(found.reaction):
-            yield Site(found.node, expression, span, names, found.event, found.port)
+            yield ExpressionSite(found.node, expression, span, names, found.event, found.port)
     for node in system.nodes:
         for port in node.ports:
             for expression, span in _goal_expressions(port):
-                yield Site(node, expression, span, names_at(Event.GOAL), Event.GOAL, port)
+                yield ExpressionSite(node, expression, span, names_at(Event.GOAL), Event.GOAL, port)
         for timer in node.timers:
             if isinstance(timer.period.value, Expression):
-                yield Site(node, timer.period.value, timer.period.span, PERIOD_NAMES)
+                yield ExpressionSite(node, timer.period.value, timer.period.span, PERIOD_NAMES)
 
 
 def names_at(event: Event) -> tuple[str, ...]:
@@ -68,16 +68,16 @@ def names_at(event: Event) -> tuple[str, ...]:
 
 
 def reaction_expressions(reaction: Reaction) -> Iterator[tuple[Expression, Span]]:
-    """Yield the expressions of a reaction with their places."""
+    """Yield the expressions of a reaction with their spans."""
     if reaction.when is not None:
         yield reaction.when, reaction.when_span or reaction.span
-    contents = [content for _, content in reaction.state]
-    contents += [send.content for send in (*reaction.publish, *reaction.call)]
-    yield from _in_templates((*contents, reaction.log, reaction.respond))
+    message_templates = [content for _, content in reaction.state]
+    message_templates += [send.content for send in (*reaction.publish, *reaction.call)]
+    yield from _in_templates((*message_templates, reaction.log, reaction.respond))
 
 
 def _goal_expressions(port: Port) -> Iterator[tuple[Expression, Span]]:
-    """Yield what an action server works out from a goal, beside its reaction."""
+    """Yield the expressions of an action server other than those of its reactions."""
     if port.accept is not None:
         yield port.accept, port.accept_span or port.span
     steps = port.feedback.content if port.feedback is not None else None

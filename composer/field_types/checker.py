@@ -1,4 +1,4 @@
-"""Judges templates, texts and conditions against what their places take."""
+"""Checks templates, strings and conditions against the types of message fields."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from composer.field_types.types import (
     is_integer,
     is_number,
     is_seconds,
-    is_text,
+    is_string,
 )
 from composer.interfaces import FieldType, Interfaces, Message
 from composer.source import Span
@@ -38,14 +38,14 @@ from composer.templates import (
 
 
 @dataclass(frozen=True, slots=True)
-class Judge:
-    """What is wrong with templates and expressions, with the names of ``scope`` in scope."""
+class FieldChecker:
+    """Checks templates and expressions that use the names in ``scope``."""
 
     interfaces: Interfaces
     scope: Scope
 
     def template(self, template: Template, message: Message) -> Iterator[Problem]:
-        """Yield why ``template`` cannot become ``message``."""
+        """Yield the problems of filling ``message`` from ``template``."""
         match template:
             case Record():
                 yield from self._record(template, message)
@@ -54,12 +54,12 @@ class Judge:
             case Constant(value=str() as text) if "${" in text:
                 return
             case Constant() | Text() | Items():
-                names = ", ".join(message.field_names) or "it has none"
-                problem = f"{message.name} is made of a map of fields"
-                yield Problem(problem, template.span, f"its fields: {names}")
+                names = ", ".join(message.field_names) or "none"
+                problem = f"{message.name} must be a map of its fields"
+                yield Problem(problem, template.span, f"fields: {names}")
 
     def text(self, template: Template) -> Iterator[Problem]:
-        """Yield what is wrong with the expressions of a template that may become anything."""
+        """Yield the problems of the expressions in a template of any type."""
         match template:
             case Computed(expression=expression, span=span):
                 yield from self.expression(expression, span)
@@ -75,36 +75,36 @@ class Judge:
                     yield from self.text(item)
 
     def condition(self, expression: Expression, span: Span) -> Iterator[Problem]:
-        """Yield what is wrong with an expression that must be true or false."""
+        """Yield the problems of an expression that must be a bool."""
         found, problems = self._infer(expression, span)
         yield from problems
         if found is not ANYTHING and not is_bool(found):
-            message = f"a condition is true or false, this is {described(found)}"
+            message = f"a condition must be a bool, not {described(found)}"
             hint = "compare it, as in '... > 0'" if is_number(found) else None
             yield Problem(message, span, hint)
 
     def expression(self, expression: Expression, span: Span) -> Iterator[Problem]:
-        """Yield what is wrong with an expression."""
+        """Yield the problems of an expression."""
         yield from self._infer(expression, span)[1]
 
     def _formatted(self, part: Formatted) -> Iterator[Problem]:
         found, problems = self._infer(part.expression, part.span)
         yield from problems
-        if part.format and not _can_be_written(found, part.format):
-            yield Problem(f"{described(found)} cannot be written as '{part.format}'", part.span)
+        if part.format and not _can_format(found, part.format):
+            yield Problem(f"{described(found)} cannot be formatted as '{part.format}'", part.span)
 
     def _infer(self, expression: Expression, span: Span) -> tuple[ValueType, list[Problem]]:
-        found, complaints = infer(expression, self.scope, self.interfaces)
-        # Where the file does not spell the source out, its parts have no places of their own.
-        spelled_out = span.length == len(expression.source)
+        found, problems_found = infer(expression, self.scope, self.interfaces)
+        # Parts have spans of their own only if the file contains the source literally.
+        is_literal = span.length == len(expression.source)
         problems = [
             Problem(
-                complaint.message,
-                span.part(complaint.offset, complaint.length) if spelled_out else span,
-                complaint.hint,
-                complaint.missing,
+                problem.message,
+                span.part(problem.offset, problem.length) if is_literal else span,
+                problem.hint,
+                problem.missing,
             )
-            for complaint in complaints
+            for problem in problems_found
         ]
         return found, problems
 
@@ -131,9 +131,9 @@ class Judge:
                 yield from self._computed(expression, span, type_)
             case Text(span=span):
                 yield from self.text(template)
-                if not is_text(type_):
-                    hint = 'a value is one {...} and nothing else: "{...}"'
-                    yield Problem(f"a text where {type_} is expected", span, hint)
+                if not is_string(type_):
+                    hint = 'write a single expression: "{...}"'
+                    yield Problem(f"a string where {type_} is expected", span, hint)
             case Record(span=span):
                 yield from self._nested(template, type_, span)
             case Items():
@@ -157,7 +157,7 @@ class Judge:
         if type_.array_size not in (None, count) or (
             type_.array_bound is not None and count > type_.array_bound
         ):
-            yield Problem(f"a list of {count} does not fit {type_}", items.span)
+            yield Problem(f"a list of {count} elements does not fit {type_}", items.span)
         for item in items.items:
             yield from self._field(item, type_.element)
 
@@ -179,20 +179,22 @@ class Judge:
             return _fits_primitive(found, target)
         if is_seconds(target) and is_number(found):
             return True
-        given, wanted = (fields_of(type_, self.interfaces) for type_ in (found, target))
-        if given is None or wanted is None:  # a map of anything, or a message nobody defines
+        found_message, target_message = (
+            fields_of(type_, self.interfaces) for type_ in (found, target)
+        )
+        if found_message is None or target_message is None:  # an untyped map, or an unknown message
             return not isinstance(found, FieldType) or _same_name(found, target)
-        return given.name == wanted.name
+        return found_message.name == target_message.name
 
 
-def _can_be_written(type_: ValueType, layout: str) -> bool:
-    """Ask Python, with a value of the type; true where the type is not known."""
+def _can_format(type_: ValueType, format_spec: str) -> bool:
+    """Return whether Python can format a value of the type; True if it is unknown."""
     if type_ is ANYTHING:
         return True
-    samples = ((is_integer, 1), (is_number, 1.0), (is_text, "text"), (is_bool, True))
+    samples = ((is_integer, 1), (is_number, 1.0), (is_string, "text"), (is_bool, True))
     sample = next((value for belongs, value in samples if belongs(type_)), ())
     try:
-        format(sample, layout)
+        format(sample, format_spec)
     except (TypeError, ValueError):
         return False
     return True
@@ -201,8 +203,8 @@ def _can_be_written(type_: ValueType, layout: str) -> bool:
 def _fits_array(found: ValueType, target: ValueType) -> bool:
     if not isinstance(found, FieldType) or not isinstance(target, FieldType) or not found.is_array:
         return False
-    (given_least, given_most), (least, most) = _lengths(found), _lengths(target)
-    if given_least > most or given_most < least:
+    (found_minimum, found_maximum), (minimum, maximum) = _lengths(found), _lengths(target)
+    if found_minimum > maximum or found_maximum < minimum:
         return False
     if target.is_primitive:
         return _fits_primitive(found.element, target.element)
@@ -210,7 +212,7 @@ def _fits_array(found: ValueType, target: ValueType) -> bool:
 
 
 def _lengths(array: FieldType) -> tuple[float, float]:
-    """Return how many elements an array has at least and at most."""
+    """Return the minimum and maximum number of elements of an array."""
     if array.array_size is not None:
         return array.array_size, array.array_size
     return 0, math.inf if array.array_bound is None else array.array_bound
@@ -219,7 +221,7 @@ def _lengths(array: FieldType) -> tuple[float, float]:
 def _fits_primitive(found: ValueType, target: FieldType) -> bool:
     if is_integer(target):
         return is_integer(found)
-    return any(belongs(target) and belongs(found) for belongs in (is_number, is_text, is_bool))
+    return any(belongs(target) and belongs(found) for belongs in (is_number, is_string, is_bool))
 
 
 def _same_name(found: FieldType, target: FieldType | Message) -> bool:
@@ -230,10 +232,10 @@ def _conversion_hint(
     expression: Expression, found: ValueType, target: FieldType | Message
 ) -> str | None:
     source = expression.source
-    if is_integer(target) and (is_number(found) or is_text(found)):
+    if is_integer(target) and (is_number(found) or is_string(found)):
         return f"use {{{'round' if is_number(found) else 'int'}({source})}}"
-    if is_text(target) and (is_number(found) or is_bool(found)):
+    if is_string(target) and (is_number(found) or is_bool(found)):
         return f"use {{str({source})}}"
-    if is_number(target) and is_text(found):
+    if is_number(target) and is_string(found):
         return f"use {{float({source})}}"
     return None
