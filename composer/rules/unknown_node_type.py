@@ -41,7 +41,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
         if context.node_types.find(name.value) is not None:
             continue  # the file exists but is invalid, which is reported elsewhere
         if context.node_types.find_outside_project(name.value) is not None:
-            message = f"the file of node type '{name}' is a symbolic link that leaves the project"
+            message = f"the file of node type '{name}' is a symbolic link out of the project"
             yield Diagnostic(RULE, message, name.span, hint="copy the target into the project")
             continue
         yield Diagnostic(
