@@ -53,7 +53,7 @@ def _mutations(seconds: float, first: int) -> None:
     """Run the property tests of validation with new examples until the time is over."""
     from hypothesis import given, seed, settings  # noqa: PLC0415
 
-    from tests.properties.test_validate_total import MISTAKEN, MISWRITTEN  # noqa: PLC0415
+    from tests.properties.test_validate_total import MUTATED, SPLICED  # noqa: PLC0415
     from tests.properties.validating import validate_and_check  # noqa: PLC0415
 
     def hold(data: bytes) -> None:
@@ -63,7 +63,7 @@ def _mutations(seconds: float, first: int) -> None:
     end_s = time.monotonic() + seconds
     examples = 0
     while time.monotonic() < end_s:
-        for inputs in (MISTAKEN, MISWRITTEN):
+        for inputs in (MUTATED, SPLICED):
             many(seed(first + examples)(given(inputs)(hold)))()
             examples += EXAMPLES_PER_ROUND
             print(f"{examples} files with errors", file=sys.stderr, flush=True)

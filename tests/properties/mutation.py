@@ -1,4 +1,4 @@
-"""Right files with a few mistakes in them: keys and values lost, renamed, moved and replaced."""
+"""Mutations of valid files: keys and values are removed, renamed, moved and replaced."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-#: What people and programs put where something else belongs.
+#: Replacement values, mostly of a wrong type.
 VALUES: st.SearchStrategy[Any] = st.one_of(
     st.none(),
     st.booleans(),
@@ -26,7 +26,7 @@ VALUES: st.SearchStrategy[Any] = st.one_of(
 
 @st.composite
 def mutated(draw: st.DrawFn, content: Any) -> Any:
-    """Return ``content`` with one to four mistakes."""
+    """Return ``content`` with one to four mutations."""
     changed = copy.deepcopy(content)
     for _ in range(draw(st.integers(1, 4))):
         places = list(_containers(changed))
@@ -36,25 +36,25 @@ def mutated(draw: st.DrawFn, content: Any) -> Any:
 
 
 def _containers(part: Any) -> list[Any]:
-    """Return every map and list that has something in it; the whole if there is none."""
-    found = []
+    """Return all maps and lists that are not empty, or else the content itself."""
+    containers = []
     waiting = [part]
     while waiting:
         current = waiting.pop()
         inner = list(current.values()) if isinstance(current, dict) else list(current)
         if inner:
-            found.append(current)
+            containers.append(current)
         waiting.extend(item for item in inner if isinstance(item, dict | list))
-    return found or [part]
+    return containers or [part]
 
 
 def _pick(draw: st.DrawFn, container: Any) -> Any:
-    """Return a key or an index of ``container``, or None when it is empty."""
+    """Return a key or an index of ``container``, or None if it is empty."""
     keys = list(container) if isinstance(container, dict) else list(range(len(container)))
     return draw(st.sampled_from(keys)) if keys else None
 
 
-def _lose(draw: st.DrawFn, container: Any, _: list[Any]) -> None:
+def _remove(draw: st.DrawFn, container: Any, _: list[Any]) -> None:
     key = _pick(draw, container)
     if key is not None:
         del container[key]
@@ -63,7 +63,7 @@ def _lose(draw: st.DrawFn, container: Any, _: list[Any]) -> None:
 def _replace(draw: st.DrawFn, container: Any, _: list[Any]) -> None:
     key = _pick(draw, container)
     if key is not None:
-        container[key] = copy.deepcopy(draw(VALUES))  # for it may be changed in its turn
+        container[key] = copy.deepcopy(draw(VALUES))  # may be mutated later
 
 
 def _rename(draw: st.DrawFn, container: Any, places: list[Any]) -> None:
@@ -71,12 +71,12 @@ def _rename(draw: st.DrawFn, container: Any, places: list[Any]) -> None:
     if not isinstance(key, str) or not isinstance(container, dict):
         return
     others = [name for place in places if isinstance(place, dict) for name in place]
-    misspelt = [key[1:], key + "s", key.upper(), key.replace("_", "-"), key[::-1]]
-    container[draw(st.sampled_from([*others, *misspelt]))] = container.pop(key)
+    misspelled = [key[1:], key + "s", key.upper(), key.replace("_", "-"), key[::-1]]
+    container[draw(st.sampled_from([*others, *misspelled]))] = container.pop(key)
 
 
 def _move(draw: st.DrawFn, container: Any, places: list[Any]) -> None:
-    """Put a copy of something from elsewhere there."""
+    """Replace a value with a copy of another value."""
     other = draw(st.sampled_from(places))
     key, source = _pick(draw, container), _pick(draw, other)
     if key is not None and source is not None:
@@ -84,7 +84,7 @@ def _move(draw: st.DrawFn, container: Any, places: list[Any]) -> None:
 
 
 def _spoil(draw: st.DrawFn, container: Any, _: list[Any]) -> None:
-    """Change a few characters of a text."""
+    """Change a few characters of a string."""
     key = _pick(draw, container)
     text = container[key] if key is not None else None
     if isinstance(text, str):
@@ -95,7 +95,7 @@ def _spoil(draw: st.DrawFn, container: Any, _: list[Any]) -> None:
 
 
 _CHANGES = {
-    "lose": _lose,
+    "remove": _remove,
     "move": _move,
     "rename": _rename,
     "replace": _replace,

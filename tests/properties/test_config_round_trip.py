@@ -1,4 +1,4 @@
-"""What ``compose config`` prints is a file that means the same as what it was made from."""
+"""``compose config`` prints a file that is equivalent to its input."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, plain
 from tests.properties.validating import SHIPPED
 
 SPAN = Span(SourceFile("it"), 1, 1)
-#: Systems that can be anywhere in a fleet, with variables and nodes that may be changed.
+#: Systems that can be included anywhere, with variables and nodes to override.
 PARTS: dict[str, dict[str, Any]] = {
     "robot.yaml": {"variables": {"start": [1.0, 2.5]}, "nodes": {"planner": {"executor": "slow"}}},
     "fleet.yaml": {"nodes": {"tower": {"lifecycle": {"timeout_ms": 10}}}},
@@ -32,7 +32,7 @@ PARTS: dict[str, dict[str, Any]] = {
 
 @st.composite
 def fleets(draw: st.DrawFn) -> dict[str, Any]:
-    """Draw a system that includes shipped ones, in all the ways there are."""
+    """Draw a system that includes shipped ones, with all features of includes."""
     includes = []
     for number in range(draw(st.integers(1, 3))):
         file = draw(st.sampled_from(sorted(PARTS)))
@@ -60,13 +60,13 @@ def fleets(draw: st.DrawFn) -> dict[str, Any]:
     }
 
 
-def hold(loading: LoadResult) -> None:
-    """Write what was loaded as one file: it must say the same, and be written so again."""
+def check_round_trip(loading: LoadResult) -> None:
+    """Check that the expanded file is equivalent to its input and a fixed point."""
     assert loading.tree is not None
     text = write_document(canonical(loading.tree))
     assert gives_same_model(loading, text)
-    tree, findings = parse_document(SourceFile("it", text))
-    assert findings == []
+    tree, diagnostics = parse_document(SourceFile("it", text))
+    assert diagnostics == []
     assert tree is not None
     if tree.entry("system") is not None:
         assert all(entry.name not in {"include", "variables"} for entry in tree)
@@ -75,15 +75,15 @@ def hold(loading: LoadResult) -> None:
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.name)
 def test_shipped_file(path: Path) -> None:
-    hold(load(path))
+    check_round_trip(load(path))
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    found = tmp_path_factory.mktemp("fleets")
+    folder = tmp_path_factory.mktemp("fleets")
     for path in systems_folder().glob("*.yaml"):
-        (found / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
-    return found
+        (folder / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    return folder
 
 
 @settings(max_examples=40, deadline=None)
@@ -94,7 +94,7 @@ def test_drawn_system(folder: Path, fleet: dict[str, Any]) -> None:
     loading = load(path)
     assert loading.system is not None
     assert {item.rule.name for item in loading.diagnostics} & {"unknown-key", "wrong-type"} == set()
-    hold(loading)
+    check_round_trip(loading)
 
 
 scalars = st.one_of(
@@ -128,10 +128,10 @@ trees = st.recursive(
 
 @settings(max_examples=200, deadline=None)
 @given(tree=maps(trees))
-def test_any_tree_is_read_as_it_was_written(tree: Mapping) -> None:
+def test_any_tree_round_trips(tree: Mapping) -> None:
     if not tree.entries:
         return
-    read, findings = parse_document(SourceFile("it", write_document(tree)))
-    assert [item.message for item in findings] == []
+    read, diagnostics = parse_document(SourceFile("it", write_document(tree)))
+    assert [item.message for item in diagnostics] == []
     assert read is not None
     assert repr(plain(read)) == repr(plain(tree))

@@ -1,4 +1,4 @@
-"""Dependencies of any shape: the order holds wherever there is one, cycles are really cycles."""
+"""Random dependency graphs: the order satisfies all dependencies, and cycles are cycles."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ graphs = st.integers(1, 9).flatmap(_graphs)
 
 
 def system_of(graph: list[list[int]]) -> System:
-    """Return a system of nodes n0, n1, ...; a number without a node stands for an unknown one."""
+    """Return a system of nodes n0, n1, ...; numbers without a node are unknown nodes."""
     nodes = tuple(
         Node(
             name=Located(f"n{number}", SPAN),

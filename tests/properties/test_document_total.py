@@ -1,4 +1,4 @@
-"""Reading takes any bytes, and what is written is what is read."""
+"""Any bytes can be parsed, and valid documents round-trip."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from composer.document.limits import MAX_INTEGER, MIN_INTEGER
 from composer.source import SourceFile
 from composer.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
 
-#: What YAML is made of, so that random texts get further than random characters do.
+#: Tokens of YAML, which get further than random characters.
 PIECES = st.sampled_from(
     [*"[]{},:?-#&*!|>'\"%@`\t \n\r\\~$", ": ", "- ", "a", "b: ", "<<", "*a", "&a ", "!!int ",
      "---\n", "...\n", "%YAML 1.1\n", "\n  ", "\n    ", '"\\x', "\\u", "é", "\ud800", "\x00",
@@ -34,27 +34,29 @@ def text_of(place: Tree) -> str:
 @example(b"%YAML 1." + b"9" * 5000)
 @example(b'"\\U00110000"')
 def test_any_bytes(data: bytes) -> None:
-    tree, source, findings = parse_bytes(data, "f")
-    assert tree is not None or findings
-    for finding in findings:
-        assert finding.primary.file == source
-        assert 1 <= finding.primary.line <= len(source.lines)
-        assert 1 <= finding.primary.column <= len(source.line(finding.primary.line)) + 1
-        assert finding.message.isprintable()
-        assert len(finding.message) < 2 * LONGEST_ECHO + 100
+    tree, source, diagnostics = parse_bytes(data, "f")
+    assert tree is not None or diagnostics
+    for diagnostic in diagnostics:
+        assert diagnostic.primary.file == source
+        assert 1 <= diagnostic.primary.line <= len(source.lines)
+        assert 1 <= diagnostic.primary.column <= len(source.line(diagnostic.primary.line)) + 1
+        assert diagnostic.message.isprintable()
+        assert len(diagnostic.message) < 2 * LONGEST_ECHO + 100
 
 
 @settings(max_examples=500, deadline=None)
 @given(st.lists(PIECES, max_size=30).map("".join))
 def test_any_text(text: str) -> None:
-    tree, findings = parse_document(SourceFile("f", text))
-    assert tree is not None or findings
-    for finding in findings:
+    tree, diagnostics = parse_document(SourceFile("f", text))
+    assert tree is not None or diagnostics
+    for diagnostic in diagnostics:
         assert (
-            1 <= finding.primary.column <= len(finding.primary.file.line(finding.primary.line)) + 1
+            1
+            <= diagnostic.primary.column
+            <= len(diagnostic.primary.file.line(diagnostic.primary.line)) + 1
         )
-        assert finding.message.isprintable()
-        assert finding.hint is None or finding.hint.isprintable()
+        assert diagnostic.message.isprintable()
+        assert diagnostic.hint is None or diagnostic.hint.isprintable()
 
 
 characters = st.characters(
@@ -112,8 +114,8 @@ def scalars_in(tree: Tree) -> list[Scalar]:
 @settings(max_examples=300, deadline=None)
 @given(documents, st.sampled_from([quoted, as_blocks]))
 def test_round_trip(document: dict[str, Plain], write: Callable[[Plain], str]) -> None:
-    tree, findings = parse_document(SourceFile("f", write(document)))
-    assert [finding.message for finding in findings] == []
+    tree, diagnostics = parse_document(SourceFile("f", write(document)))
+    assert [diagnostic.message for diagnostic in diagnostics] == []
     assert tree is not None
     assert repr(plain(tree)) == repr(document)
     for scalar in scalars_in(tree):

@@ -1,4 +1,4 @@
-"""Whatever is written, compiling and evaluating end quickly, in a value or in the one error."""
+"""Compiling and evaluating any expression ends quickly, with a value or a documented error."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ ESCAPES = (
 
 
 class Message:
-    """A message whose other attributes must never be touched."""
+    """A message whose other attributes must not be accessed."""
 
     _fields_and_field_types = {"data": "string", "items": "sequence<double>"}  # noqa: RUF012
     data = "text"
@@ -116,7 +116,7 @@ def scope() -> dict[str, Any]:
 
 
 def evaluate(source: str) -> object:
-    """Evaluate, and let nothing but the two documented errors be caught."""
+    """Return the value or one of the two documented errors."""
     started = time.process_time()
     try:
         return compile_expression(source).evaluate(scope())
@@ -127,12 +127,12 @@ def evaluate(source: str) -> object:
 
 
 @pytest.mark.parametrize("source", ESCAPES)
-def test_a_known_escape_leads_nowhere(source: str) -> None:
+def test_known_escapes_are_rejected(source: str) -> None:
     assert isinstance(evaluate(source), ExpressionError | EvaluationError)
 
 
 @given(st.text(max_size=600))
-def test_any_text_ends_in_a_value_or_an_error(source: str) -> None:
+def test_any_text_gives_a_value_or_an_error(source: str) -> None:
     evaluate(source)
 
 
@@ -147,7 +147,7 @@ WORDS = (
 
 
 @given(st.lists(st.sampled_from(WORDS), max_size=60), st.sampled_from(["", " "]))
-def test_any_run_of_words_ends_in_a_value_or_an_error(words: list[str], between: str) -> None:
+def test_any_sequence_of_words_gives_a_value_or_an_error(words: list[str], between: str) -> None:
     evaluate(between.join(words))
 
 
@@ -174,7 +174,7 @@ def expressions() -> st.SearchStrategy[str]:
 
 
 @given(expressions())
-def test_a_value_is_never_larger_than_what_went_in(source: str) -> None:
+def test_values_are_bounded(source: str) -> None:
     value = evaluate(source)
     if isinstance(value, int):
         assert -(2**63) <= value < 2**64
@@ -183,7 +183,7 @@ def test_a_value_is_never_larger_than_what_went_in(source: str) -> None:
 
 
 @given(expressions())
-def test_compiled_code_reaches_nothing_but_its_operations(source: str) -> None:
+def test_compiled_code_accesses_only_its_operations(source: str) -> None:
     try:
         code: CodeType = compile_expression(source).function.__code__
     except ExpressionError:
@@ -195,12 +195,12 @@ def test_compiled_code_reaches_nothing_but_its_operations(source: str) -> None:
 
 
 @given(expressions())
-def test_evaluating_twice_gives_the_same(source: str) -> None:
+def test_evaluation_is_deterministic(source: str) -> None:
     first, second = evaluate(source), evaluate(source)
     assert repr(first) == repr(second)
 
 
-def test_a_deep_stack_ends_in_the_error_too() -> None:
+def test_a_deep_stack_gives_an_error() -> None:
     def deeper(depth: int) -> object:
         return evaluate("((((((((((a.b.b + 1))))))))))") if depth == 0 else deeper(depth - 1)
 

@@ -1,4 +1,4 @@
-"""Resolving takes every tree, whatever stands where: nothing raises, and plans end."""
+"""Any tree can be resolved and planned without exceptions."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ trees = st.recursive(
 
 @st.composite
 def files(draw: st.DrawFn) -> Mapping:
-    """Draw a file that is a system or a node type by its first key, and anything behind it."""
+    """Draw a file whose first key makes it a system or a node type, with random content."""
     first = Entry(Scalar(draw(st.sampled_from(["system", "node"])), SPAN), draw(scalars))
     nodes = Entry(Scalar("nodes", SPAN), draw(mappings(mappings(trees))))
     rest = draw(mappings(trees))

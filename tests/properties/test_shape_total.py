@@ -1,4 +1,4 @@
-"""Variables and schemas take every tree that can be read, whatever stands where."""
+"""Any tree can be expanded and checked against the schemas."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ values: st.SearchStrategy[Plain] = st.recursive(
 
 @st.composite
 def files(draw: st.DrawFn) -> Mapping:
-    """Draw a file that has some of the right keys at its top."""
+    """Draw a file with some valid top-level keys."""
     kind = draw(st.sampled_from(SCHEMAS))
     properties = schema(kind)["properties"]
     content = draw(st.dictionaries(st.sampled_from(sorted(properties)), values, max_size=6))
@@ -44,8 +44,8 @@ def files(draw: st.DrawFn) -> Mapping:
 
 
 def tree_of(content: Plain) -> Mapping:
-    tree, findings = parse_document(SourceFile("f", json.dumps(content)))
-    assert findings == []
+    tree, diagnostics = parse_document(SourceFile("f", json.dumps(content)))
+    assert diagnostics == []
     assert tree is not None
     return tree
 
@@ -67,21 +67,21 @@ def size(tree: Tree) -> int:
 def test_any_tree(tree: Mapping, arguments: dict[str, Plain]) -> None:
     trees = {entry.name: entry.value for entry in tree_of(arguments)} if arguments else {}
     missing_variables(tree, trees)
-    expanded, findings = expand(tree, trees)
+    expanded, diagnostics = expand(tree, trees)
     assert size(expanded) <= 2 * MAX_VALUES
     for kind in SCHEMAS:
-        findings += check_schema(expanded, kind)
-    for finding in findings:
-        line = finding.primary.file.line(finding.primary.line)
-        assert 1 <= finding.primary.column <= len(line)
-        assert finding.message.isprintable()
+        diagnostics += check_schema(expanded, kind)
+    for diagnostic in diagnostics:
+        line = diagnostic.primary.file.line(diagnostic.primary.line)
+        assert 1 <= diagnostic.primary.column <= len(line)
+        assert diagnostic.message.isprintable()
 
 
 @settings(max_examples=100, deadline=None)
 @given(files())
-def test_expanding_twice_changes_nothing_that_was_complete(tree: Mapping) -> None:
-    once, findings = expand(tree, {})
+def test_expanding_a_complete_tree_again_changes_nothing(tree: Mapping) -> None:
+    once, diagnostics = expand(tree, {})
     if "${" not in json.dumps(plain(once)):
         twice, _ = expand(once, {})
         assert repr(plain(twice)) == repr(plain(once))
-        assert not any(finding.rule.name == "cyclic-variables" for finding in findings)
+        assert not any(diagnostic.rule.name == "cyclic-variables" for diagnostic in diagnostics)

@@ -1,4 +1,4 @@
-"""The whole of validating takes whatever people, programs and accidents make of a file."""
+"""Any file can be validated, and its diagnostics are well-formed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,13 @@ from composer.assembly.canonical import canonical
 from composer.document.writer import write_document
 from composer.loading import collect_diagnostics, load
 from tests.properties.mutation import mutated
-from tests.properties.validating import INTERFACES, SHIPPED, contents, hold, validate_and_check
+from tests.properties.validating import (
+    INTERFACES,
+    SHIPPED,
+    check_diagnostics,
+    contents,
+    validate_and_check,
+)
 
 CONTENTS = contents()
 TEXTS = [path.read_text(encoding="utf-8") for path in SHIPPED]
@@ -21,16 +27,16 @@ TEXTS = [path.read_text(encoding="utf-8") for path in SHIPPED]
 
 @st.composite
 def spliced(draw: st.DrawFn) -> str:
-    """Draw a shipped file with pieces lost, doubled, moved and changed."""
+    """Draw a shipped file with lines removed, duplicated, moved and indented."""
     lines = draw(st.sampled_from(TEXTS)).splitlines(keepends=True)
     for _ in range(draw(st.integers(1, 4))):
         start = draw(st.integers(0, len(lines)))
         end = draw(st.integers(start, min(start + 4, len(lines))))
         piece = lines[start:end]
-        match draw(st.sampled_from(["lose", "double", "move", "indent", "insert"])):
-            case "lose":
+        match draw(st.sampled_from(["remove", "duplicate", "move", "indent", "insert"])):
+            case "remove":
                 lines[start:end] = []
-            case "double":
+            case "duplicate":
                 lines[start:start] = piece
             case "move":
                 lines[start:end] = []
@@ -44,26 +50,28 @@ def spliced(draw: st.DrawFn) -> str:
     return "".join(lines)
 
 
-#: A shipped file that says something else here and there; and one that is written otherwise.
-MISTAKEN = st.sampled_from(CONTENTS).flatmap(mutated).map(lambda said: json.dumps(said).encode())
-MISWRITTEN = spliced().map(str.encode)
+#: Shipped files with mutated values, and with mutated text.
+MUTATED = (
+    st.sampled_from(CONTENTS).flatmap(mutated).map(lambda content: json.dumps(content).encode())
+)
+SPLICED = spliced().map(str.encode)
 
 
 @settings(max_examples=150, deadline=None)
-@given(MISTAKEN)
-def test_files_with_mistakes(data: bytes) -> None:
+@given(MUTATED)
+def test_mutated_files(data: bytes) -> None:
     validate_and_check(data)
 
 
 @settings(max_examples=100, deadline=None)
-@given(MISWRITTEN)
+@given(SPLICED)
 @example(b"")
 @example(b"system: a\nnodes: {b: {type: [x]}}\n")
-def test_files_with_pieces_out_of_place(data: bytes) -> None:
+def test_spliced_files(data: bytes) -> None:
     validate_and_check(data)
 
 
-#: The first is included under two names; the second extended by the type of a node.
+#: Includes part.yaml twice.
 WHOLE = """\
 system: whole
 include:
@@ -90,20 +98,20 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @settings(max_examples=60, deadline=None)
-@given(part=MISTAKEN | MISWRITTEN, base=MISTAKEN | MISWRITTEN)
-def test_mistakes_in_what_is_included_and_extended(project: Path, part: bytes, base: bytes) -> None:
+@given(part=MUTATED | SPLICED, base=MUTATED | SPLICED)
+def test_errors_in_included_and_extended_files(project: Path, part: bytes, base: bytes) -> None:
     (project / "part.yaml").write_bytes(part)
     (project / "nodes" / "base.yaml").write_bytes(base)
     names = ["whole.yaml", "part.yaml", "nodes/child.yaml"]
     loadings = [load(project / name, shown=name, interfaces=INTERFACES) for name in names]
     for loading in loadings:
-        hold(loading.diagnostics)
+        check_diagnostics(loading.diagnostics)
         if loading.tree is not None:
             write_document(canonical(loading.tree))
-    found = collect_diagnostics(loadings)
-    hold(found)
-    assert {finding.rule for loading in loadings for finding in loading.diagnostics} == {
-        finding.rule for finding in found if finding.rule.name != "unused-node-type"
+    collected = collect_diagnostics(loadings)
+    check_diagnostics(collected)
+    assert {diagnostic.rule for loading in loadings for diagnostic in loading.diagnostics} == {
+        diagnostic.rule for diagnostic in collected if diagnostic.rule.name != "unused-node-type"
     }
 
 

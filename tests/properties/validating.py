@@ -1,4 +1,4 @@
-"""What holds for everything that ``compose validate`` can be given."""
+"""Checks of the diagnostics of arbitrary files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ INTERFACES = Interfaces.load([interfaces_folder()])
 SHIPPED = tuple(
     path for folder in (systems_folder(), nodes_folder()) for path in sorted(folder.glob("*.yaml"))
 )
-#: What no shipped file says.
+#: Features that no shipped file uses.
 OTHERS = (
     {
         "node": "loud_watchdog",
@@ -47,44 +47,44 @@ RENDERERS = (report.render, sarif.render, github.render, text.render)
 
 
 def contents() -> list[Any]:
-    """Return what the shipped systems and node types say, and what none of them says."""
+    """Return the contents of the shipped systems and node types, and of OTHERS."""
     trees = (read_document(path)[0] for path in SHIPPED)
     return [*(plain(tree) for tree in trees if tree is not None), *OTHERS]
 
 
 def validate_and_check(data: bytes) -> list[Diagnostic]:
-    """Validate ``data`` as a file of this project, and hold the findings to their promises."""
-    said = io.StringIO()
-    with redirect_stdout(said), redirect_stderr(said):
-        found = load_bytes(data, ROOT, shown="systems/it.yaml", interfaces=INTERFACES).diagnostics
-    assert said.getvalue() == ""
-    hold(found)
-    return found
+    """Validate ``data`` as a file of this project and check its diagnostics."""
+    output = io.StringIO()
+    with redirect_stdout(output), redirect_stderr(output):
+        loading = load_bytes(data, ROOT, shown="systems/it.yaml", interfaces=INTERFACES)
+    assert output.getvalue() == ""
+    check_diagnostics(loading.diagnostics)
+    return loading.diagnostics
 
 
-def hold(found: list[Diagnostic]) -> None:
-    """Hold findings to what is promised of them: their places, their order, their reports."""
-    assert found == sorted(found, key=lambda finding: finding.sort_key)
-    for finding in found:
-        _hold(finding)
+def check_diagnostics(diagnostics: list[Diagnostic]) -> None:
+    """Check the locations, the order and the rendering of diagnostics."""
+    assert diagnostics == sorted(diagnostics, key=lambda diagnostic: diagnostic.sort_key)
+    for diagnostic in diagnostics:
+        _check(diagnostic)
     for render in RENDERERS:
-        _hold_text(render(found))
+        _check_text(render(diagnostics))
 
 
-def _hold(finding: Diagnostic) -> None:
-    for told in (finding.message, finding.hint or ""):
-        assert "\n" not in told
-        assert len(told) < 2000
-    for span in (finding.primary, *(label.span for label in finding.related)):
-        _hold_place(span)
+def _check(diagnostic: Diagnostic) -> None:
+    for text_part in (diagnostic.message, diagnostic.hint or ""):
+        assert "\n" not in text_part
+        assert len(text_part) < 2000
+    for span in (diagnostic.primary, *(label.span for label in diagnostic.related)):
+        _check_span(span)
 
 
-def _hold_place(span: Span) -> None:
+def _check_span(span: Span) -> None:
     line = span.file.line(span.line)
     assert 1 <= span.line <= max(len(span.file.lines), 1)
     assert 1 <= span.column <= len(line) + 1
     assert span.length >= 1
 
 
-def _hold_text(rendered: str) -> None:
+def _check_text(rendered: str) -> None:
     assert all(character.isprintable() or character == "\n" for character in rendered)
