@@ -17,6 +17,7 @@ INSTALL := $(PIP) install -qq
 # Every downloaded file must have one of the hashes in requirements/.
 INSTALL_PINNED := $(INSTALL) --require-hashes -r requirements
 INSTALL_PROJECT := $(INSTALL) --no-deps --no-build-isolation --editable .
+TWO_WORKERS := --numprocesses 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 INTERFACES := $(shell find interfaces -type f)
 READY := $(STAMPS)/composer $(STAMPS)/interfaces
 # Set only if this Python has no headers: create_environment.py downloads them into the environment.
@@ -28,12 +29,13 @@ ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION
 endif
 
-.PHONY: help run test soak check lint format generate docs bench profile fuzz dist test-wheel requirements clean
+.PHONY: help run test test-fast soak check lint format generate docs bench profile fuzz dist test-wheel requirements clean
 .NOTPARALLEL:
 
 help:
 	@echo "make run           run $(SYSTEM) (SYSTEM=... for another)"
 	@echo "make test          run the tests"
+	@echo "make test-fast     run the tests that need neither ROS nor much time (a minute)"
 	@echo "make soak          run the tests that take several minutes each"
 	@echo "make check         run lint, type and layer checks, and the tests"
 	@echo "make lint          run lint, type and layer checks only"
@@ -57,12 +59,19 @@ run: $(READY)
 # A dead worker fails the run: xdist would wait forever for its tests.
 test: $(READY) $(STAMPS)/dev
 	@echo "==> pytest"
-	@$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --max-worker-restart 0
+	@$(BIN)/python -m pytest $(TWO_WORKERS)
+
+# The inner loop: a quarter of the examples that hypothesis generates otherwise.
+test-fast: $(STAMPS)/composer $(STAMPS)/dev
+	@echo "==> pytest, the fast tests"
+	@$(BIN)/python -m pytest $(TWO_WORKERS) -m "not ros and not slow" --hypothesis-profile fast \
+	  tests/unit tests/golden tests/properties tests/cli
 
 # Problems that appear only after hundreds of starts, shutdowns and transitions.
 soak: $(READY) $(STAMPS)/dev
-	@echo "==> pytest -m soak (ten minutes)"
+	@echo "==> pytest -m soak (a quarter of an hour)"
 	@$(BIN)/python -m pytest --soak -m soak --override-ini faulthandler_timeout=1860
+	@$(BIN)/python -m pytest --hypothesis-profile thorough --timeout 600 tests/properties
 
 check: lint test
 
@@ -116,7 +125,7 @@ test-wheel: $(READY) $(STAMPS)/dev
 	@rm -f $(STAMPS)/composer $(STAMPS)/dev
 	@rm -rf build/tree && mkdir -p build/tree
 	@git archive HEAD ':!composer' | tar -x -C build/tree
-	@cd build/tree && $(abspath $(BIN))/python -m pytest --numprocesses 2 --dist loadfile --max-worker-restart 0 \
+	@cd build/tree && $(abspath $(BIN))/python -m pytest $(TWO_WORKERS) \
 	  --ignore tests/packaging
 
 requirements: $(STAMPS)/tools

@@ -1,4 +1,4 @@
-"""Fixtures and hooks of all tests: a separate ROS domain, and skips without ROS."""
+"""Fixtures of all tests: DDS domains, the environment, and skips where ROS is missing."""
 
 from __future__ import annotations
 
@@ -15,44 +15,49 @@ from pathlib import Path
 from typing import TextIO
 
 import pytest
-from hypothesis import HealthCheck, settings
 
 from composer.runtime.process.dds_participants import count_participants
+from tests.examples import register_profiles
 
-TESTS_WITH_ROS = Path(__file__).parent / "ros"
-PROFILE_OF_FAST_DDS = Path(__file__).with_name("udp_on_this_computer.xml")
+TESTS = Path(__file__).parent
+TESTS_WITH_ROS = TESTS / "ros"
+#: These start no ROS node, so all of them share a domain.
+TESTS_WITHOUT_NODES = (TESTS / "unit", TESTS / "golden", TESTS / "properties")
+FAST_DDS_PROFILE = Path(__file__).with_name("udp_on_this_computer.xml")
 NO_ROS = "rclpy cannot be imported"
-# Domain 0 is used by other systems; ports of IDs above 101 collide with ephemeral ports.
+# Domain 0 is the default of real robots; the ports of ids above 101 are ephemeral ports on Linux.
 DOMAIN_IDS = range(1, 102)
 
-# The duration of an example depends on the load of the machine and on first-time imports.
-settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("unhurried")
+register_profiles()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update-golden",
         action="store_true",
-        help="update the expected output of the golden tests",
+        help="write the actual output as the expected output; review the difference afterwards",
     )
-    parser.addoption("--soak", action="store_true", help="also run tests that take many minutes")
+    parser.addoption(
+        "--soak", action="store_true", help="also run the tests that take many minutes"
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    # Without a bytecode cache, each of hundreds of commands would compile the composer.
+    # Without bytecode files, hundreds of commands would each compile the composer.
     if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
         folder = tempfile.TemporaryDirectory(prefix="bytecode-")
         config.add_cleanup(folder.cleanup)
         os.environ["PYTHONPYCACHEPREFIX"] = folder.name
-    # Background jobs of scripts ignore SIGINT, and child processes inherit this: restore the
-    # default, so that tests can use Ctrl-C.
+    # numpy, which every ROS process imports, would start a thread for each core.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # A background job of a script ignores SIGINT, and its children inherit that: tests could not
+    # check whether programs stop at Ctrl-C.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _may_skip() -> bool:
-    """Return whether tests with ROS may be skipped without ROS, which CI does not allow."""
+    """Return whether tests with ROS may be skipped: never in CI."""
     return importlib.util.find_spec("rclpy") is None and os.environ.get("CI") != "true"
 
 
@@ -72,12 +77,15 @@ def pytest_pycollect_makemodule(
 
 
 def pytest_collection_finish() -> None:
-    """Exclude the collected tests and their imports from garbage collection."""
+    """Keep the garbage collector from visiting thousands of tests and their modules."""
     gc.collect()
     gc.freeze()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    # With xdist's --no-loadscope-reorder: the long files, which are those with ROS, come first, so
+    # that the workers finish at the same time.
+    items.sort(key=lambda item: not item.path.is_relative_to(TESTS_WITH_ROS))
     if not config.getoption("--soak"):
         _deselect(config, items, "soak")
     may_skip = _may_skip()
@@ -95,35 +103,36 @@ def _deselect(config: pytest.Config, items: list[pytest.Item], marker: str) -> N
         items[:] = [item for item in items if item not in deselected]
 
 
-#: Domain IDs that the current test has used.
-_visited: set[int] = set()
+#: The domain ids that the current test has used.
+_used_domain_ids: set[int] = set()
 
 
 def pytest_runtest_logfinish() -> None:
-    """Collect reference cycles, so that their nodes leave the ROS graph and release sockets.
+    """Collect nodes in reference cycles, so that their participants leave the ROS graph.
 
-    Lifecycle nodes of rclpy and tracebacks contain reference cycles. Fixtures hold their objects
-    until here.
+    rclpy's lifecycle nodes are in cycles, and so are nodes in the traceback of an exception. The
+    fixtures have released them by now.
     """
-    if any(count_participants(domain_id) for domain_id in _visited):
+    if any(count_participants(domain_id) for domain_id in _used_domain_ids):
         gc.collect()
-    _visited.clear()
+    _used_domain_ids.clear()
 
 
 def _lock_domain_id() -> tuple[int, TextIO]:
-    """Lock the least recently used domain ID without participants and return it.
+    """Return the least recently used domain id that is free, and its locked file.
 
-    Leftovers of killed processes and nodes of blocked test processes thus do not affect other
-    tests. The lock is held until the returned file is closed or the process exits.
+    Participants that a killed process left behind have expired by the time an id is used again. An
+    id with live participants, such as hanging nodes of another test process, is skipped. The lock
+    lasts as long as the file is open, however the process ends.
     """
     locks = Path(tempfile.gettempdir()) / f"ros2-composer-domain-ids-{os.getuid()}"
     locks.mkdir(exist_ok=True)
 
-    def used_s(domain_id: int) -> float:
+    def last_used_s(domain_id: int) -> float:
         lock = locks / str(domain_id)
         return lock.stat().st_mtime if lock.exists() else 0.0
 
-    for domain_id in sorted(DOMAIN_IDS, key=used_s):
+    for domain_id in sorted(DOMAIN_IDS, key=last_used_s):
         lock = (locks / str(domain_id)).open("a", encoding="ascii")
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -134,14 +143,14 @@ def _lock_domain_id() -> tuple[int, TextIO]:
             lock.close()
             continue
         os.utime(lock.fileno())
-        _visited.add(domain_id)
+        _used_domain_ids.add(domain_id)
         return domain_id, lock
-    pytest.exit(f"all {len(DOMAIN_IDS)} domain IDs are used by other processes", 3)
+    pytest.exit(f"all {len(DOMAIN_IDS)} domain ids are in use by other processes", 3)
 
 
 @contextmanager
 def _restored_environment() -> Iterator[None]:
-    """Restore changed variables only, since other threads may read the environment."""
+    """Undo changes of the environment, one by one: other threads may read it meanwhile."""
     before = dict(os.environ)
     yield
     for name in os.environ.keys() - before.keys():
@@ -153,47 +162,57 @@ def _restored_environment() -> Iterator[None]:
 
 @contextmanager
 def _domain() -> Iterator[int]:
-    """Set a domain ID for this process and its child processes.
+    """Set a domain id of its own for this process and the processes it starts.
 
-    Discovery is limited to this computer, and shared memory is disabled. Environment variables
-    that a host sets in this process are restored at the end.
+    Participants use UDP on this computer only, without shared memory.
     """
     domain_id, lock = _lock_domain_id()
     with _restored_environment(), pytest.MonkeyPatch.context() as environment, lock:
         environment.setenv("ROS_DOMAIN_ID", str(domain_id))
-        # Shared memory spans all domains and outlives killed processes. Destroying a participant
-        # right after another one was killed can crash or deadlock: Fast DDS locks a mutex that its
-        # own listener is about to replace (SharedMemManager::Listener::close).
-        environment.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(PROFILE_OF_FAST_DDS))
+        # All domains share the shared-memory segments, which outlive killed processes. A
+        # participant that is destroyed right after another one was killed may crash or hang: Fast
+        # DDS locks what its own listener is about to replace (SharedMemManager::Listener::close).
+        environment.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(FAST_DDS_PROFILE))
         environment.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SYSTEM_DEFAULT")
-        if "AMENT_PREFIX_PATH" not in os.environ:  # set by a sourced ROS, but not by the wheels
+        if "AMENT_PREFIX_PATH" not in os.environ:  # the wheels do not set it, a sourced ROS does
             environment.setenv("AMENT_PREFIX_PATH", sys.prefix)
         yield domain_id
-        os.utime(lock.fileno())  # start of its idle time
+        os.utime(lock.fileno())  # the id is free from now on
 
 
 @pytest.fixture(scope="session")
 def in_a_domain() -> Callable[[], AbstractContextManager[int]]:
-    """Return a context manager that locks a domain ID."""
+    """A context manager that holds a domain id."""
     return _domain
+
+
+@pytest.fixture(scope="session")
+def session_domain_id() -> Iterator[int]:
+    """The domain id of all tests without nodes."""
+    with _domain() as domain_id:
+        yield domain_id
 
 
 @pytest.fixture(scope="module")
 def shared_domain_id() -> Iterator[int]:
-    """The domain ID that all tests of a module share."""
+    """The domain id of all tests of a module, for nodes and processes that they share."""
     with _domain() as domain_id:
         yield domain_id
 
 
 @pytest.fixture(autouse=True)
 def ros_domain_id(request: pytest.FixtureRequest) -> Iterator[int]:
-    """The domain ID of this test.
+    """The domain id of this test.
 
-    Each test has its own, since stale discovery data of a previous test would affect it. Tests of
-    a module that share nodes share the domain ID, too.
+    A test with nodes has its own. Otherwise endpoints of the previous test that are still known
+    would be counted, and services that are half known would not be ready.
     """
-    if "shared_domain_id" in request.fixturenames:
+    if any(map(request.path.is_relative_to, TESTS_WITHOUT_NODES)):
+        domain_id = request.getfixturevalue("session_domain_id")
+        with _restored_environment():
+            yield domain_id
+    elif "shared_domain_id" in request.fixturenames:
         yield request.getfixturevalue("shared_domain_id")
-        return
-    with _domain() as domain_id:
-        yield domain_id
+    else:
+        with _domain() as domain_id:
+            yield domain_id

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from composer.assembly.canonical import canonical
@@ -17,6 +17,7 @@ from composer.loading import LoadResult, gives_same_model, load
 from composer.resources import systems_folder
 from composer.source import SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, plain
+from tests.examples import examples
 from tests.properties.validating import SHIPPED
 
 SPAN = Span(SourceFile("it"), 1, 1)
@@ -86,7 +87,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(fleet=fleets())
 def test_drawn_system(folder: Path, fleet: dict[str, Any]) -> None:
     path = folder / "drawn.yaml"
@@ -126,7 +127,7 @@ trees = st.recursive(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(tree=maps(trees))
 def test_any_tree_round_trips(tree: Mapping) -> None:
     if not tree.entries:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from composer.diagnostics import LONGEST_ECHO
@@ -13,6 +13,7 @@ from composer.document import parse_bytes, parse_document
 from composer.document.limits import MAX_INTEGER, MIN_INTEGER
 from composer.source import SourceFile
 from composer.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
+from tests.examples import examples
 
 #: Tokens of YAML, which get further than random characters.
 PIECES = st.sampled_from(
@@ -28,7 +29,7 @@ def text_of(place: Tree) -> str:
     return span.file.line(span.line)[span.column - 1 : span.column - 1 + span.length]
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(st.binary(max_size=200))
 @example(b"\xff\xfe\x00")
 @example(b"%YAML 1." + b"9" * 5000)
@@ -44,7 +45,7 @@ def test_any_bytes(data: bytes) -> None:
         assert len(diagnostic.message) < 2 * LONGEST_ECHO + 100
 
 
-@settings(max_examples=500, deadline=None)
+@examples(500)
 @given(st.lists(PIECES, max_size=30).map("".join))
 def test_any_text(text: str) -> None:
     tree, diagnostics = parse_document(SourceFile("f", text))
@@ -111,7 +112,7 @@ def scalars_in(tree: Tree) -> list[Scalar]:
             return keys + [scalar for entry in tree for scalar in scalars_in(entry.value)]
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(documents, st.sampled_from([quoted, as_blocks]))
 def test_round_trip(document: dict[str, Plain], write: Callable[[Plain], str]) -> None:
     tree, diagnostics = parse_document(SourceFile("f", write(document)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from composer.model.dependencies import dependency_cycles
@@ -14,6 +14,7 @@ from composer.project import Project
 from composer.resolve import OverrideOptions, read_overrides, resolve
 from composer.source import SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
+from tests.examples import examples
 
 SOURCE = SourceFile("robot.yaml", "")
 SPAN = Span(SOURCE, 1, 1)
@@ -67,7 +68,7 @@ def files(draw: st.DrawFn) -> Mapping:
     return Mapping((first, nodes, *kept), SPAN)
 
 
-@settings(max_examples=120, deadline=None)
+@examples(120)
 @given(tree=files(), text=st.sampled_from(TEXTS) | st.text(max_size=12))
 def test_every_tree_has_a_model_and_a_plan(tree: Mapping, text: str) -> None:
     overrides, _ = read_overrides(OverrideOptions((f"a.b={text}", text), text))

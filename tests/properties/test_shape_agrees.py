@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft7Validator
 from jsonschema.validators import extend
@@ -15,6 +15,7 @@ from composer.resources import nodes_folder, systems_folder
 from composer.schema import SCHEMAS, schema
 from composer.schema.fast_check import compile_check
 from composer.tree import plain
+from tests.examples import examples
 from tests.properties.mutation import mutated
 
 STRICT = extend(
@@ -34,7 +35,7 @@ FILES = [
 ]
 
 
-@settings(max_examples=400, deadline=None)
+@examples(400)
 @given(st.sampled_from(FILES).flatmap(mutated))
 def test_on_mutated_files(content: Any) -> None:
     for name in SCHEMAS:

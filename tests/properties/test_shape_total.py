@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from composer.document import parse_document
@@ -13,6 +13,7 @@ from composer.expand import expand, missing_variables
 from composer.schema import SCHEMAS, check_schema, schema
 from composer.source import SourceFile
 from composer.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
+from tests.examples import examples
 
 KEYS = sorted(
     {
@@ -60,7 +61,7 @@ def size(tree: Tree) -> int:
             return 1 + sum(1 + size(entry.value) for entry in tree)
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(files(), st.dictionaries(st.sampled_from(["a", "b", "c"]), values, max_size=2))
 @example(tree_of({"node": "a", "timers": {"t": {"rate_hz": 1, "period_ms": 1}}}), {})
 @example(tree_of({"system": "a", "nodes": {"a": {"typ": {}}}, "connections": [{"topc": 1}]}), {})
@@ -77,7 +78,7 @@ def test_any_tree(tree: Mapping, arguments: dict[str, Plain]) -> None:
         assert diagnostic.message.isprintable()
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(files())
 def test_expanding_a_complete_tree_again_changes_nothing(tree: Mapping) -> None:
     once, diagnostics = expand(tree, {})

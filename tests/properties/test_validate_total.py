@@ -6,12 +6,13 @@ import json
 from pathlib import Path
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from composer.assembly.canonical import canonical
 from composer.document.writer import write_document
 from composer.loading import collect_diagnostics, load
+from tests.examples import examples
 from tests.properties.mutation import mutated
 from tests.properties.validating import (
     INTERFACES,
@@ -57,13 +58,13 @@ MUTATED = (
 SPLICED = spliced().map(str.encode)
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(MUTATED)
 def test_mutated_files(data: bytes) -> None:
     validate_and_check(data)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(SPLICED)
 @example(b"")
 @example(b"system: a\nnodes: {b: {type: [x]}}\n")
@@ -97,7 +98,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(part=MUTATED | SPLICED, base=MUTATED | SPLICED)
 def test_errors_in_included_and_extended_files(project: Path, part: bytes, base: bytes) -> None:
     (project / "part.yaml").write_bytes(part)

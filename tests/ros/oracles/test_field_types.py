@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from composer.expressions import EvaluationError
 from composer.field_types import INTEGER, NUMBER, STRING, FieldChecker, Scope, type_of
 from composer.interfaces import Interfaces
 from composer.runtime.ros.messages import MessageError, compile_message, interface_class
+from tests.examples import examples
 from tests.unit.support.field_types import template
 
 INTERFACES = Interfaces.load()
@@ -73,7 +74,7 @@ def taken_by_the_runtime(value: Any, name: str) -> bool:
     return True
 
 
-@settings(max_examples=400)
+@examples(400)
 @given(st.dictionaries(FIELDS, CONTENT, max_size=2), st.sampled_from(MESSAGES))
 def test_judge_and_runtime_agree(value: dict[str, Any], name: str) -> None:
     message = INTERFACES.message(name)
@@ -82,7 +83,7 @@ def test_judge_and_runtime_agree(value: dict[str, Any], name: str) -> None:
     assert taken_by_the_runtime(value, name) == (not judged), judged
 
 
-@settings(max_examples=400)
+@examples(400)
 @given(CONTENT, st.sampled_from(MESSAGES), st.data())
 def test_judge_and_runtime_agree_on_fields(value: Any, name: str, data: st.DataObject) -> None:
     message = INTERFACES.message(name)

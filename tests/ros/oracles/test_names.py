@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from rclpy.exceptions import (
     InvalidNamespaceException,
@@ -27,6 +27,7 @@ from composer.names import (
     node_name_problem,
     topic_name_problem,
 )
+from tests.examples import examples
 
 INVALID = (
     InvalidNamespaceException,
@@ -87,7 +88,7 @@ def test_topic_names(name: str) -> None:
     assert judged_alike(topic_name_problem(name), accepts(full_name, name))
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(
     st.one_of(NAMES, TOKENS),
     st.sampled_from(["n", "_node", "n2"]),

@@ -105,6 +105,7 @@ def test_behaviors_are_read_for_what_they_publish(
     assert topic_hz("/chatter", BEHAVIOR, tmp_path) == rate_hz
 
 
+@pytest.mark.slow  # 1500 nodes
 def test_a_long_line_of_relays_is_followed(tmp_path: Path) -> None:
     count = 1500
     nodes = [TALKER]

@@ -108,6 +108,7 @@ def test_values_through_aliases_count_again(items: int, fits: bool) -> None:
     assert (tree is not None, findings == []) == (fits, fits)
 
 
+@pytest.mark.slow  # reads as much as a file may have
 def test_memory() -> None:
     program = (
         "import re\n"

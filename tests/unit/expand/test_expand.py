@@ -257,6 +257,7 @@ def test_depth(around: int, fits: bool) -> None:
 MANY = 20_000
 
 
+@pytest.mark.slow  # 20 000 variables
 @pytest.mark.parametrize(
     "text",
     [

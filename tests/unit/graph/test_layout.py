@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from itertools import combinations
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from composer.graph.layout import Layout, Place, arrange
 from composer.graph.measure import sizes
 from composer.graph.picture import Cluster, Direction, Edge, Graph, Kind, Line, Vertex
+from tests.examples import examples
 
 
 def graph_of(
@@ -109,7 +110,7 @@ def graphs(draw: st.DrawFn) -> Graph:
     return graph_of(vertices, edges, clusters, draw(st.sampled_from(Direction)))
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(graphs())
 def test_nothing_overlaps_that_must_not(graph: Graph) -> None:
     layout = laid_out(graph)
@@ -127,7 +128,7 @@ def test_nothing_overlaps_that_must_not(graph: Graph) -> None:
         assert not overlap(first, second)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(graphs())
 def test_frames_hold_what_is_theirs_and_nothing_else(graph: Graph) -> None:
     layout = laid_out(graph)
@@ -147,7 +148,7 @@ def test_frames_hold_what_is_theirs_and_nothing_else(graph: Graph) -> None:
                 assert not overlap(frame.place, place)
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(graphs())
 def test_everything_is_inside_the_picture_and_comes_out_the_same_again(graph: Graph) -> None:
     layout = laid_out(graph)

@@ -86,7 +86,7 @@ def laid_out(count: int, view: View, engine: Engine) -> tuple[Graph, Layout, flo
 
 @pytest.mark.parametrize("engine", [Engine.BUNDLED, Engine.AUTO])
 @pytest.mark.parametrize("view", list(View))
-@pytest.mark.parametrize("count", [3, 30, 300])
+@pytest.mark.parametrize("count", [3, 30, pytest.param(300, marks=pytest.mark.slow)])
 def test_no_box_and_no_label_lies_on_another(count: int, view: View, engine: Engine) -> None:
     graph, layout, _ = laid_out(count, view, engine)
     boxes = [*solids(graph, layout), *labels(graph, layout)]
@@ -94,6 +94,7 @@ def test_no_box_and_no_label_lies_on_another(count: int, view: View, engine: Eng
     assert overlaps(boxes) == []
 
 
+@pytest.mark.slow  # lays out 300 nodes
 @pytest.mark.parametrize("view", list(View))
 def test_a_picture_of_300_nodes_is_laid_out_in_less_than_three_seconds(view: View) -> None:
     assert laid_out(300, view, Engine.BUNDLED)[2] < 3.0

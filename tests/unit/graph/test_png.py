@@ -41,6 +41,7 @@ def test_resvg_draws_it_twice_as_large_as_it_is_laid_out() -> None:
     assert height > 2 * layout.size.height  # the title is above
 
 
+@pytest.mark.slow  # rasterizes 40 megapixels
 def test_a_large_picture_does_not_take_all_memory() -> None:
     pytest.importorskip("resvg_py")
     width, height = size(drawn(fleet_graph(300, View.DEPLOYMENT)))

@@ -200,6 +200,7 @@ def test_a_plan_ends_even_where_dependencies_go_round_in_a_circle() -> None:
     assert len(tear_down(system).steps) == 9
 
 
+@pytest.mark.slow  # 3000 nodes
 def test_a_long_chain_takes_no_time_and_no_stack() -> None:
     count = 3000
     chain = (

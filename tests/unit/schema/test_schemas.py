@@ -138,27 +138,32 @@ def large_system(nodes: int) -> str:
     return "\n".join(lines)
 
 
-def seconds_to_check(text: str) -> float:
+def seconds_to_check(text: str, times: int = 1) -> float:
+    """Return the shortest CPU time of ``times`` checks, in seconds."""
     tree, findings = parse_document(SourceFile("f", text))
     assert findings == []
     assert tree is not None
-    started = time.process_time()
-    check_schema(tree, "system")
-    return time.process_time() - started
+    durations_s = []
+    for _ in range(times):
+        started_s = time.process_time()
+        check_schema(tree, "system")
+        durations_s.append(time.process_time() - started_s)
+    return min(durations_s)
 
 
+@pytest.mark.slow  # 2000 nodes
 def test_large_system_is_checked_quickly() -> None:
     large_system_text = large_system(2000)
     seconds_to_check(large_system(1))  # loads the schema
     assert seconds_to_check(large_system_text) < 3.0
 
 
+@pytest.mark.slow  # 800 nodes with mistakes
 def test_mistakes_everywhere_cost_no_more_than_in_proportion() -> None:
-    few, many = (
-        min(
-            seconds_to_check(large_system(nodes).replace("type:", "typ:").replace("topic", "topc"))
-            for _ in range(2)
+    few_s, many_s = (
+        seconds_to_check(
+            large_system(nodes).replace("type:", "typ:").replace("topic", "topc"), times=2
         )
         for nodes in (100, 800)
     )
-    assert many < 20 * few
+    assert many_s < 20 * few_s

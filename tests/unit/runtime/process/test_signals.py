@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 ROUNDS = 20_000
 SENDER = """
 import os, signal
@@ -31,6 +33,7 @@ with stop_signals(main_queue.request_stop, main_queue.wakeup, ends_process=True)
 """
 
 
+@pytest.mark.slow  # 20 000 signals
 def test_a_signal_just_before_a_wait_ends_it() -> None:
     ended = subprocess.run(
         [sys.executable, "-c", RECEIVER], capture_output=True, text=True, timeout=60.0, check=False
