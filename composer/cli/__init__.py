@@ -1,7 +1,7 @@
-"""The command line: it parses, calls and prints. Whatever decides lives below.
+"""The command line: it parses arguments, calls the packages below and prints results.
 
-stdout is data, stderr is everything else. Exit codes: 0 clean, 1 findings or a node failed,
-2 usage, 3 a fault of the composer itself.
+stdout is data, stderr is everything else. Exit codes: 0 success, 1 errors in files or a failed
+node, 2 wrong usage, 3 internal error.
 """
 
 from __future__ import annotations
@@ -13,61 +13,61 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from composer.cli.support.failure import FINDINGS, Failure
+from composer.cli.support.errors import FAILED, CommandError
 
 INTERNAL = 3
 INTERRUPTED = 128 + signal.SIGINT
 
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command that ``arguments`` (those of the process unless given) name.
+    """Run a command and return the exit code.
 
-    Returns the exit code; nothing is raised.
+    ``arguments`` defaults to those of the process. No exception is raised.
     """
-    _have_streams()
+    _open_missing_streams()
     try:
         from composer.cli.app import application
 
         given = sys.argv[1:] if arguments is None else list(arguments)
         application(given)(args=given, prog_name="compose")
-    except KeyboardInterrupt:  # so early, or so late, that typer does not see it
+    except KeyboardInterrupt:  # before or after typer handles it
         return INTERRUPTED
     except SystemExit as end:
         return _exit_code(end)
-    except Failure as failure:
+    except CommandError as failure:
         print(failure.text(), file=sys.stderr)
         return failure.exit_code
     except OSError as error:
-        return _machine_error(error)
+        return _os_error(error)
     except Exception as error:
-        return INTERRUPTED if _comes_of_an_interrupt(error) else _internal_error(error)
+        return INTERRUPTED if _is_caused_by_interrupt(error) else _internal_error(error)
     finally:
         _flush()
     return 0
 
 
-def _have_streams() -> None:
-    """Let streams that the process was started without lead nowhere."""
+def _open_missing_streams() -> None:
+    """Open the null device in place of standard streams that are closed."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:  # opened for as long as the process lives
+        if getattr(sys, name) is None:  # open until the process ends
             setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
 
 
-def _machine_error(error: OSError) -> int:
-    """Say what is wrong with the machine, where that is known, and not with us."""
-    if error.errno in _NO_ROOM:
-        text = f"the output cannot be written: {error.strerror}"
-    elif not _is_in_a_folder():
-        text = "the current folder is gone: somebody has removed it"
+def _os_error(error: OSError) -> int:
+    """Report a full disk or a removed working directory; all else is an internal error."""
+    if error.errno in _DISK_FULL:
+        text = f"cannot write the output: {error.strerror}"
+    elif not _has_working_directory():
+        text = "the current working directory does not exist anymore"
     else:
         return _internal_error(error)
     print(f"compose: {text}", file=sys.stderr)
-    return FINDINGS
+    return FAILED
 
 
-def _is_in_a_folder() -> bool:
+def _has_working_directory() -> bool:
     try:
         return bool(Path.cwd())
     except FileNotFoundError:
@@ -80,31 +80,31 @@ def _exit_code(end: SystemExit) -> int:
     return end.code if isinstance(end.code, int) else 1
 
 
-def _comes_of_an_interrupt(error: BaseException) -> bool:
-    """Say whether it was Ctrl-C: a module in C makes another error of it while it is loaded."""
+def _is_caused_by_interrupt(error: BaseException) -> bool:
+    """Say whether Ctrl-C caused the error: C extensions raise ImportError for it while loading."""
     cause = error.__cause__
     return isinstance(cause, KeyboardInterrupt) or (
-        cause is not None and _comes_of_an_interrupt(cause)
+        cause is not None and _is_caused_by_interrupt(cause)
     )
 
 
 def _internal_error(error: Exception) -> int:
-    """Say shortly that this is our fault; the traceback is for who asks for it."""
+    """Report an internal error; with COMPOSE_DEBUG, print the traceback."""
     if os.environ.get("COMPOSE_DEBUG"):
         import traceback
 
         traceback.print_exception(error)
     print(f"compose: internal error: {type(error).__name__}: {error}", file=sys.stderr)
     print(
-        "  This is a fault of compose, not of your files. Please report it with the output of\n"
-        "  the same command with --debug in front (compose --debug ...) and of compose --version.",
+        "  This is a bug in compose. Please report it with the output of the same command with\n"
+        "  --debug (compose --debug ...) and of 'compose --version'.",
         file=sys.stderr,
     )
     return INTERNAL
 
 
 def _flush() -> None:
-    """Write out what is buffered now: at interpreter exit a closed pipe would be a traceback."""
+    """Flush stdout now: at interpreter exit, a closed pipe would print a traceback."""
     from composer.cli.support.terminal import drop_stdout
 
     try:

@@ -1,58 +1,58 @@
-"""The commands of ``compose``, put together. A new command is a file here and a word below."""
+"""The command-line application. To add a command, add a module and a line in COMMANDS."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Sequence
 from importlib import import_module
 from typing import Annotated
 
 import typer
 
-from composer.cli.support.help import examples
+from composer.cli.support.options import examples
 from composer.cli.support.terminal import write
 
-#: Each is a module here: with a function of its name and an EPILOG, or with an ``app`` of its own.
-COMMANDS = (
-    "run",
-    "ps",
-    "top",
-    "up",
-    "down",
-    "pause",
-    "resume",
-    "reset",
-    "validate",
-    "config",
-    "graph",
-    "diff",
-    "lifecycle",
-    "node",
-    "topic",
-    "service",
-    "action",
-    "param",
-    "interface",
-    "doctor",
-    "rule",
-    "schema",
-)
-
+#: Each command and its module in composer.cli.commands. The module has an ``app`` with subcommands,
+#: or a function with the name of the command and the epilogs of its commands in ``EPILOGS``.
+COMMANDS = {
+    "run": "run",
+    "ps": "ps",
+    "top": "top",
+    "up": "manage",
+    "down": "manage",
+    "pause": "manage",
+    "resume": "manage",
+    "reset": "manage",
+    "validate": "validate",
+    "config": "config",
+    "graph": "graph",
+    "diff": "diff",
+    "lifecycle": "lifecycle",
+    "node": "node",
+    "topic": "topic",
+    "service": "service",
+    "action": "action",
+    "param": "param",
+    "interface": "interface",
+    "doctor": "doctor",
+    "rule": "rule",
+    "schema": "schema",
+}
 
 EPILOG = examples(
     "compose run pipeline                        run an example system",
-    "compose run systems/pipeline.yaml           validate, bring up, keep up, tear down",
-    "compose validate systems nodes              every finding in one run",
-    "compose lifecycle set planner deactivate    from another terminal",
-    "compose graph systems/pipeline.yaml         a diagram, as Mermaid text",
+    "compose run systems/pipeline.yaml           run your own system",
+    "compose validate systems nodes              report all problems in your files",
+    "compose lifecycle set planner deactivate    change a running node",
+    "compose graph systems/pipeline.yaml         draw a diagram",
 )
 
 
-def application(arguments: Iterable[str] = ()) -> typer.Typer:
+def application(arguments: Sequence[str] = ()) -> typer.Typer:
     """Return the application for a command line.
 
-    Where ``arguments`` begin with a command it has that one only: to import and put together all
-    of them takes longer than most of them run.
+    Only the command in ``arguments`` is imported: importing all of them takes longer than most
+    commands run.
     """
     app = typer.Typer(
         no_args_is_help=True,
@@ -61,30 +61,36 @@ def application(arguments: Iterable[str] = ()) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback(epilog=EPILOG)(compose)
-    wanted = next((text for text in arguments if not text.startswith("-")), None)
-    for name in (wanted,) if wanted in COMMANDS else COMMANDS:
-        _add(app, str(name))
+    for name in _needed_commands(arguments):
+        _add(app, name)
     return app
 
 
+def _needed_commands(arguments: Sequence[str]) -> Sequence[str]:
+    if list(arguments) == ["--version"]:
+        return ()
+    command = next((text for text in arguments if not text.startswith("-")), None)
+    return (command,) if command in COMMANDS else tuple(COMMANDS)
+
+
 def _add(app: typer.Typer, name: str) -> None:
-    module = import_module(f"composer.cli.commands.{name}")
+    module = import_module(f"composer.cli.commands.{COMMANDS[name]}")
     if hasattr(module, "app"):
         app.add_typer(module.app, name=name)
     else:
-        app.command(name, epilog=module.EPILOG)(getattr(module, name))
+        app.command(name, epilog=module.EPILOGS[name])(getattr(module, name))
 
 
-def _show_version(asked: bool) -> None:
-    if asked:
+def _print_version(requested: bool) -> None:
+    if requested:
         from composer.report.tool import tool_version
 
         write(f"compose {tool_version()}")
         raise typer.Exit
 
 
-def _set_debug(asked: bool) -> None:
-    if asked:
+def _set_debug(requested: bool) -> None:
+    if requested:
         os.environ["COMPOSE_DEBUG"] = "1"
 
 
@@ -92,7 +98,7 @@ def compose(
     version: Annotated[
         bool,
         typer.Option(
-            "--version", callback=_show_version, is_eager=True, help="Print the version and exit."
+            "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
         ),
     ] = False,
     debug: Annotated[
@@ -100,14 +106,14 @@ def compose(
         typer.Option(
             "--debug",
             callback=_set_debug,
-            help="Show the traceback of an internal error (also: COMPOSE_DEBUG=1).",
+            help="Print the traceback of an internal error (or set COMPOSE_DEBUG=1).",
         ),
     ] = False,
 ) -> None:
-    """Declare, prove and run a ROS 2 system.
+    """Define, validate and run ROS 2 systems.
 
-    YAML says what the system is; compose checks it before anything starts, runs it as real
-    lifecycle nodes in one process, and lets any ROS 2 tool see it.
+    A system is declared in YAML files. Compose validates them, runs all nodes as lifecycle nodes in
+    one process, and works with every ROS 2 tool.
 
-    Exit codes: 0 clean, 1 findings or a node failed, 2 usage, 3 internal error.
+    Exit codes: 0 success, 1 errors in files or a failed node, 2 wrong usage, 3 internal error.
     """

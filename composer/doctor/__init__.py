@@ -1,5 +1,4 @@
-"""What keeps a ROS 2 system from working, outside of its files, and what to do about it.
+"""Checks of the ROS 2 setup of a computer, each with a remedy.
 
-``environment``, ``network``, ``versions`` and ``interfaces`` import no rclpy: they are looked at
-where it is missing, too. ``graph`` joins the ROS graph.
+Only ``graph`` imports rclpy. The other checks also work without it.
 """

@@ -1,11 +1,11 @@
-"""Interface packages among a project's sources: whether they are built, and as they are now."""
+"""Interface packages in the sources of a project: whether they are built and up to date."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
 
-from composer.doctor.finding import Finding, error, fine
+from composer.doctor.result import CheckResult, error, ok
 from composer.interfaces import Interfaces
 
 AREA = "interfaces"
@@ -13,25 +13,25 @@ _KINDS = ("msg", "srv", "action")
 
 
 def how_to_build(package: str) -> str:
-    """Return what makes an interface package known to Python."""
+    """Return the commands that build and install an interface package."""
     by_colcon = f"colcon build --packages-select {package}, then source install/setup.bash"
-    ours = package == "composer_interfaces"  # a folder of the composer, which pip can build
+    ours = package == "composer_interfaces"  # part of ros2-composer, which pip can build
     return f"pip install ./interfaces   or: {by_colcon}" if ours else by_colcon
 
 
-def look_at_interfaces(
+def check_interfaces(
     packages: Iterable[str], sources: Interfaces, built: Interfaces
-) -> Iterator[Finding]:
-    """Yield which ``packages`` are not built, and which types were built from other sources.
+) -> Iterator[CheckResult]:
+    """Check that ``packages`` are built from the current definitions.
 
-    ``sources`` are the definitions that count for checks, ``built`` those that are installed.
+    ``sources`` has the definitions of the project, ``built`` the installed ones.
     """
     found = sorted(packages)
     missing = [package for package in found if find_spec(package) is None]
     for package in missing:
         yield error(
             AREA,
-            f"interface package '{package}' is not built: nodes that use it do not start",
+            f"interface package '{package}' is not built: nodes that use it cannot start",
             how_to_build(package),
         )
     stale = {
@@ -42,11 +42,12 @@ def look_at_interfaces(
     for package, names in stale.items():
         yield error(
             AREA,
-            f"interface package '{package}' was built from other definitions of {', '.join(names)}",
-            f"colcon build --packages-select {package}, then start every process anew",
+            f"interface package '{package}' was built from different definitions of"
+            f" {', '.join(names)}",
+            f"colcon build --packages-select {package}, then restart all processes",
         )
     if found and not missing and not stale:
-        yield fine(AREA, f"built: {', '.join(found)}")
+        yield ok(AREA, f"built: {', '.join(found)}")
 
 
 def _changed(package: str, sources: Interfaces, built: Interfaces) -> list[str]:

@@ -1,4 +1,4 @@
-"""The network as DDS uses it: interfaces, multicast, shared memory."""
+"""The network as used by DDS: interfaces, multicast and shared memory."""
 
 from __future__ import annotations
 
@@ -9,53 +9,51 @@ import socket
 from collections.abc import Iterator
 from pathlib import Path
 
-from composer.doctor.finding import Finding, fine, note, warning
+from composer.doctor.result import CheckResult, note, ok, warning
 from composer.runtime.process.shared_memory import SHARED_MEMORY
 
 AREA = "network"
 #: The flags of net/if.h.
 _UP, _LOOPBACK, _MULTICAST = 0x1, 0x8, 0x1000
-#: Where participants announce themselves. See the DDS Interoperability Protocol, 9.6.1.4.
+#: The multicast group of DDS discovery. See the DDS Interoperability Protocol, 9.6.1.4.
 _GROUP = "239.255.0.1"
 _PROBE_S = 0.5
 _MEGABYTE = 1_000_000
-#: A participant of Fast DDS takes about half a megabyte, a large message its size.
-_LEAST_SHARED_MEMORY_BYTES = 16 * _MEGABYTE
+#: A Fast DDS participant needs about 0.5 MB; large messages need their size in addition.
+_MIN_SHARED_MEMORY_BYTES = 16 * _MEGABYTE
 
 
-def look_at_network(
+def check_network(
     reach: str,
     *,
     devices: Path = Path("/sys/class/net"),
     shared_memory: Path | None = SHARED_MEMORY,
-) -> Iterator[Finding]:
-    """Yield what hinders participants from meeting.
+) -> Iterator[CheckResult]:
+    """Check interfaces, multicast and shared memory.
 
-    ``reach`` is the discovery range; ``shared_memory`` None where DDS does not use it.
+    ``reach`` is the discovery range; ``shared_memory`` is None if DDS does not use it.
     """
     if reach == "SUBNET":
-        yield _interfaces(devices)
-        yield _multicast()
+        yield _check_interfaces(devices)
+        yield _check_multicast()
     if shared_memory is not None and shared_memory.is_dir():
-        yield _space(shared_memory)
-        yield from _leftovers(shared_memory)
+        yield _check_free_space(shared_memory)
+        yield from _check_leftovers(shared_memory)
 
 
-def _interfaces(devices: Path) -> Finding:
-    usable = sorted(
-        device.name for device in devices.glob("*") if _reaches_others(device / "flags")
-    )
+def _check_interfaces(devices: Path) -> CheckResult:
+    usable = sorted(device.name for device in devices.glob("*") if _is_usable(device / "flags"))
     if usable:
-        return fine(AREA, f"interfaces with multicast: {', '.join(usable)}")
+        return ok(AREA, f"interfaces with multicast: {', '.join(usable)}")
     return warning(
         AREA,
-        "no network interface is up and has multicast: other computers are not found",
-        "bring one up ('ip link set <name> up multicast on'), or name the other computers in"
+        "no network interface is up and supports multicast: other computers are not discovered",
+        "bring one up ('ip link set <name> up multicast on'), or list the other computers in"
         " ROS_STATIC_PEERS",
     )
 
 
-def _reaches_others(flags_file: Path) -> bool:
+def _is_usable(flags_file: Path) -> bool:
     try:
         flags = int(flags_file.read_text(encoding="ascii"), 16)
     except (OSError, ValueError):
@@ -63,22 +61,22 @@ def _reaches_others(flags_file: Path) -> bool:
     return bool(flags & _UP and flags & _MULTICAST and not flags & _LOOPBACK)
 
 
-def _multicast() -> Finding:
-    """Send a datagram to the group of DDS discovery and see whether it comes back."""
+def _check_multicast() -> CheckResult:
+    """Send a datagram to the multicast group of DDS and check that it arrives."""
     try:
         arrived = _probe()
     except OSError as problem:
-        return _no_multicast(f"multicast does not work here: {problem.strerror or problem}")
+        return _no_multicast(f"multicast does not work: {problem.strerror or problem}")
     if arrived:
-        return fine(AREA, "multicast works on this computer")
-    return _no_multicast(f"a multicast datagram did not come back within {_PROBE_S:g} s")
+        return ok(AREA, "multicast works on this computer")
+    return _no_multicast(f"a multicast datagram did not arrive within {_PROBE_S:g} s")
 
 
-def _no_multicast(message: str) -> Finding:
+def _no_multicast(message: str) -> CheckResult:
     return warning(
         AREA,
         message,
-        "let UDP to 239.255.0.1 through the firewall ('ufw allow in proto udp to 224.0.0.0/4'),"
+        "allow UDP to 239.255.0.1 in the firewall ('ufw allow in proto udp to 224.0.0.0/4'),"
         " or set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST or ROS_STATIC_PEERS",
     )
 
@@ -101,26 +99,26 @@ def _probe() -> bool:
             return False
 
 
-def _space(folder: Path) -> Finding:
+def _check_free_space(folder: Path) -> CheckResult:
     free_bytes = shutil.disk_usage(folder).free
-    if free_bytes >= _LEAST_SHARED_MEMORY_BYTES:
-        return fine(AREA, f"shared memory: {free_bytes / _MEGABYTE:.0f} MB free in {folder}")
+    if free_bytes >= _MIN_SHARED_MEMORY_BYTES:
+        return ok(AREA, f"shared memory: {free_bytes / _MEGABYTE:.0f} MB free in {folder}")
     return warning(
         AREA,
         f"shared memory: only {free_bytes / _MEGABYTE:.1f} MB free in {folder}",
-        "give the container more (docker run --shm-size=1g), remove leftovers"
+        "increase it for the container (docker run --shm-size=1g), remove leftovers"
         " ('fastdds shm clean'), or set FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
     )
 
 
-def _leftovers(folder: Path) -> Iterator[Finding]:
-    """Count segments of killed processes: Fast DDS locks the files of those that live."""
+def _check_leftovers(folder: Path) -> Iterator[CheckResult]:
+    """Count the segments of killed processes, whose files Fast DDS no longer locks."""
     dead = [path for path in sorted(folder.glob("fastrtps_*_el")) if _is_unlocked(path)]
     if dead:
         yield note(
             AREA,
-            f"{len(dead)} shared memory segment{'s' if len(dead) > 1 else ''} of processes that"
-            " were killed: Fast DDS complains about them",
+            f"{len(dead)} shared memory segment{'s' if len(dead) > 1 else ''} of killed processes:"
+            " Fast DDS prints errors about them",
             "run 'fastdds shm clean'",
         )
 
@@ -128,7 +126,7 @@ def _leftovers(folder: Path) -> Iterator[Finding]:
 def _is_unlocked(path: Path) -> bool:
     try:
         with path.open("rb") as file:
-            # A shared lock: it hinders nobody who is just starting from sharing it.
+            # A shared lock does not block processes that are starting.
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except OSError:
         return False

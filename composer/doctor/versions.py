@@ -1,4 +1,4 @@
-"""What is installed: the composer, Python, rclpy and the interfaces that come with the composer."""
+"""The versions of ros2-composer, Python and rclpy."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
-from composer.doctor.finding import Finding, error, fine, warning
+from composer.doctor.result import CheckResult, error, ok, warning
 
 AREA = "versions"
 #: Jazzy's rclpy, see https://github.com/ros2/rclpy/tree/jazzy.
@@ -17,31 +17,31 @@ _FROM_PYPI = 'pip install "ros2-composer[ros]"'
 _SOURCED = "source /opt/ros/jazzy/setup.bash"
 
 
-def look_at_versions(composer: str) -> Iterator[Finding]:
-    """Yield what is installed; ``composer`` is its version."""
+def check_versions(composer: str) -> Iterator[CheckResult]:
+    """Check the installed versions; ``composer`` is that of ros2-composer."""
     system = f"{platform.system()} {platform.machine()}"
-    yield fine(AREA, f"ros2-composer {composer}, Python {platform.python_version()}, {system}")
-    yield rclpy_finding(has_rclpy=find_spec("rclpy") is not None, found=_version("rclpy"))
+    yield ok(AREA, f"ros2-composer {composer}, Python {platform.python_version()}, {system}")
+    yield check_rclpy(has_rclpy=find_spec("rclpy") is not None, found=_version("rclpy"))
 
 
-def rclpy_finding(*, has_rclpy: bool, found: str | None) -> Finding:
-    """Judge the rclpy of this Python; ``found`` is its version where that is known."""
+def check_rclpy(*, has_rclpy: bool, found: str | None) -> CheckResult:
+    """Check rclpy in this Python; ``found`` is its version if known."""
     if not has_rclpy:
         return error(
             AREA,
-            f"rclpy is not installed in this Python ({sys.executable}): systems can be checked"
-            " and drawn, not run",
+            f"rclpy is not installed in this Python ({sys.executable}): systems can be validated"
+            " and drawn, but not run",
             f"{_FROM_PYPI}   or: {_SOURCED}",
         )
     if found is None:
-        return fine(AREA, "rclpy is installed, its version is not known")
+        return ok(AREA, "rclpy is installed; its version is unknown")
     if found.split(".")[0] != _MAJOR:
         return warning(
             AREA,
-            f"rclpy is {found}; the composer is made for Jazzy's, {_MAJOR}.x",
+            f"rclpy is {found}; ros2-composer supports {_MAJOR}.x (Jazzy)",
             f"{_FROM_PYPI}   or: {_SOURCED}",
         )
-    return fine(AREA, f"rclpy {found}")
+    return ok(AREA, f"rclpy {found}")
 
 
 def _version(distribution: str) -> str | None:

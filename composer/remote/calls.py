@@ -1,4 +1,4 @@
-"""Service calls and action goals from the command line, to any server."""
+"""Service calls and action goals, to any server."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from action_msgs.msg import GoalStatus
 from rclpy.action.client import ActionClient, ClientGoalHandle
 from rclpy.task import Future
 
-from composer.remote.graph_names import other_types
+from composer.remote.graph_names import type_mismatch_hint
 from composer.remote.requests import call_once
-from composer.remote.session import Deadline, NoAnswer, RosError, Session
+from composer.remote.session import Deadline, NoResponseError, RosError, Session
 from composer.remote.values import class_of, compile_content
 
 _STATUS = {
@@ -21,20 +21,21 @@ _STATUS = {
     GoalStatus.STATUS_CANCELED: "canceled",
     GoalStatus.STATUS_ABORTED: "aborted",
 }
-_CANCEL_PATIENCE_S = 2.0
-_LAST_WORDS_S = 0.5
+_CANCEL_WITHIN_S = 2.0
+#: How long to wait for a result that a server sent before it went away.
+_LAST_RESULT_S = 0.5
 
-#: Says whether somebody wants the end.
-Stop = Callable[[], bool]
+#: Says whether to stop waiting.
+ShouldStop = Callable[[], bool]
 
 
-class Rejected(RosError):
-    """The action server did not take the goal."""
+class GoalRejectedError(RosError):
+    """The action server rejected the goal."""
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
-    """How a goal ended: ``succeeded``, ``canceled`` or ``aborted``, and the result message."""
+class FinishedGoal:
+    """The end of a goal: ``succeeded``, ``canceled`` or ``aborted``, and the result message."""
 
     status: str
     result: Any
@@ -43,28 +44,30 @@ class Outcome:
 def call_service(
     session: Session, deadline: Deadline, name: str, type_name: str, request: str
 ) -> Any:
-    """Return the response to ``request``, which is YAML. Raises BadValue, NoAnswer."""
+    """Return the response to a request in YAML. Raises InvalidValueError, NoResponseError."""
     service = class_of(type_name, "service")
     message = compile_content(request, service.Request, "the request")({})
     try:
         return call_once(session, service, name, message, deadline)
-    except NoAnswer as error:
-        raise NoAnswer(str(error), other_types(session, "service", name, type_name)) from error
+    except NoResponseError as error:
+        raise NoResponseError(
+            str(error), type_mismatch_hint(session, "service", name, type_name)
+        ) from error
 
 
-class _Client(ActionClient):
-    """Takes all feedback that is there before a result: with that rclpy drops what is left."""
+class _ActionClient(ActionClient):
+    """Takes all feedback before the result: rclpy drops the feedback that is left after it."""
 
     def take_data(self) -> Any:
-        """Take what has come; the result stays where it is while feedback comes."""
+        """Take the data that is ready; leave the result while there is feedback."""
         self._is_result_response_ready = (
             self._is_result_response_ready and not self._is_feedback_ready
         )
         return super().take_data()
 
 
-class Goal:
-    """A goal that an action server has taken."""
+class AcceptedGoal:
+    """A goal that an action server has accepted."""
 
     def __init__(
         self, session: Session, client: ActionClient, name: str, handle: ClientGoalHandle
@@ -75,74 +78,77 @@ class Goal:
         self._handle = handle
         self._result: Future = handle.get_result_async()
 
-    def result(self, stop: Stop) -> Outcome | None:
-        """Wait for the end of the goal; None when ``stop`` comes first.
+    def result(self, should_stop: ShouldStop) -> FinishedGoal | None:
+        """Wait for the end of the goal; None if ``should_stop`` is true first.
 
-        Raises NoAnswer when the server goes away.
+        Raises NoResponseError if the server goes away.
         """
-        while not self._result.done() and not stop():
+        while not self._result.done() and not should_stop():
             self._session.spin_once(Deadline(1.0))
             if not self._client.server_is_ready():
-                self._take_last_words()
-        return self._outcome() if self._result.done() else None
+                self._wait_for_last_result()
+        return self._finished() if self._result.done() else None
 
-    def cancel(self) -> Outcome:
-        """Ask for the end of the goal and wait for it. Raises NoAnswer when it does not end."""
-        patience = Deadline(_CANCEL_PATIENCE_S)
+    def cancel(self) -> FinishedGoal:
+        """Cancel the goal and wait for its end. Raises NoResponseError if it does not end."""
+        limit = Deadline(_CANCEL_WITHIN_S)
         self._handle.cancel_goal_async()
-        if self._session.wait_for(lambda: self._result.done() or None, patience) is None:
-            raise NoAnswer("the goal was to be canceled and goes on")
-        return self._outcome()
+        if self._session.wait_for(lambda: self._result.done() or None, limit) is None:
+            raise NoResponseError(f"the goal was not canceled within {_CANCEL_WITHIN_S:g} s")
+        return self._finished()
 
-    def _take_last_words(self) -> None:
-        """Take a result that a server sent before it went away. Raises NoAnswer."""
-        patience = Deadline(_LAST_WORDS_S)
-        if self._session.wait_for(lambda: self._result.done() or None, patience) is None:
-            raise NoAnswer(f"the server of '{self._name}' is gone, and the goal with it")
+    def _wait_for_last_result(self) -> None:
+        """Wait for a result that was sent before the server went away. Raises NoResponseError."""
+        limit = Deadline(_LAST_RESULT_S)
+        if self._session.wait_for(lambda: self._result.done() or None, limit) is None:
+            raise NoResponseError(f"the server of '{self._name}' is gone, so the goal is lost")
 
-    def _outcome(self) -> Outcome:
+    def _finished(self) -> FinishedGoal:
         response = self._result.result()
-        return Outcome(_STATUS.get(response.status, "unknown"), response.result)
+        return FinishedGoal(_STATUS.get(response.status, "unknown"), response.result)
 
 
 @dataclass(frozen=True, slots=True)
-class Sending:
-    """A goal, which is YAML, for the action ``name`` of a type, and who follows it."""
+class GoalRequest:
+    """A goal, as YAML, for an action, with the handler of its feedback."""
 
     name: str
     type_name: str
     goal: str
     on_feedback: Callable[[Any], None]
-    stop: Stop
+    should_stop: ShouldStop
 
 
 @contextmanager
-def sent_goal(session: Session, deadline: Deadline, sending: Sending) -> Iterator[Goal]:
-    """Send a goal; the block begins once it is taken.
+def send_goal(session: Session, deadline: Deadline, request: GoalRequest) -> Iterator[AcceptedGoal]:
+    """Send a goal; the ``with`` block begins once it is accepted.
 
-    Raises BadValue, NoAnswer, Rejected, and KeyboardInterrupt when ``stop`` comes before the goal
-    is sent; a goal that is sent is waited for, so that it can be canceled.
+    Raises InvalidValueError, NoResponseError, GoalRejectedError. Raises KeyboardInterrupt if
+    ``should_stop`` is true before the goal is sent; afterwards the response is awaited, so that the
+    goal can be canceled.
     """
-    name = sending.name
-    action = class_of(sending.type_name, "action")
-    message = compile_content(sending.goal, action.Goal, "the goal")({})
-    client = _Client(session.node, action, name)
+    name = request.name
+    action = class_of(request.type_name, "action")
+    message = compile_content(request.goal, action.Goal, "the goal")({})
+    client = _ActionClient(session.node, action, name)
     try:
-        ready = session.wait_for(
-            lambda: client.server_is_ready() or sending.stop() or None, deadline
+        is_ready = session.wait_for(
+            lambda: client.server_is_ready() or request.should_stop() or None, deadline
         )
-        if sending.stop():
+        if request.should_stop():
             raise KeyboardInterrupt
-        if not ready:
-            hint = other_types(session, "action", name, sending.type_name)
-            raise NoAnswer(f"no server of '{name}' was there within {deadline.timeout_s:g} s", hint)
-        answer: Future = client.send_goal_async(
-            message, lambda item: sending.on_feedback(item.feedback)
+        if not is_ready:
+            hint = type_mismatch_hint(session, "action", name, request.type_name)
+            raise NoResponseError(
+                f"no server of '{name}' found within {deadline.timeout_s:g} s", hint
+            )
+        response: Future = client.send_goal_async(
+            message, lambda item: request.on_feedback(item.feedback)
         )
-        if not session.wait_for(lambda: answer.done() or None, deadline):
-            raise NoAnswer(f"'{name}' did not say within {deadline.timeout_s:g} s if it takes it")
-        if not answer.result().accepted:
-            raise Rejected(f"'{name}' rejected the goal")
-        yield Goal(session, client, name, answer.result())
+        if not session.wait_for(lambda: response.done() or None, deadline):
+            raise NoResponseError(f"no goal response from '{name}' within {deadline.timeout_s:g} s")
+        if not response.result().accepted:
+            raise GoalRejectedError(f"'{name}' rejected the goal")
+        yield AcceptedGoal(session, client, name, response.result())
     finally:
         client.destroy()

@@ -1,4 +1,4 @@
-"""What is in the ROS graph: nodes, topics, services, actions and who offers and uses them."""
+"""Names in the ROS graph: nodes, topics, services and actions, and the nodes that use them."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from rclpy.action.graph import (
 )
 from rclpy.node import Node
 
-from composer.remote.name_matching import find_node, full_name, not_there
-from composer.remote.session import Deadline, Session
+from composer.remote.name_matching import find_node, full_name, not_found_error
+from composer.remote.session import Deadline, RosError, Session
 
 T = TypeVar("T")
 
-#: (name, types): more than one type means that somebody has it wrong.
-Named = tuple[str, tuple[str, ...]]
+#: A name and its types. More than one type is a mistake in some node.
+NameAndTypes = tuple[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True, slots=True)
 class NodeInfo:
-    """What one node offers and uses, each by name."""
+    """The endpoints of a node, by name."""
 
     name: str
-    subscriptions: tuple[Named, ...]
-    publishers: tuple[Named, ...]
-    services: tuple[Named, ...]
-    clients: tuple[Named, ...]
-    action_servers: tuple[Named, ...]
-    action_clients: tuple[Named, ...]
+    subscriptions: tuple[NameAndTypes, ...]
+    publishers: tuple[NameAndTypes, ...]
+    services: tuple[NameAndTypes, ...]
+    clients: tuple[NameAndTypes, ...]
+    action_servers: tuple[NameAndTypes, ...]
+    action_clients: tuple[NameAndTypes, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class ActionInfo:
-    """Who serves an action and who uses it."""
+    """The nodes with a server or client of an action."""
 
     name: str
     types: tuple[str, ...]
@@ -46,15 +46,15 @@ class ActionInfo:
 
 
 def is_hidden(name: str) -> bool:
-    """Say whether a part of the name begins with an underscore.
+    """Say whether a part of the name starts with an underscore.
 
     See 'hidden' in the ROS 2 design article 'Topic and Service name mapping'.
     """
     return any(part.startswith("_") for part in name.split("/"))
 
 
-class Names:
-    """Looks names up in the graph, all within one time limit."""
+class GraphNames:
+    """Looks up names in the ROS graph, all within one time limit."""
 
     def __init__(self, session: Session, deadline: Deadline) -> None:
         self._session = session
@@ -62,55 +62,65 @@ class Names:
         self._node: Node = session.node
 
     def nodes(self, *, hidden: bool = False) -> tuple[str, ...]:
-        """Return the full names of all nodes; one that is there twice comes twice."""
-        return self._still(lambda: self._nodes(hidden))
+        """Return the full names of all nodes; a name that two nodes share is listed twice."""
+        return self._settled(lambda: self._nodes(hidden))
 
-    def topics(self, *, hidden: bool = False) -> tuple[Named, ...]:
+    def topics(self, *, hidden: bool = False) -> tuple[NameAndTypes, ...]:
         """Return all topics and their types."""
-        found = self._still(lambda: _named(self._node.get_topic_names_and_types(), hidden))
-        return found if self._session.others() else ()  # the command's own are not worth telling
+        found = self._settled(lambda: _sorted(self._node.get_topic_names_and_types(), hidden))
+        return found if self._session.others() else ()  # only the topics of this session
 
-    def services(self, *, hidden: bool = False) -> tuple[Named, ...]:
+    def services(self, *, hidden: bool = False) -> tuple[NameAndTypes, ...]:
         """Return all services and their types."""
-        return self._still(lambda: _named(self._node.get_service_names_and_types(), hidden))
+        return self._settled(lambda: _sorted(self._node.get_service_names_and_types(), hidden))
 
-    def actions(self) -> tuple[Named, ...]:
+    def actions(self) -> tuple[NameAndTypes, ...]:
         """Return all actions and their types."""
-        return self._still(lambda: _named(get_action_names_and_types(self._node), hidden=False))
+        return self._settled(lambda: _sorted(get_action_names_and_types(self._node), hidden=False))
 
     def node(self, name: str, *, hidden: bool = False) -> NodeInfo:
-        """Return what a node offers and uses. Raises NotThere."""
+        """Return the endpoints of a node. Raises NotFoundError."""
         full_name = self.find_node(name)
-        return self._still(lambda: self._node_info(full_name, hidden))
+        return self._settled(lambda: self._node_info(full_name, hidden))
 
     def action(self, name: str) -> ActionInfo:
-        """Return who serves and uses an action. Raises NotThere."""
+        """Return the servers and clients of an action. Raises NotFoundError."""
         types = self.types("action", name)
-        return self._still(lambda: self._action_info(full_name("action", name), types))
+        return self._settled(lambda: self._action_info(full_name("action", name), types))
 
     def find_node(self, name: str) -> str:
-        """Return the full name of the node that ``name`` means. Raises NotThere."""
+        """Return the full name of the node that ``name`` refers to. Raises NotFoundError."""
         return find_node(self._session, self._deadline, name, lambda: self._nodes(hidden=True))
 
     def types(self, kind: str, name: str) -> tuple[str, ...]:
-        """Return the types of a topic, service or action. Raises NotThere."""
-        node = self._node
-        wanted = self.find(kind, name, lambda: tuple(found for found, _ in _look(node, kind)))
-        return dict(_named(_look(node, kind), hidden=True))[wanted]
+        """Return the types of a topic, service or action, once it is discovered.
 
-    def find(self, kind: str, name: str, look: Callable[[], tuple[str, ...]]) -> str:
-        """Wait until ``name`` is among what ``look`` finds, and return it. Raises NotThere.
-
-        A name without a leading slash means the one in the root namespace.
+        A name without a leading slash is in the root namespace. Raises NotFoundError.
         """
-        wanted = full_name(kind, name)
-        if self._session.search(lambda: wanted in look() or None, self._deadline):
-            return wanted
-        known = [found for found in look() if not is_hidden(found)]
-        raise not_there(kind, wanted, known)
+        absolute = full_name(kind, name)
 
-    def _still(self, look: Callable[[], T]) -> T:
-        return self._session.wait_until_still(look, self._deadline)
+        def known() -> dict[str, tuple[str, ...]]:
+            return dict(_sorted(_names_and_types(self._node, kind), hidden=True))
+
+        types = self._session.search(lambda: known().get(absolute), self._deadline)
+        if types is None:
+            raise not_found_error(kind, absolute, [item for item in known() if not is_hidden(item)])
+        return types
+
+    def only_type(self, kind: str, name: str) -> str:
+        """Return the type of a topic, service or action.
+
+        Raises NotFoundError; RosError if there is more than one type.
+        """
+        types = self.types(kind, name)
+        if len(types) > 1:
+            raise RosError(
+                f"{kind} '{name}' has more than one type", f"specify one of: {', '.join(types)}"
+            )
+        return types[0]
+
+    def _settled(self, poll: Callable[[], T]) -> T:
+        return self._session.wait_until_settled(poll, self._deadline)
 
     def _nodes(self, hidden: bool) -> tuple[str, ...]:
         names = (f"{namespace.rstrip('/')}/{name}" for name, namespace in self._session.others())
@@ -120,18 +130,18 @@ class Names:
         namespace, _, name = full_name.rpartition("/")
         where = (name, namespace or "/")
 
-        def named(look: Callable[..., Iterable[Any]]) -> tuple[Named, ...]:
-            return _named(look(*where), hidden)
+        def names(query: Callable[..., Iterable[Any]]) -> tuple[NameAndTypes, ...]:
+            return _sorted(query(*where), hidden)
 
         node = self._node
         return NodeInfo(
             full_name,
-            named(node.get_subscriber_names_and_types_by_node),
-            named(node.get_publisher_names_and_types_by_node),
-            named(node.get_service_names_and_types_by_node),
-            named(node.get_client_names_and_types_by_node),
-            named(lambda *at: get_action_server_names_and_types_by_node(node, *at)),
-            named(lambda *at: get_action_client_names_and_types_by_node(node, *at)),
+            names(node.get_subscriber_names_and_types_by_node),
+            names(node.get_publisher_names_and_types_by_node),
+            names(node.get_service_names_and_types_by_node),
+            names(node.get_client_names_and_types_by_node),
+            names(lambda *at: get_action_server_names_and_types_by_node(node, *at)),
+            names(lambda *at: get_action_client_names_and_types_by_node(node, *at)),
         )
 
     def _action_info(self, name: str, types: tuple[str, ...]) -> ActionInfo:
@@ -143,14 +153,14 @@ class Names:
         return ActionInfo(name, types, tuple(servers), tuple(clients))
 
 
-def other_types(session: Session, kind: str, name: str, type_name: str) -> str | None:
-    """Return a hint where somebody knows ``name`` by another type, which explains a silence."""
-    known = dict(_named(_look(session.node, kind), hidden=True)).get(name, ())
+def type_mismatch_hint(session: Session, kind: str, name: str, type_name: str) -> str | None:
+    """Return a hint if other nodes use ``name`` with another type, else None."""
+    known = dict(_sorted(_names_and_types(session.node, kind), hidden=True)).get(name, ())
     others = [other for other in known if other != type_name]
-    return f"here it is of type {', '.join(others)}, not {type_name}" if others else None
+    return f"other nodes use type {', '.join(others)}, not {type_name}" if others else None
 
 
-def _look(node: Node, kind: str) -> Iterable[tuple[str, list[str]]]:
+def _names_and_types(node: Node, kind: str) -> Iterable[tuple[str, list[str]]]:
     match kind:
         case "topic":
             return node.get_topic_names_and_types()
@@ -160,7 +170,7 @@ def _look(node: Node, kind: str) -> Iterable[tuple[str, list[str]]]:
             return get_action_names_and_types(node)
 
 
-def _named(found: Iterable[tuple[str, list[str]]], hidden: bool) -> tuple[Named, ...]:
+def _sorted(found: Iterable[tuple[str, list[str]]], hidden: bool) -> tuple[NameAndTypes, ...]:
     return tuple(
         sorted((name, tuple(types)) for name, types in found if hidden or not is_hidden(name))
     )

@@ -1,8 +1,8 @@
-"""The lifecycle of nodes in other processes, whoever wrote them: for the command line.
+"""The lifecycle of nodes in other processes.
 
-Everything goes through the standard services (lifecycle_msgs), so hand-written nodes answer as
-ours do. A transition is sent only when the node says it is legal: sent at the wrong moment it would
-end the process of a hand-written rclpy node.
+It uses the standard services (lifecycle_msgs) only, so it works with every lifecycle node. A
+transition is requested only if the node lists it as available: an invalid request ends the process
+of an rclpy lifecycle node.
 """
 
 from __future__ import annotations
@@ -17,15 +17,20 @@ from lifecycle_msgs.msg import Transition as TransitionMessage
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 from rclpy.type_support import check_is_valid_srv_type
 
-from composer.remote.name_matching import check_all_answer, find_node, not_there
-from composer.remote.proxies import LIFECYCLE, Deputies
-from composer.remote.requests import Send, ask, ask_each, call_once
-from composer.remote.session import Deadline, NoAnswer, RosError, Session
+from composer.remote.name_matching import check_all_respond, find_node, not_found_error
+from composer.remote.proxies import LIFECYCLE, Proxies
+from composer.remote.requests import (
+    Call,
+    call_all_with_retries,
+    call_once,
+    call_with_retries,
+)
+from composer.remote.session import Deadline, NoResponseError, RosError, Session
 
 PRIMARY_STATES = ("unconfigured", "inactive", "active", "finalized")
 _PATTERN = re.compile(r"[*?\[]")
-#: By goal and state: the next transition on the way.
-_WAYS = {
+#: The next transition on the way to a goal state, by goal and current state.
+_NEXT_TRANSITION = {
     "unconfigured": {"inactive": "cleanup", "active": "deactivate"},
     "inactive": {"unconfigured": "configure", "active": "deactivate"},
     "active": {"unconfigured": "configure", "inactive": "activate"},
@@ -35,13 +40,13 @@ _STATE_SERVICE = "/get_state"
 _STATE_TYPE = "lifecycle_msgs/srv/GetState"
 
 
-class TransitionRefused(RosError):
-    """The transition is not legal in the node's state, or the node did not carry it out."""
+class TransitionError(RosError):
+    """The transition is not available in the state of the node, or it failed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """A transition that is legal now and the state it leads through."""
+    """An available transition and its goal state."""
 
     id: int
     label: str
@@ -49,7 +54,7 @@ class Transition:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class TransitionResult:
     """The primary states before and after a transition."""
 
     node: str
@@ -60,8 +65,8 @@ class Change:
         return f"{self.node}: {self.before} -> {self.after}"
 
 
-#: What is legal in each state, for nodes that are not asked themselves (lifecycle_msgs).
-_LEGAL = {
+#: The transitions of each state (lifecycle_msgs), for nodes without services of their own.
+_AVAILABLE = {
     "unconfigured": (
         Transition(TransitionMessage.TRANSITION_CONFIGURE, "configure", "configuring"),
         Transition(TransitionMessage.TRANSITION_UNCONFIGURED_SHUTDOWN, "shutdown", "shuttingdown"),
@@ -78,154 +83,158 @@ _LEGAL = {
 }
 
 
-class Control:
-    """Asks lifecycle nodes things, all within one time limit."""
+class LifecycleClient:
+    """Queries and changes lifecycle nodes, all within one time limit."""
 
     def __init__(self, session: Session, deadline: Deadline) -> None:
         self._session = session
         self._deadline = deadline
-        self._deputies = Deputies(session)
+        self._proxies = Proxies(session)
         for service in (GetState, GetAvailableTransitions, ChangeState):
-            check_is_valid_srv_type(service)  # it takes a tenth of a second, and nobody is met yet
+            check_is_valid_srv_type(service)  # takes 0.1 s, during which discovery runs
 
     def nodes(self) -> tuple[str, ...]:
-        """Return the full names of all lifecycle nodes, once discovery stands still."""
-        return self._session.wait_until_still(self.known, self._deadline)
+        """Return the full names of all lifecycle nodes, once discovery is complete."""
+        return self._session.wait_until_settled(self.known, self._deadline)
 
-    def check_all_answer(self) -> None:
-        """Raise NoAnswer when there is a system here whose nodes are not known."""
-        check_all_answer(self._session)
+    def check_all_respond(self) -> None:
+        """Raise NoResponseError if the nodes of a system of this computer are not known."""
+        check_all_respond(self._session)
 
     def find(self, name: str) -> str:
-        """Return the full name of the node that ``name`` means. Raises NotThere and NoAnswer."""
+        """Return the full name of a node. Raises NotFoundError, NoResponseError."""
         return find_node(self._session, self._deadline, name, self.known, "lifecycle node")
 
     def select(self, targets: Iterable[str]) -> tuple[str, ...]:
-        """Return the full names of all nodes that are meant, each once, in the targets' order.
+        """Return the full names of the nodes that match the targets, each once, in order.
 
-        A target is what :meth:`find` takes, or a pattern: ``/planning/*``, ``*_driver``; without a
-        slash it is held against the last parts of the names. Raises NotThere and NoAnswer.
+        A target is a name as for :meth:`find`, or a pattern: ``/planning/*``, ``*_driver``. A
+        pattern without a slash is matched with the last parts of the names. Raises NotFoundError,
+        NoResponseError.
         """
-        found: dict[str, None] = {}
+        selected: dict[str, None] = {}
         for target in targets:
             if not _PATTERN.search(target):
-                found[self.find(target)] = None
+                selected[self.find(target)] = None
                 continue
             known = self.nodes()
-            check_all_answer(self._session)
+            check_all_respond(self._session)
             matches = [name for name in known if _matches(name, target)]
             if not matches:
-                raise not_there("lifecycle node like", target, known)
-            found.update(dict.fromkeys(matches))
-        return tuple(found)
+                raise not_found_error("lifecycle node matching", target, known)
+            selected.update(dict.fromkeys(matches))
+        return tuple(selected)
 
     def state(self, node: str) -> str:
-        """Return the label of the node's state. Raises NoAnswer."""
+        """Return the label of the node's state. Raises NoResponseError."""
         if self._manager(node):
-            return self._deputies.state(node)
-        response = self._response(ask, node, GetState, "get_state", GetState.Request())
+            return self._proxies.state(node)
+        response = self._call(call_with_retries, node, GetState, "get_state", GetState.Request())
         return str(response.current_state.label)
 
     def states(self, nodes: Iterable[str]) -> dict[str, str | None]:
-        """Return the label of each node's state; None for a node that did not answer in time."""
-        wanted = tuple(nodes)
-        told: dict[str, str | None] = {
-            node: self._deputies.state(node) for node in wanted if self._manager(node)
+        """Return the label of each node's state, None for nodes that did not respond in time."""
+        names = tuple(nodes)
+        reported: dict[str, str | None] = {
+            node: self._proxies.state(node) for node in names if self._manager(node)
         }
-        services = {f"{node}/get_state": node for node in wanted if node not in told}
-        responses = ask_each(self._session, GetState, services, GetState.Request(), self._deadline)
-        return told | {
+        services = {f"{node}/get_state": node for node in names if node not in reported}
+        responses = call_all_with_retries(
+            self._session, GetState, services, GetState.Request(), self._deadline
+        )
+        return reported | {
             node: None if response is None else str(response.current_state.label)
             for node, response in zip(services.values(), responses.values(), strict=True)
         }
 
     def transitions(self, node: str) -> tuple[Transition, ...]:
-        """Return what is legal now. Raises NoAnswer."""
+        """Return the transitions that are available now. Raises NoResponseError."""
         if self._manager(node):
-            return _LEGAL.get(self._deputies.state(node), ())
+            return _AVAILABLE.get(self._proxies.state(node), ())
         request = GetAvailableTransitions.Request()
-        response = self._response(
-            ask, node, GetAvailableTransitions, "get_available_transitions", request
+        response = self._call(
+            call_with_retries, node, GetAvailableTransitions, "get_available_transitions", request
         )
         return tuple(
             Transition(item.transition.id, item.transition.label, item.goal_state.label)
             for item in response.available_transitions
         )
 
-    def change(self, node: str, label: str) -> Change:
-        """Take the node through the transition ``label``.
+    def change_state(self, node: str, label: str) -> TransitionResult:
+        """Request the transition ``label`` of a node.
 
-        Raises TransitionRefused, with the state and what is legal in it; NoAnswer.
+        Raises TransitionError with the available transitions; NoResponseError.
         """
         before = self.state(node)
-        legal = self.transitions(node)
-        wanted = next((transition for transition in legal if transition.label == label), None)
-        if wanted is None:
-            raise TransitionRefused(
-                f"'{label}' is not possible: {node} is {before}", _possible(before, legal)
+        available = self.transitions(node)
+        transition = next((item for item in available if item.label == label), None)
+        if transition is None:
+            raise TransitionError(
+                f"'{label}' is not possible: {node} is {before}", _hint(before, available)
             )
-        success, after = self._make(node, before, wanted)
+        success, after = self._request(node, before, transition)
         if not success:
-            raise TransitionRefused(
-                f"{node} refused '{label}': it is {after} now", "its log says why"
+            raise TransitionError(
+                f"'{label}' of {node} failed: it is {after} now", "see its log for the reason"
             )
-        return Change(node, before, after)
+        return TransitionResult(node, before, after)
 
-    def take(self, node: str, goal: str) -> Change:
-        """Take the node to a primary state by the legal way, which may be none or several steps.
+    def go_to_state(self, node: str, goal: str) -> TransitionResult:
+        """Take a node to a primary state in as many transitions as it needs.
 
-        Raises TransitionRefused where there is no way or a step is refused; NoAnswer.
+        Raises TransitionError if the state cannot be reached or a transition fails;
+        NoResponseError.
         """
         before = state = self.state(node)
         while state != goal:
-            label = _WAYS.get(goal, {}).get(state)
+            label = _NEXT_TRANSITION.get(goal, {}).get(state)
             if label is None:
-                raise TransitionRefused(
-                    f"there is no way to '{goal}': {node} is {state}",
-                    _possible(state, self.transitions(node)),
+                raise TransitionError(
+                    f"'{goal}' cannot be reached: {node} is {state}",
+                    _hint(state, self.transitions(node)),
                 )
-            reached = self.change(node, label).after
+            reached = self.change_state(node, label).after
             if reached == state:
-                raise TransitionRefused(f"{node} stays {state}: '{label}' led nowhere")
+                raise TransitionError(f"{node} is still {state} after '{label}'")
             state = reached
-        return Change(node, before, state)
+        return TransitionResult(node, before, state)
 
-    def _make(self, node: str, before: str, wanted: Transition) -> tuple[bool, str]:
-        """Have a transition made; return whether it was, and the state after it."""
+    def _request(self, node: str, before: str, transition: Transition) -> tuple[bool, str]:
+        """Request a transition; return whether it succeeded, and the state after it."""
         manager = self._manager(node)
-        # With the label, a state that has changed since is a refusal and not a fault in the node.
-        label = f"{node} {wanted.label}" if manager else wanted.label
-        message = TransitionMessage(id=wanted.id, label=label)
+        # The label makes the request fail cleanly if the state has changed in the meantime.
+        label = f"{node} {transition.label}" if manager else transition.label
+        message = TransitionMessage(id=transition.id, label=label)
         request = ChangeState.Request(transition=message)
-        response = self._response(call_once, manager or node, ChangeState, "change_state", request)
+        response = self._call(call_once, manager or node, ChangeState, "change_state", request)
         success = bool(response.success)
         if not manager:
             return success, self.state(node)
-        return success, self._deputies.state_after(
+        return success, self._proxies.wait_for_state(
             node, before if success else None, self._deadline
         )
 
     def _manager(self, node: str) -> str | None:
-        """Return the manager that answers for the lifecycle of a node, if one does."""
-        return self._deputies.nodes(LIFECYCLE).get(node)
+        """Return the manager that provides the lifecycle services of a node, or None."""
+        return self._proxies.nodes(LIFECYCLE).get(node)
 
     def known(self) -> tuple[str, ...]:
-        """Return the full names of the lifecycle nodes that are known now."""
-        self._deputies.meet(self._deadline)
-        own = {
+        """Return the full names of the lifecycle nodes discovered so far."""
+        self._proxies.discover(self._deadline)
+        with_services = {
             name.removesuffix(_STATE_SERVICE)
             for name, types in self._session.node.get_service_names_and_types()
             if name.endswith(_STATE_SERVICE) and _STATE_TYPE in types
         }
-        return tuple(sorted(own | self._deputies.nodes(LIFECYCLE).keys()))
+        return tuple(sorted(with_services | self._proxies.nodes(LIFECYCLE).keys()))
 
-    def _response(self, send: Send, node: str, service: Any, name: str, request: Any) -> Any:
+    def _call(self, send: Call, node: str, service: Any, name: str, request: Any) -> Any:
         try:
             return send(self._session, service, f"{node}/{name}", request, self._deadline)
-        except NoAnswer as error:
-            raise NoAnswer(
-                f"{node} did not answer within {self._deadline.timeout_s:g} s",
-                f"{error}; its process may be busy or gone. --timeout gives it longer",
+        except NoResponseError as error:
+            raise NoResponseError(
+                f"{node} did not respond within {self._deadline.timeout_s:g} s",
+                f"{error}; its process may be busy or gone. Use --timeout to wait longer",
             ) from error
 
 
@@ -233,8 +242,8 @@ def _matches(node: str, pattern: str) -> bool:
     return fnmatchcase(node if "/" in pattern else node.rpartition("/")[2], pattern)
 
 
-def _possible(state: str, legal: tuple[Transition, ...]) -> str:
+def _hint(state: str, available: tuple[Transition, ...]) -> str:
     if state not in PRIMARY_STATES:
-        return "it is in mid-transition: wait, or see its log for what it hangs in"
-    names = ", ".join(dict.fromkeys(transition.label for transition in legal))
-    return f"possible now: {names or 'nothing, this state is final'}"
+        return "a transition is in progress: wait, or see its log if it does not end"
+    names = ", ".join(dict.fromkeys(transition.label for transition in available))
+    return f"available transitions: {names or 'none, this state is final'}"

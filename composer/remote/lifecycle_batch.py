@@ -1,11 +1,11 @@
-"""Several lifecycle nodes taken through a transition, or to a state, one after the other."""
+"""Lifecycle requests to several nodes, one after the other."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from composer.remote.lifecycle import Change, Control
+from composer.remote.lifecycle import LifecycleClient, TransitionResult
 from composer.remote.session import Deadline, RosError, Session
 from composer.remote.systems import Systems
 
@@ -14,55 +14,55 @@ _RANK = {"unconfigured": 0, "inactive": 1, "active": 2}
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
-    """What is wanted of a node: a transition by its label, or else the state to be in."""
+class LifecycleRequest:
+    """A transition by its label, or else a goal state."""
 
     transition: str | None
     state: str | None
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
-    """What became of a wish for one node: the change, or why there was none."""
+class NodeOutcome:
+    """The result of a request for one node, or the error."""
 
-    change: Change | None
+    result: TransitionResult | None
     error: RosError | None
 
 
 def nodes_of_system(
-    session: Session, deadline: Deadline, name: str, wish: Request
+    session: Session, deadline: Deadline, name: str, request: LifecycleRequest
 ) -> tuple[str, ...]:
-    """Return the nodes of a running system in the order that is right for the wish.
+    """Return the nodes of a running system in the order of the request.
 
-    What goes up goes in the order of the bring-up, what goes down before that and in reverse.
-    Raises NotThere and NoAnswer.
+    First the nodes to take down, in the reverse order of the bring-up, then the nodes to bring up,
+    in its order. Raises NotFoundError, NoResponseError.
     """
     systems = Systems(session, deadline)
     nodes = systems.report(systems.find(name)).nodes
     names = [node.node for node in nodes]
-    if wish.state is None:
-        return tuple(names if wish.transition in _UPWARD else names[::-1])
-    goal = _RANK.get(wish.state, -1)
-    falling = [node.node for node in nodes if _RANK.get(node.state, 0) > goal]
-    return (*falling[::-1], *(node for node in names if node not in falling))
+    if request.state is None:
+        return tuple(names if request.transition in _UPWARD else names[::-1])
+    goal = _RANK.get(request.state, -1)
+    going_down = [node.node for node in nodes if _RANK.get(node.state, 0) > goal]
+    return (*going_down[::-1], *(node for node in names if node not in going_down))
 
 
 def change_each(
-    session: Session, deadline: Deadline, targets: Iterable[str], wish: Request
-) -> Iterator[Outcome]:
-    """Do it to every node that is meant; a failure does not keep from the others.
+    session: Session, deadline: Deadline, targets: Iterable[str], request: LifecycleRequest
+) -> Iterator[NodeOutcome]:
+    """Carry out the request for each matching node; continue after an error.
 
-    Raises NotThere, before anything is done.
+    Raises NotFoundError before the first request.
     """
-    control = Control(session, deadline)
-    for node in control.select(targets):
+    client = LifecycleClient(session, deadline)
+    for node in client.select(targets):
         try:
-            yield Outcome(_change(control, node, wish), None)
+            yield NodeOutcome(_change_one(client, node, request), None)
         except RosError as error:
-            yield Outcome(None, error)
+            yield NodeOutcome(None, error)
 
 
-def _change(control: Control, node: str, wish: Request) -> Change:
-    if wish.state is not None:
-        return control.take(node, wish.state)
-    return control.change(node, wish.transition or "")
+def _change_one(client: LifecycleClient, node: str, request: LifecycleRequest) -> TransitionResult:
+    if request.state is not None:
+        return client.go_to_state(node, request.state)
+    return client.change_state(node, request.transition or "")

@@ -1,4 +1,4 @@
-"""Finding a node by what people call it: a full name, or the last part of just one."""
+"""Resolve the name of a node that a user has typed: a full name, or its unambiguous last part."""
 
 from __future__ import annotations
 
@@ -9,72 +9,74 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from composer.diagnostics import nearest
 from composer.names import topic_name_problem
-from composer.remote.session import Deadline, NoAnswer, RosError, Session
+from composer.remote.session import Deadline, NoResponseError, RosError, Session
 
-_MOST_LISTED = 8
-
-
-class NotThere(RosError):
-    """Nothing of that name is in the graph, or more than one; the hint says what is close."""
+_MAX_LISTED = 8
 
 
-class BadName(RosError):
-    """No topic, service or action can have that name."""
+class NotFoundError(RosError):
+    """The name is not in the ROS graph, or is ambiguous; the hint has similar names."""
+
+
+class InvalidNameError(RosError):
+    """The name is not valid for a topic, service or action."""
 
 
 def full_name(kind: str, name: str) -> str:
-    """Return the name that is meant: without a leading slash the one in the root namespace.
+    """Return the full name; a name without a leading slash is in the root namespace.
 
-    Raises BadName for what ROS does not take.
+    Raises InvalidNameError.
     """
-    wanted = name if name.startswith("/") else f"/{name}"
+    absolute = name if name.startswith("/") else f"/{name}"
     try:
-        validate_full_topic_name(wanted)
+        validate_full_topic_name(absolute)
     except InvalidTopicNameException as error:
-        problem = topic_name_problem(wanted) or "is not valid"
-        raise BadName(f"{kind} name '{wanted}' {problem}") from error
-    return wanted
+        problem = topic_name_problem(absolute) or "is not valid"
+        raise InvalidNameError(f"{kind} name '{absolute}' {problem}") from error
+    return absolute
 
 
 def find_node(
     session: Session,
     deadline: Deadline,
     name: str,
-    look: Callable[[], tuple[str, ...]],
+    list_nodes: Callable[[], tuple[str, ...]],
     kind: str = "node",
 ) -> str:
-    """Return the full name that ``name`` means among what ``look`` finds, once it is there.
+    """Return the full name of the node that ``name`` refers to, once it is discovered.
 
-    That is a full name, or the last part (or parts) of just one. Raises NotThere; NoAnswer when it
-    may be in a system that does not answer.
+    ``name`` is a full name, or the last part or parts of a single node's name. Raises
+    NotFoundError; NoResponseError if the node may be in a system that does not respond.
     """
-    found = session.search(lambda: _matches(name, look()) or None, deadline)
+    found = session.search(lambda: _matches(name, list_nodes()) or None, deadline)
     if found is None:
-        check_all_answer(session)
-        raise not_there(kind, name, look())
-    if name not in found:  # a part of a name: are there others with the same part?
-        found = _matches(name, session.wait_until_still(look, deadline))
+        check_all_respond(session)
+        raise not_found_error(kind, name, list_nodes())
+    if name not in found:  # wait for other nodes with the same last part
+        found = _matches(name, session.wait_until_settled(list_nodes, deadline))
     if len(found) > 1:
-        raise NotThere(f"'{name}' is more than one {kind}", "say which: " + ", ".join(found))
+        raise NotFoundError(
+            f"'{name}' matches more than one {kind}", "use a full name: " + ", ".join(found)
+        )
     return found[0]
 
 
-def check_all_answer(session: Session) -> None:
-    """Raise NoAnswer when a system of this computer is not met: not all nodes are known then."""
-    for name, pid in session.silent_systems().items():
-        raise NoAnswer(
-            f"system '{name}' does not answer, so its nodes are not known",
+def check_all_respond(session: Session) -> None:
+    """Raise NoResponseError if a system of this computer is missing in the ROS graph."""
+    for name, pid in session.unresponsive_systems().items():
+        raise NoResponseError(
+            f"system '{name}' does not respond, so its nodes are not known",
             f"its process {pid} may be busy or stopped",
         )
 
 
-def not_there(kind: str, name: str, known: Iterable[str]) -> NotThere:
-    """Return the error that names what is there instead of ``name``."""
-    return NotThere(f"there is no {kind} '{name}'", _what_is_there(kind, name, list(known)))
+def not_found_error(kind: str, name: str, known: Iterable[str]) -> NotFoundError:
+    """Return the error for an unknown name, with the most similar known one."""
+    return NotFoundError(f"there is no {kind} '{name}'", _hint(kind, name, list(known)))
 
 
 def _matches(name: str, known: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the nodes with that full name, else those whose name ends with it."""
+    """Return the node with that full name, else those whose names end with it."""
     if name in known:
         return (name,)
     if name.startswith("/"):
@@ -82,11 +84,11 @@ def _matches(name: str, known: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(node for node in known if node.endswith(f"/{name}"))
 
 
-def _what_is_there(kind: str, name: str, known: list[str]) -> str:
+def _hint(kind: str, name: str, known: list[str]) -> str:
     if not known:
         return (
-            f"no {kind} was found at all: is the system running, with the same ROS_DOMAIN_ID and"
-            " discovery range?"
+            f"no {kind} found at all: check that the system is running, and that ROS_DOMAIN_ID and"
+            " the discovery range are the same"
         )
     close = nearest(name, known)
     if close is None:
@@ -95,5 +97,5 @@ def _what_is_there(kind: str, name: str, known: list[str]) -> str:
         close = by_last_part[match] if match is not None else None
     if close is not None:
         return f"did you mean '{close}'?"
-    more = ", ..." if len(known) > _MOST_LISTED else ""
-    return "there are: " + ", ".join(known[:_MOST_LISTED]) + more
+    more = ", ..." if len(known) > _MAX_LISTED else ""
+    return "available: " + ", ".join(known[:_MAX_LISTED]) + more

@@ -1,4 +1,4 @@
-"""Parameters of any node, through its parameter services (rcl_interfaces)."""
+"""Parameters of any node, through the standard parameter services (rcl_interfaces)."""
 
 from __future__ import annotations
 
@@ -17,10 +17,15 @@ from rcl_interfaces.srv import (
 from rclpy.parameter import Parameter, parameter_value_to_python
 
 from composer.diagnostics import suggestion
-from composer.remote.graph_names import Names
-from composer.remote.proxies import PARAMETERS, Deputies
-from composer.remote.requests import Send, ask, ask_each, call_once
-from composer.remote.session import Deadline, NoAnswer, RosError, Session
+from composer.remote.graph_names import GraphNames
+from composer.remote.proxies import PARAMETERS, Proxies
+from composer.remote.requests import (
+    Call,
+    call_all_with_retries,
+    call_once,
+    call_with_retries,
+)
+from composer.remote.session import Deadline, NoResponseError, RosError, Session
 from composer.runtime.ros.manager_protocol import full_parameter_name
 
 _NOT_SET = "not set"
@@ -39,17 +44,17 @@ _TYPES = {
 }
 
 
-class UnknownParameter(RosError):
+class UnknownParameterError(RosError):
     """The node has no such parameter."""
 
 
-class ParameterRefused(RosError):
-    """The node did not take the value."""
+class ParameterRejectedError(RosError):
+    """The node rejected the value."""
 
 
 @dataclass(frozen=True, slots=True)
-class Description:
-    """What a node says of a parameter. Bounds are None where there are none."""
+class ParameterDescription:
+    """The description of a parameter. Bounds are None if there are none."""
 
     name: str
     type: str
@@ -61,74 +66,74 @@ class Description:
     step: float | None
 
 
-class Parameters:
-    """The parameters of one node. Raises NotThere when there is no such node."""
+class ParameterClient:
+    """Reads and sets the parameters of a node. Raises NotFoundError if there is no such node."""
 
     def __init__(self, session: Session, deadline: Deadline, node: str) -> None:
         self._session = session
         self._deadline = deadline
-        self.node = Names(session, deadline).find_node(node)
+        self.node = GraphNames(session, deadline).find_node(node)
         manager = _manager(session, deadline, self.node)
-        #: Whom to ask, and what its names of the node's parameters begin with.
-        self._asked, self._prefix = (
+        #: The node with the services, and the prefix of the parameter names there.
+        self._server, self._prefix = (
             (manager, full_parameter_name(self.node, "")) if manager else (self.node, "")
         )
 
     def names(self) -> tuple[str, ...]:
-        """Return the names of all parameters, sorted. Raises NoAnswer."""
+        """Return the names of all parameters, sorted. Raises NoResponseError."""
         request = ListParameters.Request(prefixes=[self.node] if self._prefix else [])
-        response = self._response(ask, ListParameters, "list_parameters", request)
+        response = self._call(call_with_retries, ListParameters, "list_parameters", request)
         return tuple(sorted(name.removeprefix(self._prefix) for name in response.result.names))
 
     def values(self, names: Iterable[str]) -> dict[str, Any]:
-        """Return the values of parameters; None for one without. Raises UnknownParameter."""
-        wanted = list(names)
-        self._check_known(wanted)
-        request = GetParameters.Request(names=self._there(wanted))
-        response = self._response(ask, GetParameters, "get_parameters", request)
+        """Return the values of parameters, None if not set. Raises UnknownParameterError."""
+        requested = list(names)
+        self._check_known(requested)
+        request = GetParameters.Request(names=self._qualified(requested))
+        response = self._call(call_with_retries, GetParameters, "get_parameters", request)
         return {
-            name: plain_value(value) for name, value in zip(wanted, response.values, strict=True)
+            name: plain_value(value) for name, value in zip(requested, response.values, strict=True)
         }
 
-    def describe(self, names: Iterable[str]) -> tuple[Description, ...]:
-        """Return what the node says of parameters. Raises UnknownParameter."""
-        wanted = list(names)
-        self._check_known(wanted)
-        request = DescribeParameters.Request(names=self._there(wanted))
-        response = self._response(ask, DescribeParameters, "describe_parameters", request)
+    def describe(self, names: Iterable[str]) -> tuple[ParameterDescription, ...]:
+        """Return the descriptions of parameters. Raises UnknownParameterError."""
+        requested = list(names)
+        self._check_known(requested)
+        request = DescribeParameters.Request(names=self._qualified(requested))
+        response = self._call(call_with_retries, DescribeParameters, "describe_parameters", request)
         return tuple(
             _description(name, found)
-            for name, found in zip(wanted, response.descriptors, strict=True)
+            for name, found in zip(requested, response.descriptors, strict=True)
         )
 
     def set(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Set parameters and return what the node took.
+        """Set parameters and return the values that were set.
 
-        A whole number becomes a double where the node has one. Raises UnknownParameter,
-        ParameterRefused with the node's reason.
+        An integer is converted for a parameter of type double. Raises UnknownParameterError,
+        ParameterRejectedError with the reason.
         """
         types = {item.name: item.type for item in self.describe(values)}
-        wanted = [_message(name, value, types[name]) for name, value in values.items()]
+        messages = [_message(name, value, types[name]) for name, value in values.items()]
         request = SetParameters.Request(
             parameters=[
                 ParameterMessage(name=f"{self._prefix}{item.name}", value=item.value)
-                for item in wanted
+                for item in messages
             ]
         )
-        response = self._response(call_once, SetParameters, "set_parameters", request)
-        refused = [
+        response = self._call(call_once, SetParameters, "set_parameters", request)
+        rejected = [
             f"{name}: {result.reason or 'no reason given'}"
             for name, result in zip(values, response.results, strict=True)
             if not result.successful
         ]
-        if refused:
-            raise ParameterRefused(f"{self.node} refused " + "; ".join(refused))
-        return {item.name: plain_value(item.value) for item in wanted}
+        if rejected:
+            raise ParameterRejectedError(f"{self.node} rejected " + "; ".join(rejected))
+        return {item.name: plain_value(item.value) for item in messages}
 
     def load(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Set the parameters of a file; what is read-only and has its value already is left alone.
+        """Set the parameters of a file, except for read-only ones that have the value already.
 
-        Like :meth:`set` otherwise. ROS nodes have such parameters, and dump them with the others.
+        ROS nodes dump read-only parameters together with the others. Raises like :meth:`set`.
         """
         present = self.values(values)
         fixed = {item.name for item in self.describe(values) if item.read_only}
@@ -144,66 +149,70 @@ class Parameters:
         known = self.names()
         for name in names:
             if name not in known:
-                raise UnknownParameter(
+                raise UnknownParameterError(
                     f"{self.node} has no parameter '{name}'", suggestion(name, known)
                 )
 
-    def _there(self, names: Iterable[str]) -> list[str]:
-        """Return what parameters are called where they are asked for."""
+    def _qualified(self, names: Iterable[str]) -> list[str]:
+        """Return the names of parameters at the node with the services."""
         return [f"{self._prefix}{name}" for name in names]
 
-    def _response(self, send: Send, service: Any, name: str, request: Any) -> Any:
+    def _call(self, send: Call, service: Any, name: str, request: Any) -> Any:
         try:
-            return send(self._session, service, f"{self._asked}/{name}", request, self._deadline)
-        except NoAnswer as error:
-            raise NoAnswer(
-                f"{self.node} did not answer within {self._deadline.timeout_s:g} s",
-                "its parameter services may be switched off, or its process busy",
+            return send(self._session, service, f"{self._server}/{name}", request, self._deadline)
+        except NoResponseError as error:
+            raise NoResponseError(
+                f"{self.node} did not respond within {self._deadline.timeout_s:g} s",
+                "its parameter services may be disabled, or its process may be busy",
             ) from error
 
 
 def names_by_node(session: Session, deadline: Deadline) -> dict[str, list[str] | None]:
-    """Return the names of all nodes' parameters; None for a node that did not answer in time."""
-    # A node without parameter services has none to tell of.
+    """Return the parameter names of all nodes, None for nodes that did not respond in time."""
+    # Nodes without parameter services are left out.
     services = {
         name: name.removesuffix(_LIST_SERVICE)
-        for name, _ in Names(session, deadline).services()
+        for name, _ in GraphNames(session, deadline).services()
         if name.endswith(_LIST_SERVICE)
     }
-    deputies = Deputies(session)
-    deputies.meet(deadline)
-    responses = ask_each(session, ListParameters, services, ListParameters.Request(), deadline)
+    proxies = Proxies(session)
+    proxies.discover(deadline)
+    responses = call_all_with_retries(
+        session, ListParameters, services, ListParameters.Request(), deadline
+    )
     listed = {
         node: None if responses[name] is None else sorted(responses[name].result.names)
         for name, node in services.items()
     }
-    left = deputies.nodes(PARAMETERS)
-    deputies.close()
-    told = {manager: listed.pop(manager, None) for manager in set(left.values())}
-    return listed | {node: _of_node(node, told[manager]) for node, manager in left.items()}
+    managers = proxies.nodes(PARAMETERS)
+    proxies.close()
+    by_manager = {manager: listed.pop(manager, None) for manager in set(managers.values())}
+    return listed | {
+        node: _of_node(node, by_manager[manager]) for node, manager in managers.items()
+    }
 
 
 def _of_node(node: str, listed: list[str] | None) -> list[str] | None:
-    """Return the parameters of a node among those that its manager lists."""
+    """Return the names of a node's parameters from the list of its manager."""
     if listed is None:
         return None
-    owned = full_parameter_name(node, "")
-    return [name.removeprefix(owned) for name in listed if name.startswith(owned)]
+    prefix = full_parameter_name(node, "")
+    return [name.removeprefix(prefix) for name in listed if name.startswith(prefix)]
 
 
 def _manager(session: Session, deadline: Deadline, node: str) -> str | None:
-    """Return the manager that answers for a node; None where the node does itself."""
-    deputies = Deputies(session)
+    """Return the manager with the parameter services of a node, None if the node has its own."""
+    proxies = Proxies(session)
 
-    def asked() -> str | None:
+    def server() -> str | None:
         names = (name for name, _ in session.node.get_service_names_and_types())
         if f"{node}{_LIST_SERVICE}" in names:
             return ""
-        deputies.meet(deadline)
-        return deputies.nodes(PARAMETERS).get(node)
+        proxies.discover(deadline)
+        return proxies.nodes(PARAMETERS).get(node)
 
-    found = session.search(asked, deadline)
-    deputies.close()
+    found = session.search(server, deadline)
+    proxies.close()
     return found or None
 
 
@@ -216,14 +225,16 @@ def plain_value(value: ParameterValue) -> Any:
 
 
 def _message(name: str, value: Any, kind: str) -> ParameterMessage:
-    """Return the parameter with the type that the node has it in. Raises ParameterRefused."""
+    """Return the parameter with its declared type. Raises ParameterRejectedError."""
     try:
         if kind == _NOT_SET:
             return Parameter(name, value=value).to_parameter_msg()
-        wanted = Parameter.Type[kind.upper()]
-        return Parameter(name, wanted, _converted(value, kind)).to_parameter_msg()
+        declared = Parameter.Type[kind.upper()]
+        return Parameter(name, declared, _converted(value, kind)).to_parameter_msg()
     except (TypeError, ValueError) as error:
-        raise ParameterRefused(f"'{name}' is a {kind}, which {value!r} is not") from error
+        raise ParameterRejectedError(
+            f"parameter '{name}' has type {kind}, got {value!r}"
+        ) from error
 
 
 def _converted(value: Any, kind: str) -> Any:
@@ -238,9 +249,9 @@ def _converted(value: Any, kind: str) -> Any:
             return value
 
 
-def _description(name: str, found: ParameterDescriptor) -> Description:
+def _description(name: str, found: ParameterDescriptor) -> ParameterDescription:
     bounds = [*found.floating_point_range, *found.integer_range]
-    return Description(
+    return ParameterDescription(
         name=name,
         type=_TYPES[found.type],
         description=found.description,

@@ -1,23 +1,23 @@
-"""What runs: systems as their managers tell, and lifecycle nodes that no composer runs."""
+"""Running systems as their managers report them, and other lifecycle nodes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from composer.remote.lifecycle import Control
+from composer.remote.lifecycle import LifecycleClient
 from composer.remote.session import Deadline, Session
-from composer.remote.systems import MEETING_S, SystemReport, Systems
+from composer.remote.systems import DISCOVERY_S, SystemReport, Systems
 from composer.runtime.process.instance_lock import local_systems
 
-#: Who does not answer so soon after being met is said to be silent.
-_PATIENCE_S = 2.0
+#: How long to wait for the responses of other nodes after discovery.
+_RESPONSE_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class ProcessList:
     """Systems by the namespaces of their managers, and the states of other lifecycle nodes.
 
-    None stands for who did not answer.
+    None stands for a system or node that did not respond.
     """
 
     systems: dict[str, SystemReport | None]
@@ -25,22 +25,24 @@ class ProcessList:
 
 
 def list_processes(session: Session, deadline: Deadline, *, callbacks: bool) -> ProcessList:
-    """Return everything there is, once discovery stands still; with or without callbacks."""
+    """Return all systems and lifecycle nodes, once discovery is complete."""
     systems = Systems(session, deadline, callbacks=callbacks)
-    control = Control(session, deadline)
-    meeting = Deadline(min(MEETING_S, deadline.left_s))
-    here = sorted(local_systems())
-    systems.listen(here)
-    names, nodes = session.wait_until_still(lambda: (systems.look(), control.known()), deadline)
-    reports = systems.reports({*here, *names}, meeting)
+    client = LifecycleClient(session, deadline)
+    discovery = Deadline(min(DISCOVERY_S, deadline.left_s))
+    local = sorted(local_systems())
+    systems.subscribe(local)
+    names, nodes = session.wait_until_settled(
+        lambda: (systems.discover(), client.known()), deadline
+    )
+    reports = systems.reports({*local, *names}, discovery)
     managed = {node.node for report in reports.values() if report for node in report.nodes}
     others = [node for node in nodes if node not in managed]
-    patient = Control(session, Deadline(min(_PATIENCE_S, deadline.left_s)))
-    return ProcessList(reports, patient.states(others) if others else {})
+    limited = LifecycleClient(session, Deadline(min(_RESPONSE_S, deadline.left_s)))
+    return ProcessList(reports, limited.states(others) if others else {})
 
 
 def list_one(session: Session, deadline: Deadline, name: str, *, callbacks: bool) -> ProcessList:
-    """Return one system. Raises NotThere and NoAnswer."""
+    """Return one system. Raises NotFoundError, NoResponseError."""
     systems = Systems(session, deadline, callbacks=callbacks)
     found = systems.find(name)
     return ProcessList({found: systems.report(found)})

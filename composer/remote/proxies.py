@@ -1,6 +1,6 @@
-"""Managers that answer for nodes without services of their own, as a command meets them.
+"""Nodes whose services are provided by the manager node of their system, as clients see them.
 
-The other end of :mod:`composer.runtime.manager.proxy_services`.
+See :mod:`composer.runtime.manager.proxy_services` for the server side.
 """
 
 from __future__ import annotations
@@ -18,76 +18,79 @@ from composer.runtime.ros.manager_protocol import CHANGE_STATE, NAME, STATE_QOS,
 LIFECYCLE, PARAMETERS = "lifecycle", "parameters"
 _SERVICE = f"/{NAME}/{CHANGE_STATE}"
 _SERVICE_TYPE = "lifecycle_msgs/srv/ChangeState"
-#: Managers tell at once what they told last, and again each second.
-_TOLD_WITHIN_S = 2.0
+#: Managers publish their last report to each new subscription, and again every second.
+_REPORT_WITHIN_S = 2.0
 _PRIMARY_STATES = frozenset(("unconfigured", "inactive", "active", "finalized"))
 
-#: What a manager said last: for each node without ``parameters`` or ``lifecycle`` its values.
-_Told: TypeAlias = dict[str, Mapping[str, str]]
+#: The last report of a manager: the values of each node without services of its own.
+_Report: TypeAlias = dict[str, Mapping[str, str]]
 
 
-class Deputies:
-    """What managers tell of the nodes that they answer for."""
+class Proxies:
+    """The nodes for which managers provide services, as the managers report them."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._told: dict[str, _Told] = {}  # by the manager's full name
-        self._times: dict[str, int] = {}
+        self._reports: dict[str, _Report] = {}  # by the full name of the manager
+        self._report_counts: dict[str, int] = {}
         self._subscriptions: dict[str, Subscription] = {}
 
-    def meet(self, deadline: Deadline) -> None:
-        """Listen to every such manager that is known by now, until each has said something."""
+    def discover(self, deadline: Deadline) -> None:
+        """Subscribe to every manager discovered so far, and wait for its first report."""
         known = {
             name.removesuffix(f"/{CHANGE_STATE}")
             for name, types in self._session.node.get_service_names_and_types()
             if name.endswith(_SERVICE) and _SERVICE_TYPE in types
         }
-        new = known - self._subscriptions.keys()  # nobody is waited for twice
+        new = known - self._subscriptions.keys()  # wait for each manager only once
         for manager in new:
-            self._listen(manager)
-        patience = Deadline(min(_TOLD_WITHIN_S, deadline.left_s))
-        self._session.wait_for(lambda: new <= self._told.keys() or None, patience)
+            self._subscribe(manager)
+        limit = Deadline(min(_REPORT_WITHIN_S, deadline.left_s))
+        self._session.wait_for(lambda: new <= self._reports.keys() or None, limit)
 
     def close(self) -> None:
-        """Listen no more."""
+        """Destroy the subscriptions."""
         for subscription in self._subscriptions.values():
             self._session.node.destroy_subscription(subscription)
         self._subscriptions.clear()
 
-    def nodes(self, what: str) -> dict[str, str]:
-        """Return the nodes whose ``what`` is left to their manager, with its full name."""
+    def nodes(self, service: str) -> dict[str, str]:
+        """Return the nodes with a proxy for ``service``, with the full names of their managers."""
         return {
             node: manager
-            for manager, told in self._told.items()
-            for node, values in told.items()
-            if what in values["left_to_manager"].split()
+            for manager, report in self._reports.items()
+            for node, values in report.items()
+            if service in values["left_to_manager"].split()
         }
 
     def state(self, node: str) -> str:
         """Return the label of the lifecycle state of a node of :meth:`nodes`."""
-        return next(told[node]["state"] for told in self._told.values() if node in told)
+        return next(report[node]["state"] for report in self._reports.values() if node in report)
 
-    def state_after(self, node: str, before: str | None, deadline: Deadline) -> str:
-        """Return the primary state that the manager tells of from now on, but not ``before``."""
+    def wait_for_state(self, node: str, before: str | None, deadline: Deadline) -> str:
+        """Return the next primary state other than ``before`` that the manager reports."""
         manager = self.nodes(LIFECYCLE)[node]
-        heard = self._times[manager]
+        count = self._report_counts[manager]
 
-        def arrived() -> bool | None:
+        def is_reported() -> bool | None:
             state = self.state(node)
-            at_rest = state in _PRIMARY_STATES and state != before
-            return (self._times[manager] > heard and at_rest) or None
+            is_settled = state in _PRIMARY_STATES and state != before
+            return (self._report_counts[manager] > count and is_settled) or None
 
-        self._session.wait_for(arrived, deadline)
+        self._session.wait_for(is_reported, deadline)
         return self.state(node)
 
-    def _listen(self, manager: str) -> None:
+    def _subscribe(self, manager: str) -> None:
         self._subscriptions[manager] = self._session.node.create_subscription(
-            DiagnosticArray, f"{manager}/{STATE_TOPIC}", partial(self._take, manager), STATE_QOS
+            DiagnosticArray,
+            f"{manager}/{STATE_TOPIC}",
+            partial(self._on_report, manager),
+            STATE_QOS,
         )
 
-    def _take(self, manager: str, message: DiagnosticArray) -> None:
-        self._times[manager] = self._times.get(manager, 0) + 1
-        self._told[manager] = {
+    def _on_report(self, manager: str, message: DiagnosticArray) -> None:
+        self._report_counts[manager] = self._report_counts.get(manager, 0) + 1
+        self._reports[manager] = {
             str(status.name).partition(": ")[2]: values
             for status in message.status
             if (values := {item.key: str(item.value) for item in status.values}).get(

@@ -1,8 +1,8 @@
-"""How often messages come over many topics at once.
+"""Message rates of many topics at once.
 
-Messages are taken from the subscriptions directly, serialized: an executor would spend more time
-on finding out which of hundreds is ready than the messages take. The times are those of sending,
-so that it does not matter when somebody looks.
+Serialized messages are taken from the subscriptions directly: with hundreds of subscriptions, an
+executor spends more time on its wait set than on messages. Rates are computed from source
+timestamps, so they do not depend on when messages are taken.
 """
 
 from __future__ import annotations
@@ -14,24 +14,24 @@ from typing import Any, Self
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from composer.remote.topics import strongest_for_all
-from composer.remote.values import BadValue, class_of
+from composer.remote.topics import strictest_compatible_qos
+from composer.remote.values import InvalidValueError, class_of
 from composer.runtime.ros.endpoints import topic_info
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
 _DEPTH = 1000
-_PAUSE_S = 0.002
+_POLL_PERIOD_S = 0.002
 
 
 class RateMeter:
-    """Subscribes to topics, given with their types. Use it in a ``with`` block."""
+    """Subscribes to topics, given by name with their types. Use it in a ``with`` block."""
 
     def __init__(self, node: Node, topics: Mapping[str, tuple[str, ...]]) -> None:
         self._node = node
         self._sent_ns: dict[str, list[int]] = {}
         self._subscriptions: dict[str, Subscription] = {}
         for topic, types in topics.items():
-            subscription = self._subscribed(topic, types)
+            subscription = self._subscribe(topic, types)
             if subscription is not None:
                 self._subscriptions[topic] = subscription
                 self._sent_ns[topic] = []
@@ -44,38 +44,38 @@ class RateMeter:
             self._node.destroy_subscription(subscription)
 
     def measure(self, duration_s: float) -> dict[str, float]:
-        """Count for so long; return messages per second by topic, where there were two or more."""
+        """Return messages per second by topic, for topics with at least two messages."""
         end_s = time.monotonic() + duration_s
         while time.monotonic() < end_s:
             for topic, subscription in self._subscriptions.items():
-                self._sent_ns[topic] += _taken(subscription)
-            time.sleep(_PAUSE_S)
+                self._sent_ns[topic] += _take_timestamps(subscription)
+            time.sleep(_POLL_PERIOD_S)
         return {
             topic: (len(times) - 1) * 1e9 / (times[-1] - times[0])
             for topic, times in self._sent_ns.items()
             if len(times) > 1 and times[-1] > times[0]
         }
 
-    def _subscribed(self, topic: str, types: tuple[str, ...]) -> Subscription | None:
+    def _subscribe(self, topic: str, types: tuple[str, ...]) -> Subscription | None:
         publishers = topic_info(self._node, topic, types).publishers
         if not publishers or len(types) != 1:
             return None
         try:
             message_type = class_of(types[0])
-        except BadValue:  # not installed here: it cannot be counted
+        except InvalidValueError:  # not installed, so it cannot be counted
             return None
-        profile = strongest_for_all([end.qos for end in publishers], _DEPTH)
+        profile = strictest_compatible_qos([publisher.qos for publisher in publishers], _DEPTH)
         return self._node.create_subscription(
             message_type, topic, _ignore, rclpy_profile(profile), raw=True
         )
 
 
 def _ignore(_: Any) -> None:
-    """Stand in for the callback: messages are taken without one."""
+    """Serve as a callback that is never called."""
 
 
-def _taken(subscription: Subscription) -> list[int]:
-    """Return when the messages that are there now were sent, in nanoseconds."""
+def _take_timestamps(subscription: Subscription) -> list[int]:
+    """Take all messages; return their source timestamps in nanoseconds."""
     times = []
     with subscription.handle:
         while (found := subscription.handle.take_message(subscription.msg_type, True)) is not None:

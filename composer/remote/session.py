@@ -1,8 +1,8 @@
-"""A command's own short-lived node in the ROS graph: it joins, waits on what it needs, leaves.
+"""The short-lived node of a command: it joins the ROS graph, waits for what it needs and leaves.
 
-Discovery tells nobody when it is complete. What is asked for by name is there as soon as it is
-seen. For all else, what is seen counts once nobody on this computer is left to be met and nothing
-has come for a moment.
+DDS does not signal the end of discovery. An entity that is looked up by name is used as soon as it
+is discovered. A listing counts as complete once all participants on this computer are discovered
+and nothing has changed for a moment.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from rclpy.parameter import Parameter
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.utilities import get_rmw_implementation_identifier
 
-from composer.runtime.process import dds_profiles as discovery
+from composer.runtime.process import dds_profiles
 from composer.runtime.process.dds_participants import count_participants, enlarge_receive_buffers
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.ros.endpoints import NO_NAME
@@ -28,36 +28,36 @@ from composer.runtime.ros.manager_protocol import NAME
 T = TypeVar("T")
 H = TypeVar("H", bound=Hashable)
 
-_STEP_S = 0.01
-#: What a participant has comes at once, 0.1 to 0.2 s after it was met; what was lost of it, 0.11 s
-#: later. Fast DDS 2 has these times in EDPUtils.hpp and no setting for them.
-_QUIET_S = 0.15
-#: So long is waited for the first of all others: one in another computer shows nothing before.
-_FIRST_S = 0.5
-#: Who is not met at once is met with its next announcement, with Fast DDS at most 3 s later.
-_MET_WITHIN_S = 3.5
-#: Each participant of ROS 2 has it; its name is as it is on the wire.
-_TOPIC_OF_PARTICIPANTS = "ros_discovery_info"
-#: The part of an endpoint's id that is its participant's (DDSI-RTPS, 9.3.1).
+_SPIN_S = 0.01
+#: The endpoints of a participant arrive 0.1 to 0.2 s after the participant itself; lost
+#: announcements are repeated 0.11 s later. Fast DDS 2 defines these times in EDPUtils.hpp.
+_SETTLE_S = 0.15
+#: How long to wait for the first other node, which may be on another computer.
+_FIRST_NODE_S = 0.5
+#: Fast DDS repeats the announcement of a participant every 3 s.
+_ANNOUNCED_WITHIN_S = 3.5
+#: The topic with which each ROS 2 participant announces its nodes, by its DDS name.
+_PARTICIPANTS_TOPIC = "ros_discovery_info"
+#: The length of the participant's prefix in the id of an endpoint (DDSI-RTPS, 9.3.1).
 _PARTICIPANT_BYTES = 12
-#: Commands do not count as somebody: they come and go.
+#: The nodes of commands, which are left out of listings.
 _NAME_PREFIX = "_compose_"
 
 
 class RosError(Exception):
-    """Something asked of the ROS graph came to nothing; ``hint`` says what would not."""
+    """An operation in the ROS graph failed; ``hint`` says how to proceed."""
 
     def __init__(self, message: str, hint: str | None = None) -> None:
         super().__init__(message)
         self.hint = hint
 
 
-class NoAnswer(RosError):
-    """A node or a service of it did not do its part within the time limit."""
+class NoResponseError(RosError):
+    """A node or service did not respond within the time limit."""
 
 
 class Deadline:
-    """A point in time that everything a command waits for shares."""
+    """A time limit that all waits of a command share."""
 
     def __init__(self, timeout_s: float) -> None:
         self.timeout_s = timeout_s
@@ -65,34 +65,34 @@ class Deadline:
 
     @property
     def left_s(self) -> float:
-        """The seconds that are left, at least 0."""
+        """The remaining seconds, at least 0."""
         return max(0.0, self._end - time.monotonic())
 
     @property
     def passed(self) -> bool:
-        """Whether nothing is left."""
+        """Whether no time remains."""
         return self.left_s <= 0.0
 
 
 def use_command_profile() -> None:
-    """Have this process do without shared memory: see :mod:`composer.runtime.process.dds_profiles`.
+    """Disable shared memory in this process: see :mod:`composer.runtime.process.dds_profiles`.
 
-    For commands that do not carry large messages, before they join the ROS graph.
+    For commands that carry no large messages. Call it before joining the ROS graph.
     """
     if get_rmw_implementation_identifier().startswith("rmw_fastrtps"):
-        discovery.use_command_profile(os.environ)
+        dds_profiles.use_command_profile(os.environ)
 
 
-class _Member(Node):
-    """A node that has room for the announcements of others before they come.
+class _SessionNode(Node):
+    """A node that enlarges the receive buffers before the announcements of other nodes arrive.
 
-    ``joined_s`` is when it joined the graph, on the clock of time.monotonic.
+    ``joined_s`` is when it joined the graph (seconds, time.monotonic).
     """
 
     joined_s = 0.0
 
     def create_publisher(self, *args: Any, **options: Any) -> Any:
-        """Create a publisher. The first one is a node's own, made right after its participant."""
+        """Create a publisher. The node creates the first one right after its participant."""
         if not self.joined_s:
             self.joined_s = time.monotonic()
             enlarge_receive_buffers()
@@ -100,13 +100,13 @@ class _Member(Node):
 
 
 class Session:
-    """The node, hidden from node lists by its leading underscore. Use it in a ``with`` block."""
+    """A node in the ROS graph, hidden from node lists. Use it in a ``with`` block."""
 
     def __init__(self) -> None:
         self._context = Context()
-        # No signal handlers come with it: Ctrl-C stays Python's KeyboardInterrupt.
+        # Without signal handlers: Ctrl-C remains Python's KeyboardInterrupt.
         self._context.init([])
-        self.node = _Member(
+        self.node = _SessionNode(
             f"{_NAME_PREFIX}{os.getpid()}",
             context=self._context,
             use_global_arguments=False,
@@ -117,8 +117,8 @@ class Session:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._domain_id = self._context.get_domain_id()
-        self._quiet = _Quiet()
-        self._quiet.since_s(self._met())
+        self._last_discovery = _LastChange()
+        self._last_discovery.at_s(self._discovered())
 
     def __enter__(self) -> Self:
         return self
@@ -129,7 +129,7 @@ class Session:
         self._context.try_shutdown()
 
     def others(self) -> tuple[tuple[str, str], ...]:
-        """Return name and namespace of every node known now but those of commands."""
+        """Return name and namespace of every known node except those of commands."""
         return tuple(
             sorted(
                 (name, namespace)
@@ -138,98 +138,100 @@ class Session:
             )
         )
 
-    def silent_systems(self) -> dict[str, str]:
-        """Return the systems that composers run on this computer and that are not met, by name.
+    def unresponsive_systems(self) -> dict[str, str]:
+        """Return the systems of this computer that are not discovered, with their process ids.
 
-        With their processes, which are stopped or busy. What is met lacks their nodes.
+        Their processes are stopped or busy, so their nodes are not known.
         """
-        met = set(self.others())
-        return {name: pid for name, pid in local_systems().items() if (NAME, name) not in met}
+        known = set(self.others())
+        return {name: pid for name, pid in local_systems().items() if (NAME, name) not in known}
 
     def spin_once(self, deadline: Deadline) -> None:
-        """Wait for something to come in, for a moment and not beyond the deadline."""
-        self._executor.spin_once(timeout_sec=min(_STEP_S, deadline.left_s))
+        """Wait briefly for an event, not beyond the deadline."""
+        self._executor.spin_once(timeout_sec=min(_SPIN_S, deadline.left_s))
 
-    def wait_for(self, look: Callable[[], T | None], deadline: Deadline) -> T | None:
-        """Return what ``look`` finds as soon as it finds something; None at the deadline."""
+    def wait_for(self, poll: Callable[[], T | None], deadline: Deadline) -> T | None:
+        """Return the first result of ``poll`` that is not None; None at the deadline."""
         while True:
-            found = look()
+            found = poll()
             if found is not None or deadline.passed:
                 return found
             self.spin_once(deadline)
 
-    def wait_until_still(self, look: Callable[[], H], deadline: Deadline) -> H:
-        """Return what ``look`` finds once everything is discovered, or at the deadline."""
-        found = _Quiet()
+    def wait_until_settled(self, poll: Callable[[], H], deadline: Deadline) -> H:
+        """Return the result of ``poll`` once discovery is complete, or at the deadline."""
+        last_change = _LastChange()
         while True:
-            seen = look()
-            if self._is_all_discovered(found.since_s(seen)) or deadline.passed:
-                return seen
-            self.spin_once(deadline)
-
-    def search(self, look: Callable[[], H | None], deadline: Deadline) -> H | None:
-        """Return what ``look`` finds as soon as it finds something.
-
-        None once everything is discovered, or at the deadline.
-        """
-        began_s = time.monotonic()
-        while True:
-            found = look()
-            if found is not None or self._is_all_discovered(began_s) or deadline.passed:
+            found = poll()
+            if self._is_discovery_complete(last_change.at_s(found)) or deadline.passed:
                 return found
             self.spin_once(deadline)
 
-    def _is_all_discovered(self, unchanged_since_s: float) -> bool:
-        """Say whether nobody is left to be met. What is asked for has not changed since then."""
-        met, others = self._met()
-        quiet_since_s = self._quiet.since_s((met, others))
-        ready_s = max(quiet_since_s, unchanged_since_s) + _QUIET_S
+    def search(self, poll: Callable[[], H | None], deadline: Deadline) -> H | None:
+        """Return the first result of ``poll`` that is not None.
+
+        Returns None once discovery is complete, or at the deadline.
+        """
+        started_s = time.monotonic()
+        while True:
+            found = poll()
+            if found is not None or self._is_discovery_complete(started_s) or deadline.passed:
+                return found
+            self.spin_once(deadline)
+
+    def _is_discovery_complete(self, unchanged_since_s: float) -> bool:
+        """Say whether all participants are discovered, given when the result last changed."""
+        participants, others = self._discovered()
+        last_change_s = self._last_discovery.at_s((participants, others))
+        ready_s = max(last_change_s, unchanged_since_s) + _SETTLE_S
         if not others:
-            ready_s = max(ready_s, self.node.joined_s + _FIRST_S)
+            ready_s = max(ready_s, self.node.joined_s + _FIRST_NODE_S)
         now_s = time.monotonic()
         if now_s < ready_s:
             return False
-        if now_s >= self.node.joined_s + _MET_WITHIN_S:
+        if now_s >= self.node.joined_s + _ANNOUNCED_WITHIN_S:
             return True
-        return met >= count_participants(self._domain_id) and self._have_all_told()
+        return participants >= count_participants(self._domain_id) and self._are_nodes_known()
 
-    def _have_all_told(self) -> bool:
-        """Say whether each participant's nodes are known: it tells of them last."""
+    def _are_nodes_known(self) -> bool:
+        """Say whether each participant has announced its nodes, which it does last."""
         node = self.node
-        met = node.get_publishers_info_by_topic(_TOPIC_OF_PARTICIPANTS, no_mangle=True)
+        participants = node.get_publishers_info_by_topic(_PARTICIPANTS_TOPIC, no_mangle=True)
         publishers = [
-            end
+            endpoint
             for topic, _ in node.get_topic_names_and_types()
-            for end in node.get_publishers_info_by_topic(topic)
+            for endpoint in node.get_publishers_info_by_topic(topic)
         ]
-        named = [end for end in publishers if end.node_name != NO_NAME]
-        told = {_participant(end) for end in named}
-        return len(named) == len(publishers) and told.issuperset(map(_participant, met))
+        named = [endpoint for endpoint in publishers if endpoint.node_name != NO_NAME]
+        announced = {_participant(endpoint) for endpoint in named}
+        return len(named) == len(publishers) and announced.issuperset(
+            map(_participant, participants)
+        )
 
-    def _met(self) -> tuple[int, tuple[tuple[str, str], ...]]:
-        """Return the number of participants known now, this one included, and the nodes.
+    def _discovered(self) -> tuple[int, tuple[tuple[str, str], ...]]:
+        """Return the number of known participants, including this one, and the nodes.
 
-        Publishers and subscriptions are announced apart: known is of whom both have come.
+        Publishers and subscriptions are announced separately; a participant counts with both.
         """
-        node, topic = self.node, _TOPIC_OF_PARTICIPANTS
+        node, topic = self.node, _PARTICIPANTS_TOPIC
         publishers = node.get_publishers_info_by_topic(topic, no_mangle=True)
         subscriptions = node.get_subscriptions_info_by_topic(topic, no_mangle=True)
         return min(len(publishers), len(subscriptions)), self.others()
 
 
-def _participant(end: TopicEndpointInfo) -> bytes:
-    return bytes(end.endpoint_gid[:_PARTICIPANT_BYTES])
+def _participant(endpoint: TopicEndpointInfo) -> bytes:
+    return bytes(endpoint.endpoint_gid[:_PARTICIPANT_BYTES])
 
 
-class _Quiet:
-    """Since when something looks as it does."""
+class _LastChange:
+    """When a polled value last changed."""
 
     def __init__(self) -> None:
-        self._seen: Hashable = None
-        self._since_s = time.monotonic()
+        self._value: Hashable = None
+        self._at_s = time.monotonic()
 
-    def since_s(self, seen: Hashable) -> float:
-        """Return since when it looks like that, on the clock of time.monotonic."""
-        if seen != self._seen:
-            self._seen, self._since_s = seen, time.monotonic()
-        return self._since_s
+    def at_s(self, value: Hashable) -> float:
+        """Return when the value last changed (seconds, time.monotonic), given its current value."""
+        if value != self._value:
+            self._value, self._at_s = value, time.monotonic()
+        return self._at_s

@@ -1,4 +1,4 @@
-"""Looks at a whole ROS graph: every node with its endpoints, state and parameters, and rates."""
+"""Snapshots of the whole ROS graph: nodes with endpoints, states and parameters, and rates."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from composer.drift import EndSeen, NodeSeen, Snapshot
 from composer.model import PortKind
 from composer.remote.graph_names import is_hidden
 from composer.remote.parameters import plain_value
-from composer.remote.proxies import LIFECYCLE, PARAMETERS, Deputies
+from composer.remote.proxies import LIFECYCLE, PARAMETERS, Proxies
 from composer.remote.rate_sampling import RateMeter
-from composer.remote.requests import Asker
+from composer.remote.requests import ServiceCaller
 from composer.remote.session import Deadline, Session
 from composer.runtime.ros.endpoints import topic_info
 from composer.runtime.ros.manager_protocol import full_parameter_name
 from composer.tree import Plain
 
-#: Who has not answered by then is busy or gone; what it did not say is said to be unknown.
-_PATIENCE_S = 2.0
+#: How long to wait for the responses of nodes; later ones count as unknown.
+_RESPONSE_S = 2.0
 _STATE_TYPE = "lifecycle_msgs/srv/GetState"
 _LIST_TYPE = "rcl_interfaces/srv/ListParameters"
 
@@ -35,33 +35,33 @@ _Ends: TypeAlias = dict[str, list[EndSeen]]
 _Where: TypeAlias = tuple[str, str]
 
 
-class Observer:
-    """Takes snapshots, again and again if need be. Use it in a ``with`` block."""
+class GraphObserver:
+    """Takes snapshots of the graph. Use it in a ``with`` block."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._asker = Asker(session)
-        self._deputies = Deputies(session)
+        self._caller = ServiceCaller(session)
+        self._proxies = Proxies(session)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._asker.close()
-        self._deputies.close()
+        self._caller.close()
+        self._proxies.close()
 
-    def look(self, deadline: Deadline) -> Snapshot:
-        """Return what is there, once all is discovered or the deadline is there."""
+    def snapshot(self, deadline: Deadline) -> Snapshot:
+        """Return the graph once discovery is complete, or at the deadline."""
         session = self._session
-        ends = dict(session.wait_until_still(lambda: _frozen(session.node), deadline))
+        ends = dict(session.wait_until_settled(lambda: _endpoints(session.node), deadline))
         counts = Counter(_names(session.node))
         services = {
             node: {end.name: end.type for end in found if end.kind is PortKind.SERVICE}
             for node, found in ends.items()
             if not is_hidden(node)
         }
-        self._deputies.meet(self._patience(deadline))
-        states = self._states(services, deadline) | self._told_states()
+        self._proxies.discover(self._response_deadline(deadline))
+        states = self._states(services, deadline) | self._proxy_states()
         parameters = self._parameters(services, deadline)
         return Snapshot(
             tuple(
@@ -77,10 +77,10 @@ class Observer:
         )
 
     def rates(self, deadline: Deadline, measure_s: float) -> dict[str, float]:
-        """Return how often messages come over each topic in Hz, counted for ``measure_s``.
+        """Return the message rate of each topic in Hz, measured for ``measure_s``.
 
-        Topics with less than two messages in that time, and those whose type is not installed
-        here, are left out. Nothing is counted beyond the deadline.
+        Topics with fewer than two messages, and topics whose type is not installed, are left out.
+        The measurement ends at the deadline.
         """
         if measure_s <= 0.0:
             return {}
@@ -91,69 +91,73 @@ class Observer:
     def _states(
         self, services: dict[str, dict[str, str]], deadline: Deadline
     ) -> dict[str, str | None]:
-        asked = _offering(services, "get_state", _STATE_TYPE)
-        answers = self._asker.ask(
-            GetState, {name: GetState.Request() for name in asked}, self._patience(deadline)
+        nodes = _offering(services, "get_state", _STATE_TYPE)
+        responses = self._caller.call_all(
+            GetState,
+            {name: GetState.Request() for name in nodes},
+            self._response_deadline(deadline),
         )
         return {
-            node: None if answers[name] is None else str(answers[name].current_state.label)
-            for name, node in asked.items()
+            node: None if responses[name] is None else str(responses[name].current_state.label)
+            for name, node in nodes.items()
         }
 
-    def _told_states(self) -> dict[str, str | None]:
-        """Return the states of nodes without services of their own, as managers tell them."""
-        return {node: self._deputies.state(node) for node in self._deputies.nodes(LIFECYCLE)}
+    def _proxy_states(self) -> dict[str, str | None]:
+        """Return the states of nodes without services of their own, from their managers."""
+        return {node: self._proxies.state(node) for node in self._proxies.nodes(LIFECYCLE)}
 
     def _parameters(
         self, services: dict[str, dict[str, str]], deadline: Deadline
     ) -> dict[str, dict[str, Plain] | None]:
-        asked = _offering(services, "list_parameters", _LIST_TYPE)
-        listed = self._asker.ask(
+        nodes = _offering(services, "list_parameters", _LIST_TYPE)
+        listed = self._caller.call_all(
             ListParameters,
-            {name: ListParameters.Request() for name in asked},
-            self._patience(deadline),
+            {name: ListParameters.Request() for name in nodes},
+            self._response_deadline(deadline),
         )
         names = {
             node: sorted(listed[name].result.names)
-            for name, node in asked.items()
+            for name, node in nodes.items()
             if listed[name] is not None
         }
-        values = self._asker.ask(
+        values = self._caller.call_all(
             GetParameters,
             {
-                f"{node}/get_parameters": GetParameters.Request(names=wanted)
-                for node, wanted in names.items()
+                f"{node}/get_parameters": GetParameters.Request(names=listed_names)
+                for node, listed_names in names.items()
             },
-            self._patience(deadline),
+            self._response_deadline(deadline),
         )
-        found: dict[str, dict[str, Plain] | None] = dict.fromkeys(asked.values())
-        for node, wanted in names.items():
-            answer = values[f"{node}/get_parameters"]
-            if answer is not None and len(answer.values) == len(wanted):
-                found[node] = dict(zip(wanted, map(plain_value, answer.values), strict=True))
-        return self._handed_out(found)
+        found: dict[str, dict[str, Plain] | None] = dict.fromkeys(nodes.values())
+        for node, listed_names in names.items():
+            response = values[f"{node}/get_parameters"]
+            if response is not None and len(response.values) == len(listed_names):
+                found[node] = dict(
+                    zip(listed_names, map(plain_value, response.values), strict=True)
+                )
+        return self._from_managers(found)
 
-    def _handed_out(
+    def _from_managers(
         self, found: dict[str, dict[str, Plain] | None]
     ) -> dict[str, dict[str, Plain] | None]:
-        """Return the parameters with those that managers answer for at their nodes."""
-        left = self._deputies.nodes(PARAMETERS)
-        managers = {manager: found.pop(manager, None) for manager in set(left.values())}
-        for node, manager in left.items():
-            told, owned = managers[manager], full_parameter_name(node, "")
-            found[node] = told and {
-                name.removeprefix(owned): value
-                for name, value in told.items()
-                if name.startswith(owned)
+        """Move the parameters that managers list for other nodes to these nodes."""
+        managers = self._proxies.nodes(PARAMETERS)
+        by_manager = {manager: found.pop(manager, None) for manager in set(managers.values())}
+        for node, manager in managers.items():
+            values, prefix = by_manager[manager], full_parameter_name(node, "")
+            found[node] = values and {
+                name.removeprefix(prefix): value
+                for name, value in values.items()
+                if name.startswith(prefix)
             }
         return found
 
-    def _patience(self, deadline: Deadline) -> Deadline:
-        return Deadline(min(_PATIENCE_S, deadline.left_s))
+    def _response_deadline(self, deadline: Deadline) -> Deadline:
+        return Deadline(min(_RESPONSE_S, deadline.left_s))
 
 
 def _offering(services: dict[str, dict[str, str]], last: str, type_name: str) -> dict[str, str]:
-    """Return the nodes that have a service of that name and type, by the service's full name."""
+    """Return the nodes with a service of that name and type, by the full name of the service."""
     return {
         f"{node}/{last}": node
         for node, offered in services.items()
@@ -161,13 +165,13 @@ def _offering(services: dict[str, dict[str, str]], last: str, type_name: str) ->
     }
 
 
-def _frozen(node: Node) -> tuple[tuple[str, tuple[EndSeen, ...]], ...]:
-    """Return the endpoints of all nodes in a form that can be compared."""
-    ends = _ends_by_node(node)
+def _endpoints(node: Node) -> tuple[tuple[str, tuple[EndSeen, ...]], ...]:
+    """Return the endpoints of all nodes as a hashable value."""
+    ends = _endpoints_by_node(node)
     return tuple((name, tuple(ends[name])) for name in sorted(ends))
 
 
-def _ends_by_node(node: Node) -> _Ends:
+def _endpoints_by_node(node: Node) -> _Ends:
     ends: _Ends = {name: [] for name in _names(node)}
     for topic, types in _topics(node).items():
         info = topic_info(node, topic, types)
@@ -179,12 +183,12 @@ def _ends_by_node(node: Node) -> _Ends:
                 if end.node in ends:
                     ends[end.node].append(EndSeen(kind, topic, end.type, end.qos))
     for name, of_node in ends.items():
-        of_node.extend(_others(node, name))
+        of_node.extend(_services_and_actions(node, name))
         of_node.sort(key=lambda end: (list(PortKind).index(end.kind), end.name, end.type))
     return ends
 
 
-def _others(node: Node, full_name: str) -> Iterator[EndSeen]:
+def _services_and_actions(node: Node, full_name: str) -> Iterator[EndSeen]:
     namespace, _, name = full_name.rpartition("/")
     where = (name, namespace or "/")
     readers: tuple[tuple[PortKind, Callable[[_Where], Iterable[Any]]], ...] = (
@@ -200,7 +204,7 @@ def _others(node: Node, full_name: str) -> Iterator[EndSeen]:
 
 
 def _read(read: Callable[[_Where], Iterable[Any]], where: _Where) -> Iterable[Any]:
-    """Return what a node has; nothing when it has left in the meantime."""
+    """Return the result of a query; nothing if the node has left in the meantime."""
     try:
         return read(where)
     except RuntimeError:  # NodeNameNonExistentError is one

@@ -1,4 +1,4 @@
-"""Running systems, asked from another process by way of their manager nodes."""
+"""Running systems: reports and commands through their manager nodes."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
-from composer.remote.name_matching import NotThere, not_there
+from composer.remote.name_matching import NotFoundError, not_found_error
 from composer.remote.requests import call_once
-from composer.remote.session import Deadline, NoAnswer, Session
+from composer.remote.session import Deadline, NoResponseError, Session
 from composer.runtime.metrics.diagnostics import from_message
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.process.instance_lock import local_systems
@@ -27,15 +27,15 @@ from composer.runtime.ros.manager_protocol import (
 
 _TRIGGER_TYPE = "std_srvs/srv/Trigger"
 _SERVICE = f"/{NAME}/{IS_ACTIVE}"
-#: Managers tell at once and again each second; who is not met at once is met within 3 s.
-MEETING_S = 3.5
-
-_LAST_WORDS_S = 0.1
+#: Fast DDS discovers a participant at once or within 3 s; managers report every second.
+DISCOVERY_S = 3.5
+#: How long to wait for the last messages of a process that has ended.
+_LAST_MESSAGES_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class NodeReport:
-    """A node as its system's manager tells of it. ``since_s`` is in seconds since 1970."""
+    """A node as its manager reports it. ``since_s`` is in seconds since 1970."""
 
     node: str
     state: str
@@ -56,9 +56,9 @@ class NodeReport:
 
 @dataclass(frozen=True, slots=True)
 class SystemReport:
-    """A system as its manager tells of it. ``name`` is the namespace of that.
+    """A system as its manager reports it. ``name`` is the namespace of the manager.
 
-    ``callbacks`` and ``chains`` are there where asked for, as they were at ``callbacks_at_s``.
+    ``callbacks`` and ``chains`` are included on request, with their time ``callbacks_at_s``.
     """
 
     name: str
@@ -73,18 +73,21 @@ class SystemReport:
 
 
 class Systems:
-    """Asks managers, all within one time limit; ``callbacks`` says whether for those, too."""
+    """Queries and commands managers, all within one time limit.
+
+    With ``callbacks``, reports include callbacks and chains.
+    """
 
     def __init__(self, session: Session, deadline: Deadline, *, callbacks: bool = False) -> None:
         self._session = session
         self._deadline = deadline
-        self._wants_callbacks = callbacks
-        self._heard: dict[str, DiagnosticArray] = {}
+        self._with_callbacks = callbacks
+        self._states: dict[str, DiagnosticArray] = {}
         self._callbacks: dict[str, DiagnosticArray] = {}
         self._subscriptions: dict[str, list[Subscription]] = {}
 
-    def look(self) -> tuple[str, ...]:
-        """Return the names of all systems known now, and listen for what they tell.
+    def discover(self) -> tuple[str, ...]:
+        """Return the names of all systems discovered so far, and subscribe to their reports.
 
         The name is the namespace of the manager: ``/pipeline``, ``/robot1/pipeline``.
         """
@@ -95,106 +98,115 @@ class Systems:
                 if name.endswith(_SERVICE) and _TRIGGER_TYPE in types
             )
         )
-        self.listen(found)
+        self.subscribe(found)
         return found
 
-    def listen(self, names: Iterable[str]) -> None:
-        """Listen for what systems tell, also of those that are not discovered yet."""
+    def subscribe(self, names: Iterable[str]) -> None:
+        """Subscribe to the reports of systems, which need not be discovered yet."""
         for name in names:
             if name not in self._subscriptions:
-                self._subscriptions[name] = self._listen(name)
+                self._subscriptions[name] = self._subscribe(name)
 
     def find(self, name: str) -> str:
-        """Return the full name of the running system that ``name`` means. Raises NotThere."""
-        here = _called(name, local_systems())
-        if not here:
-            known = self._session.wait_until_still(self.look, self._deadline)
-            here = _called(name, known)
-        if not here:
-            error = not_there("running system", name, (*local_systems(), *known))
+        """Return the full name of a running system. Raises NotFoundError."""
+        found = _matches(name, local_systems())
+        if not found:
+            known = self._session.wait_until_settled(self.discover, self._deadline)
+            found = _matches(name, known)
+        if not found:
+            error = not_found_error("running system", name, (*local_systems(), *known))
             none = "no system is running: start one with 'compose run'"
-            raise NotThere(str(error), error.hint if known else none)
-        if len(here) > 1:
-            raise NotThere(f"'{name}' is more than one system", f"say which: {', '.join(here)}")
-        return here[0]
+            raise NotFoundError(str(error), error.hint if known else none)
+        if len(found) > 1:
+            raise NotFoundError(
+                f"'{name}' matches more than one system", f"use a full name: {', '.join(found)}"
+            )
+        return found[0]
 
     def only(self) -> str:
-        """Return the full name of the one system that runs. Raises NotThere."""
-        known = sorted(local_systems()) or self._session.wait_until_still(self.look, self._deadline)
+        """Return the full name of the only running system. Raises NotFoundError."""
+        known = sorted(local_systems()) or self._session.wait_until_settled(
+            self.discover, self._deadline
+        )
         if not known:
-            raise NotThere("no system is running", "start one with 'compose run'")
+            raise NotFoundError("no system is running", "start one with 'compose run'")
         if len(known) > 1:
-            raise NotThere("there is more than one system", f"say which: {', '.join(known)}")
+            raise NotFoundError(
+                "more than one system is running", f"specify one of: {', '.join(known)}"
+            )
         return known[0]
 
     def report(self, name: str) -> SystemReport:
-        """Return what the manager of a system tells. Raises NoAnswer."""
+        """Return the report of a system. Raises NoResponseError."""
         found = self.reports([name], self._deadline)[name]
         if found is None:
-            raise self._silent(name)
+            raise self._no_response_error(name)
         return found
 
-    def reports(self, names: Iterable[str], patience: Deadline) -> dict[str, SystemReport | None]:
-        """Return what the managers tell until then; None for one that tells nothing."""
-        wanted = sorted(names)
-        self._hear(wanted, patience)
-        return {name: self._report(name) if name in self._heard else None for name in wanted}
+    def reports(self, names: Iterable[str], deadline: Deadline) -> dict[str, SystemReport | None]:
+        """Return the reports that arrive before the deadline, None for the other systems."""
+        requested = sorted(names)
+        self._wait_for_reports(requested, deadline)
+        return {name: self._report(name) if name in self._states else None for name in requested}
 
     def newer(self, name: str, than_s: float) -> SystemReport | None:
-        """Return the report of a system, if its callbacks are known as they were after a time."""
+        """Return the report of a system if its callbacks are newer than ``than_s``, else None."""
         if _time_s(self._callbacks[name]) <= than_s:
             return None
         return self._report(name)
 
-    def command(self, name: str, what: str) -> tuple[bool, str]:
-        """Have a system do something, and return whether it did and what it says. Raises NoAnswer.
+    def command(self, name: str, command: str) -> tuple[bool, str]:
+        """Call a service of a manager; return whether it succeeded, and its message.
 
-        ``what`` is one of the services of :class:`composer.runtime.manager.node.ManagerNode`.
+        ``command`` is a service of :class:`composer.runtime.manager.node.ManagerNode`. Raises
+        NoResponseError.
         """
-        life = _Life(name, self._deadline)
-        # Who tells its state is alive: of a killed process, services are in the graph for a while.
-        if not self._hear((name,), _Life(name, Deadline(min(MEETING_S, life.left_s)))):
-            raise self._silent(name)
-        service = f"{name}/{NAME}/{what}"
+        limit = _ProcessDeadline(name, self._deadline)
+        # A report proves that the process is alive: the services of a killed process remain in the
+        # graph for a while.
+        discovery = _ProcessDeadline(name, Deadline(min(DISCOVERY_S, limit.left_s)))
+        if not self._wait_for_reports((name,), discovery):
+            raise self._no_response_error(name)
+        service = f"{name}/{NAME}/{command}"
         try:
-            answer = call_once(self._session, Trigger, service, Trigger.Request(), life)
-        except NoAnswer as error:
-            if life.is_over:
-                raise NoAnswer(f"{name} did not {what}: its process has ended") from error
-            raise NoAnswer(
-                f"{name} did not {what} within {self._deadline.timeout_s:g} s",
-                "it may still be at it: 'compose ps' tells. --timeout waits longer",
+            response = call_once(self._session, Trigger, service, Trigger.Request(), limit)
+        except NoResponseError as error:
+            if limit.has_process_ended:
+                raise NoResponseError(f"{name} did not {command}: its process has ended") from error
+            raise NoResponseError(
+                f"{name} did not {command} within {self._deadline.timeout_s:g} s",
+                "it may still be in progress: see 'compose ps'. Use --timeout to wait longer",
             ) from error
-        return bool(answer.success), str(answer.message)
+        return bool(response.success), str(response.message)
 
-    def end(self, name: str) -> str:
-        """End a system and its process; return what it said. Raises NoAnswer."""
-        was_here = name in local_systems()
+    def shut_down(self, name: str) -> str:
+        """Shut down a system and its process; return its message. Raises NoResponseError."""
+        is_local = name in local_systems()
         _, message = self.command(name, "shutdown")
-        if was_here:
+        if is_local:
             self._session.wait_for(lambda: name not in local_systems() or None, self._deadline)
         return message
 
-    def _hear(self, names: Collection[str], patience: Deadline) -> bool:
-        """Wait until all managers have told their state, and say whether they have."""
-        self.listen(names)
+    def _wait_for_reports(self, names: Collection[str], deadline: Deadline) -> bool:
+        """Wait for the reports of all systems; return whether all have arrived."""
+        self.subscribe(names)
         return bool(
-            self._session.wait_for(lambda: all(map(self._has_told, names)) or None, patience)
+            self._session.wait_for(lambda: all(map(self._has_reported, names)) or None, deadline)
         )
 
-    def _silent(self, name: str) -> NoAnswer:
+    def _no_response_error(self, name: str) -> NoResponseError:
         pid = local_systems().get(name)
         where = "its process may be busy or gone" if pid is None else f"its process is {pid}"
-        return NoAnswer(
-            f"{name}/{NAME} did not answer within {self._deadline.timeout_s:g} s",
-            f"{where}. --timeout gives it longer",
+        return NoResponseError(
+            f"{name}/{NAME} did not respond within {self._deadline.timeout_s:g} s",
+            f"{where}. Use --timeout to wait longer",
         )
 
-    def _has_told(self, name: str) -> bool:
-        return name in self._heard and (not self._wants_callbacks or name in self._callbacks)
+    def _has_reported(self, name: str) -> bool:
+        return name in self._states and (not self._with_callbacks or name in self._callbacks)
 
     def _report(self, name: str) -> SystemReport:
-        report = _report(name, self._heard[name])
+        report = _system_report(name, self._states[name])
         callbacks = self._callbacks.get(name)
         if callbacks is None:
             return report
@@ -202,45 +214,46 @@ class Systems:
         at_s = _time_s(callbacks)
         return replace(report, callbacks=found, chains=chains, callbacks_at_s=at_s)
 
-    def _listen(self, name: str) -> list[Subscription]:
-        subscriptions = [self._heard_of(name, STATE_TOPIC, STATE_QOS, self._heard)]
-        if self._wants_callbacks:
+    def _subscribe(self, name: str) -> list[Subscription]:
+        subscriptions = [self._stored_in(self._states, name, STATE_TOPIC, STATE_QOS)]
+        if self._with_callbacks:
             subscriptions.append(
-                self._heard_of(name, CALLBACKS_TOPIC, CALLBACKS_QOS, self._callbacks)
+                self._stored_in(self._callbacks, name, CALLBACKS_TOPIC, CALLBACKS_QOS)
             )
         return subscriptions
 
-    def _heard_of(
-        self, name: str, topic: str, qos: QoSProfile, heard: dict[str, DiagnosticArray]
+    def _stored_in(
+        self, messages: dict[str, DiagnosticArray], name: str, topic: str, qos: QoSProfile
     ) -> Subscription:
+        """Return a subscription that keeps the last message of a system in ``messages``."""
         return self._session.node.create_subscription(
             DiagnosticArray,
             f"{name}/{NAME}/{topic}",
-            lambda message: heard.__setitem__(name, message),
+            lambda message: messages.__setitem__(name, message),
             qos,
         )
 
 
-class _Life(Deadline):
-    """A time limit that ends with the process of a system, where that runs on this computer."""
+class _ProcessDeadline(Deadline):
+    """A time limit that ends early if the process of a system on this computer ends."""
 
     def __init__(self, system: str, limit: Deadline) -> None:
         super().__init__(limit.left_s)
         self._system = system
-        self._is_here = system in local_systems()
-        self._last_words: Deadline | None = None
+        self._is_local = system in local_systems()
+        self._last_messages: Deadline | None = None
 
     @property
     def left_s(self) -> float:
-        """The seconds that are left. What it said last still arrives."""
-        if self._last_words is None and self.is_over:
-            self._last_words = Deadline(min(_LAST_WORDS_S, super().left_s))
-        return super().left_s if self._last_words is None else self._last_words.left_s
+        """The remaining seconds, with some time for the last messages of an ended process."""
+        if self._last_messages is None and self.has_process_ended:
+            self._last_messages = Deadline(min(_LAST_MESSAGES_S, super().left_s))
+        return super().left_s if self._last_messages is None else self._last_messages.left_s
 
     @property
-    def is_over(self) -> bool:
+    def has_process_ended(self) -> bool:
         """Whether the process has ended."""
-        return self._is_here and self._system not in local_systems()
+        return self._is_local and self._system not in local_systems()
 
 
 def _time_s(message: DiagnosticArray) -> float:
@@ -248,12 +261,12 @@ def _time_s(message: DiagnosticArray) -> float:
     return float(stamp.sec + stamp.nanosec * 1e-9)
 
 
-def _called(name: str, systems: Iterable[str]) -> list[str]:
-    """Return the systems that ``name`` may mean."""
+def _matches(name: str, systems: Iterable[str]) -> list[str]:
+    """Return the systems with that full name or last part."""
     return [system for system in systems if system == name or system.endswith(f"/{name}")]
 
 
-def _report(name: str, message: DiagnosticArray) -> SystemReport:
+def _system_report(name: str, message: DiagnosticArray) -> SystemReport:
     system, *nodes = message.status
     values = _values(system)
     return SystemReport(
@@ -288,7 +301,7 @@ def _node_report(status: DiagnosticStatus) -> NodeReport:
 
 
 def _counts(text: str) -> dict[str, int]:
-    """Read counts by name: ``incompatible=1``."""
+    """Parse counts by name, such as ``incompatible=1``."""
     pairs = (item.partition("=") for item in text.split())
     return {name: int(count) for name, _, count in pairs}
 

@@ -19,7 +19,7 @@ from composer.templates import compile_template
 
 
 class _Kind(NamedTuple):
-    """Where the types of a kind are, and what only their classes have."""
+    """The folder of an interface kind, and an attribute that only its classes have."""
 
     folder: str
     part: str
@@ -31,30 +31,30 @@ _KINDS = {
     "action": _Kind("action", "Goal"),
 }
 _SLASHES = 2
-_WHAT_A_TYPE_IS = "it has three parts, as std_msgs/msg/String"
+_TYPE_HINT = "a type has three parts, such as std_msgs/msg/String"
 
-#: Makes a message; expressions in it see the names of the scope.
+#: Builds a message; its expressions see the names of the scope.
 Build = Callable[[Mapping[str, Any]], Any]
 
 
-class BadValue(RosError):
-    """What was given does not make a message of the type, or names no part of it."""
+class InvalidValueError(RosError):
+    """A value does not fit the message type, or a path does not exist in it."""
 
 
 def class_of(name: str, kind: str = "message") -> Any:
     """Return the class of an interface.
 
-    Raises BadValue when it is not installed here, or of another kind.
+    Raises InvalidValueError if it is not installed, or of another kind.
     """
     if name.count("/") != _SLASHES:
-        raise BadValue(f"there is no type '{name}'", _similar(name, kind) or _WHAT_A_TYPE_IS)
+        raise InvalidValueError(f"there is no type '{name}'", _similar(name, kind) or _TYPE_HINT)
     try:
         found = interface_class(name)
     except MessageError as error:
-        hint = _similar(name, kind) or "the package that defines it must be installed here"
-        raise BadValue(str(error), hint) from error
+        hint = _similar(name, kind) or "install the package that defines it"
+        raise InvalidValueError(str(error), hint) from error
     if not hasattr(found, _KINDS[kind].part):
-        raise BadValue(f"'{name}' is no {kind} type")
+        raise InvalidValueError(f"'{name}' is not {'an' if kind == 'action' else 'a'} {kind} type")
     return found
 
 
@@ -66,27 +66,30 @@ def _similar(name: str, kind: str) -> str | None:
 
 
 def compile_content(text: str, message_type: Any, what: str) -> Build:
-    """Return what makes messages of YAML ``text``; fields left out keep their defaults.
+    """Return a function that builds messages from YAML ``text``; other fields keep their defaults.
 
-    ``{expressions}`` are evaluated each time. Raises BadValue, now and from the result.
+    ``{expressions}`` are evaluated for each message. This and the returned function raise
+    InvalidValueError.
     """
-    tree, findings = parse_document(SourceFile(what, text.strip() or "{}"))
-    if tree is None or findings:
-        reasons = "; ".join(finding.message for finding in findings)
-        raise BadValue(f"{what} is not a YAML map: {reasons}", "write it as '{data: hello}'")
+    tree, diagnostics = parse_document(SourceFile(what, text.strip() or "{}"))
+    if tree is None or diagnostics:
+        reasons = "; ".join(item.message for item in diagnostics)
+        raise InvalidValueError(
+            f"{what} is not a YAML map: {reasons}", "write a map, such as '{data: hello}'"
+        )
     template, problems = compile_template(tree)
     if template is None or problems:
-        raise BadValue(f"{what}: " + "; ".join(problem.message for problem in problems))
+        raise InvalidValueError(f"{what}: " + "; ".join(problem.message for problem in problems))
     try:
         build = compile_message(template, message_type, what)
     except MessageError as error:
-        raise BadValue(str(error), error.hint) from error
+        raise InvalidValueError(str(error), error.hint) from error
 
     def build_checked(scope: Mapping[str, Any]) -> Any:
         try:
             return build(scope)
         except (MessageError, EvaluationError) as error:
-            raise BadValue(f"{what}: {error}", getattr(error, "hint", None)) from error
+            raise InvalidValueError(f"{what}: {error}", getattr(error, "hint", None)) from error
 
     return build_checked
 
@@ -107,25 +110,25 @@ def to_plain(value: Any) -> Any:
 def part(value: Any, path: str) -> Any:
     """Return the part of a message that ``path`` names: ``pose.position.x``, ``ranges.3``.
 
-    Raises BadValue.
+    Raises InvalidValueError.
     """
     for name in path.split("."):
         value = _step(value, name, path)
     return value
 
 
-def age_s(message: Any, came_at_s: float) -> float:
-    """Return how many seconds lay between a message's ``header.stamp`` and its coming.
+def age_s(message: Any, arrived_s: float) -> float:
+    """Return the seconds between a message's ``header.stamp`` and its arrival.
 
-    ``came_at_s`` is by time.monotonic. Raises BadValue for a message without a header.
+    ``arrived_s`` is by time.monotonic. Raises InvalidValueError for a message without a header.
     """
     stamp = getattr(getattr(message, "header", None), "stamp", None)
     if stamp is None:
-        raise BadValue(
+        raise InvalidValueError(
             f"{type(message).__name__} has no header.stamp, so its age is not known",
-            "compose topic hz tells how often it comes",
+            "'compose topic hz' measures the rate",
         )
-    now_s = time.time() - (time.monotonic() - came_at_s)
+    now_s = time.time() - (time.monotonic() - arrived_s)
     return float(now_s - (stamp.sec + stamp.nanosec * 1e-9))
 
 
@@ -134,10 +137,10 @@ def _step(value: Any, name: str, path: str) -> Any:
         fields = value.get_fields_and_field_types()
         if name in fields:
             return getattr(value, name)
-        raise BadValue(f"there is no field '{name}' in '{path}'", suggestion(name, fields))
+        raise InvalidValueError(f"'{path}': there is no field '{name}'", suggestion(name, fields))
     if name.isdigit() and hasattr(value, "__getitem__") and not isinstance(value, str):
         try:
             return value[int(name)]
         except IndexError as error:
-            raise BadValue(f"'{path}': there are {len(value)} items only") from error
-    raise BadValue(f"'{name}' in '{path}' is not a part of {value!r:.60}")
+            raise InvalidValueError(f"'{path}': there are only {len(value)} items") from error
+    raise InvalidValueError(f"'{path}': {value!r:.60} has no part '{name}'")

@@ -1,4 +1,4 @@
-"""Runs the command line in this process, as typer's CliRunner does, up to the exit code."""
+"""Run the command line in this process, like typer's CliRunner, including the exit code."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from composer.cli import main
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """How a command ended and what it wrote."""
+    """The exit code and output of a command."""
 
     code: int
     out: str
@@ -20,7 +20,7 @@ class Done:
 
 
 class _Stream(io.TextIOWrapper):
-    """A stream in memory, with a buffer beneath as real ones have."""
+    """A stream in memory with a binary buffer, like a real one."""
 
     def text(self) -> str:
         self.flush()

@@ -1,7 +1,7 @@
-"""Runs ``compose`` as ever, and then writes to a file descriptor what it took and did.
+"""Run ``compose``, then write its CPU time, memory and imports to a file descriptor as JSON.
 
-Started as a script of its own, so that nothing but the command is measured. It may not use the
-network or start programs: that ends it with a traceback.
+It is started as a script, so that only the command is measured. Use of the network or of child
+processes ends it with a traceback.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ def watch(event: str, _: tuple[Any, ...]) -> None:
         raise AssertionError(f"{event} was called")
 
 
-def yardstick_s() -> float:
-    """Return the CPU time of work that is always the same: how fast the machine is just now."""
+def reference_s() -> float:
+    """Return the CPU time of a fixed amount of work, which shows how fast the machine is."""
     began_s = time.process_time()
     seen: dict[str, list[int]] = {}
     for number in range(150_000):
@@ -35,13 +35,13 @@ def yardstick_s() -> float:
 def report() -> dict[str, Any]:
     cpu_s = time.process_time()
     here = Path.cwd()
-    # Not ru_maxrss, which begins with what the process had that started this one.
+    # Not ru_maxrss, which starts with the peak of the parent process.
     peak = re.search(r"VmHWM:\s*(\d+)", Path("/proc/self/status").read_text())
     assert peak is not None
     files = [getattr(module, "__file__", None) for module in list(sys.modules.values())]
     return {
         "cpu_s": cpu_s,
-        "yardstick_s": yardstick_s(),
+        "reference_s": reference_s(),
         "peak_mb": int(peak[1]) / 1024,
         "imported": [file for file in files if file and Path(file).is_relative_to(here)],
     }

@@ -12,7 +12,7 @@ import typer
 
 from composer import cli
 from composer.cli.app import application
-from composer.cli.support.help import examples
+from composer.cli.support.options import examples
 from tests.cli.compose import compose
 
 COMPOSE = [sys.executable, "-m", "composer"]
@@ -25,7 +25,7 @@ def test_version() -> None:
 
 
 def commands() -> Iterator[list[str]]:
-    """Yield the words of every command there is, groups and the whole program among them."""
+    """Yield the words of every command, including groups and the program itself."""
     waiting: list[tuple[list[str], Any]] = [([], typer.main.get_command(application()))]
     while waiting:
         words, command = waiting.pop()
@@ -34,10 +34,14 @@ def commands() -> Iterator[list[str]]:
         waiting += [([*words, name], item) for name, item in inner.items()]
 
 
+def has_subcommands(words: list[str]) -> bool:
+    return any(others[:-1] == words and others != words for others in commands())
+
+
 @pytest.mark.parametrize(
     "command", list(commands()), ids=lambda words: " ".join(["compose", *words])
 )
-def test_every_help_page_ends_with_examples_of_that_command(command: list[str]) -> None:
+def test_every_help_page_ends_with_examples_of_the_command(command: list[str]) -> None:
     done = compose(*command, "--help")
     assert done.code == 0
     options, _, lines = done.out.partition("Examples:")
@@ -48,8 +52,22 @@ def test_every_help_page_ends_with_examples_of_that_command(command: list[str]) 
     assert all(words in line for line in shown)
 
 
+@pytest.mark.parametrize(
+    "group", [words for words in commands() if has_subcommands(words)], ids=str
+)
+def test_no_summary_is_truncated_at_80_columns(
+    group: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    _, _, lines = compose(*group, "--help").out.partition("Commands:\n")
+    listed = lines.partition("\n\n")[0].splitlines()
+    assert listed
+    assert [line for line in listed if line.endswith("...")] == []
+    assert all(line.startswith("  ") and line[2] != " " for line in listed), "one line per command"
+
+
 @pytest.mark.parametrize("group", ["node", "topic", "service", "action", "param"])
-def test_whatever_looks_into_the_ros_graph_has_a_time_limit_and_prints_json(group: str) -> None:
+def test_commands_that_query_the_graph_have_a_time_limit_and_json_output(group: str) -> None:
     pages = [compose(*words, "--help").out for words in commands() if words[:-1] == [group]]
     assert len(pages) > 1
     for page in pages:
@@ -60,7 +78,7 @@ def test_whatever_looks_into_the_ros_graph_has_a_time_limit_and_prints_json(grou
 @pytest.mark.parametrize(
     "arguments", [["--bogus"], ["nothing"], ["run"], ["graph", "-f", "x", "y"]]
 )
-def test_a_wrong_command_line_is_a_usage_error_on_stderr(arguments: list[str]) -> None:
+def test_wrong_arguments_are_a_usage_error_on_stderr(arguments: list[str]) -> None:
     done = compose(*arguments)
     assert (done.code, done.out) == (2, "")
     assert "Error: " in done.err
@@ -68,14 +86,14 @@ def test_a_wrong_command_line_is_a_usage_error_on_stderr(arguments: list[str]) -
 
 @pytest.mark.parametrize("option", ["--for", "--timeout", "--grace"])
 @pytest.mark.parametrize("value", ["nan", "inf", "1e300"])
-def test_what_no_clock_can_count_to_is_a_usage_error(option: str, value: str) -> None:
+def test_nan_infinity_and_huge_durations_are_usage_errors(option: str, value: str) -> None:
     done = compose("run", "pipeline", "--dry-run", option, value)
     assert (done.code, done.out) == (2, "")
     assert f"'{option}': " in done.err
 
 
 def redirected(to: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run a command with streams that a shell leads elsewhere."""
+    """Run a command with redirections of a shell."""
     line = f'exec "$@" {to}'
     return subprocess.run(
         ["sh", "-c", line, "sh", *COMPOSE, *arguments],
@@ -86,20 +104,20 @@ def redirected(to: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_streams_may_be_closed() -> None:
+def test_standard_streams_can_be_closed() -> None:
     for closed in (">&-", "2>&-", "<&- >&- 2>&-"):
         done = redirected(closed, "run", "pipeline", "--dry-run")
         assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("arguments", [["rule"], ["--help"], ["graph", "pipeline"]])
-def test_a_full_disk_is_no_fault_of_ours(arguments: list[str]) -> None:
+def test_a_full_disk_is_not_an_internal_error(arguments: list[str]) -> None:
     done = redirected("> /dev/full", *arguments)
     assert done.returncode == 1
-    assert done.stderr == "compose: the output cannot be written: No space left on device\n"
+    assert done.stderr == "compose: cannot write the output: No space left on device\n"
 
 
-def test_a_current_folder_that_is_gone_is_told_as_such(tmp_path: Path) -> None:
+def test_a_removed_working_directory_is_reported(tmp_path: Path) -> None:
     folder = tmp_path / "gone"
     folder.mkdir()
     python = f"{sys.executable} -P -m composer"
@@ -113,10 +131,10 @@ def test_a_current_folder_that_is_gone_is_told_as_such(tmp_path: Path) -> None:
         timeout=30,
     )
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr == "compose: the current folder is gone: somebody has removed it\n"
+    assert done.stderr == "compose: the current working directory does not exist anymore\n"
 
 
-def test_ctrl_c_is_heard_while_a_command_is_still_being_loaded(
+def test_ctrl_c_is_handled_while_a_command_is_imported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def interrupt(*_: object) -> None:
@@ -127,10 +145,10 @@ def test_ctrl_c_is_heard_while_a_command_is_still_being_loaded(
     assert (done.code, done.out, done.err) == (130, "", "")
 
 
-def test_ctrl_c_is_told_from_a_module_that_cannot_be_loaded(
+def test_an_import_error_caused_by_ctrl_c_is_an_interrupt(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """rclpy is in C: what it meets while it is loaded it makes an ImportError of."""
+    """The C extension of rclpy turns a KeyboardInterrupt during import into an ImportError."""
 
     def interrupt(*_: object) -> None:
         failure = ImportError("initialization failed")
@@ -152,7 +170,7 @@ def options_with_a_number() -> Iterator[tuple[str, Any]]:
                 yield f"{name} {option.opts[0]}", option
 
 
-def test_no_option_takes_a_number_that_is_none() -> None:
+def test_no_option_accepts_nan() -> None:
     found = dict(options_with_a_number())
     assert len(found) > 10
     assert [name for name, option in found.items() if option.callback is None] == []
@@ -162,7 +180,7 @@ def test_a_mistyped_command_gets_a_suggestion() -> None:
     assert "Did you mean 'validate'?" in compose("valdate").err
 
 
-def test_a_fault_of_ours_is_told_shortly_and_with_a_traceback_only_on_request(
+def test_an_internal_error_prints_a_traceback_only_on_request(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     def fail(*_: object, **__: object) -> None:
@@ -203,5 +221,5 @@ def test_help_and_version_import_nothing_heavy() -> None:
     assert done.stderr == "set()\n"
 
 
-def test_examples_stand_as_they_are_written() -> None:
+def test_examples_are_printed_verbatim() -> None:
     assert examples("compose a", "compose b") == "\b\nExamples:\n  compose a\n  compose b"

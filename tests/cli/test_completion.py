@@ -1,4 +1,4 @@
-"""Shell completion, asked as bash asks."""
+"""Shell completion, with the protocol of bash."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.cli.support.loaded import complete_system
+from composer.cli.support.system_arguments import complete_system
 
 
 def complete(*words: str) -> list[str]:
@@ -33,7 +33,7 @@ def test_commands_options_and_choices_are_completed() -> None:
     assert complete("run", "pipeline", "--autostart", "in") == ["inactive"]
 
 
-def test_a_system_is_completed_by_the_names_of_examples() -> None:
+def test_the_names_of_example_systems_are_completed() -> None:
     assert complete("run", "pi") == ["pipeline"]
 
 
@@ -48,7 +48,7 @@ def test_a_system_is_completed_by_the_names_of_examples() -> None:
         ("deep/x", []),
     ],
 )
-def test_a_system_is_completed_by_paths(
+def test_paths_of_systems_are_completed(
     typed: str, offered: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

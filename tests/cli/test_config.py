@@ -8,7 +8,7 @@ import pytest
 from tests.cli.compose import compose
 
 
-def test_a_system_without_what_it_includes(tmp_path: Path) -> None:
+def test_includes_are_resolved(tmp_path: Path) -> None:
     done = compose("config", "systems/fleet.yaml")
     assert (done.code, done.err) == (0, "")
     for gone in ("include", "for_each", "${", "variables: {start"):
@@ -21,7 +21,7 @@ def test_a_system_without_what_it_includes(tmp_path: Path) -> None:
     assert (again.out, again.err) == (done.out, "")
 
 
-def test_json_says_the_same() -> None:
+def test_json_output() -> None:
     done = compose("config", "fleet", "--json")
     nodes = json.loads(done.out)["nodes"]
     assert nodes["beta_planner"] == {
@@ -31,7 +31,7 @@ def test_json_says_the_same() -> None:
     }
 
 
-def test_a_node_type_with_what_it_extends(tmp_path: Path) -> None:
+def test_extends_is_resolved(tmp_path: Path) -> None:
     (tmp_path / "quick.yaml").write_text(
         "node: quick\nextends: watchdog\nparameters: {timeout_ms: 10.0}\n"
     )
@@ -42,14 +42,14 @@ def test_a_node_type_with_what_it_extends(tmp_path: Path) -> None:
     assert "extends" not in done.out
 
 
-def test_nothing_is_printed_of_a_file_with_errors(tmp_path: Path) -> None:
+def test_a_file_with_errors_prints_nothing(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text("system: a\ninclude: [b.yaml]\nnodes: {c: {}}\n")
     done = compose("config", str(tmp_path / "a.yaml"))
     assert (done.code, done.out) == (1, "")
     assert "invalid-include" in done.err
 
 
-def test_what_is_beside_an_included_file_is_pointed_out(tmp_path: Path) -> None:
+def test_files_next_to_an_included_file_are_noted(tmp_path: Path) -> None:
     (tmp_path / "arm").mkdir()
     (tmp_path / "a.yaml").write_text("system: a\ninclude: [arm/arm.yaml]\n")
     (tmp_path / "arm" / "arm.yaml").write_text("system: arm\nnodes: {arm: {behavior: 'arm:Arm'}}\n")
@@ -62,7 +62,7 @@ def test_what_is_beside_an_included_file_is_pointed_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("report", ["text", "json", "sarif", "github"])
-def test_reports_name_the_file_that_is_wrong(
+def test_reports_name_the_included_file(
     tmp_path: Path, report: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

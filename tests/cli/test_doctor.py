@@ -24,7 +24,7 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
-def test_without_rclpy_it_looks_at_the_rest_and_says_so() -> None:
+def test_without_rclpy_everything_else_is_checked() -> None:
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT_ROS, "doctor", "--json"],
         check=False,
@@ -35,12 +35,12 @@ def test_without_rclpy_it_looks_at_the_rest_and_says_so() -> None:
     found = {(item["area"], item["level"]): item for item in json.loads(done.stdout)}
     assert "rclpy is not installed" in found["versions", "error"]["message"]
     assert "ros2-composer[ros]" in found["versions", "error"]["remedy"]
-    assert found["graph", "note"]["message"] == "not looked at: that needs rclpy"
+    assert found["graph", "note"]["message"] == "not checked: rclpy is not installed"
     assert {area for area, _ in found} >= {"environment", "versions", "graph"}
     assert "Traceback" not in done.stderr
 
 
-def test_an_environment_that_hinders_a_start_is_told_with_a_remedy(
+def test_an_invalid_environment_is_reported_with_a_remedy(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCLHOST")
@@ -55,10 +55,10 @@ def test_an_environment_that_hinders_a_start_is_told_with_a_remedy(
         "ROS_AUTOMATIC_DISCOVERY_RANGE is 'LOCLHOST', which is not a discovery range"
     )
     assert remedy.strip().startswith("-> did you mean LOCALHOST?")
-    assert "not looked at: the environment does not let ROS start" in done.out
+    assert "not checked: the environment does not let ROS start" in done.out
 
 
-def test_a_middleware_that_is_not_installed_is_told_before_anything_is_started(
+def test_a_missing_middleware_is_reported_before_ros_starts(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     index = tmp_path / "share" / "ament_index" / "resource_index" / "rmw_typesupport"
@@ -70,10 +70,10 @@ def test_a_middleware_that_is_not_installed_is_told_before_anything_is_started(
     done = compose("doctor")
     assert done.code == 1
     assert "error    environment  RMW_IMPLEMENTATION is 'rmw_foo', which is not" in done.out
-    assert "not looked at: the environment does not let ROS start" in done.out
+    assert "not checked: the environment does not let ROS start" in done.out
 
 
-def test_everything_is_counted_and_has_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_problems_are_counted_and_have_remedies(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "x")
     monkeypatch.setenv("ROS_DISTRO", "humble")
     assert compose("doctor").err.endswith(", 1 warning\n")

@@ -1,4 +1,4 @@
-"""Systems whose includes and copies mean harm: one finding, at once, and no more."""
+"""Malicious includes and copies: validation must report one rule and stay within limits."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ BOMBS: dict[str, tuple[dict[str, str], str, str]] = {
         {"s0": "system: s\ninclude: [s1.yaml, s2.yaml, s3.yaml]\n",
          **{f"s{number}": FEW.replace("n:", f"n{number}:") + PADDING for number in (1, 2, 3)}},
         "too-much-included", "s0.yaml:2:29"),
-    "a circle": ({"s0": twice("s0", "s1"), "s1": "system: s\ninclude: [s0.yaml]\n"},
+    "a cycle": ({"s0": twice("s0", "s1"), "s1": "system: s\ninclude: [s0.yaml]\n"},
                  "include-cycle", "s0.yaml:2:18"),
     "itself": ({"s0": "system: s\ninclude: [s0.yaml]\n"}, "include-cycle", "s0.yaml:2:11"),
     "a billion copies": ({"s0": MANY.replace("2000", "1000000000")},
@@ -64,12 +64,12 @@ BOMBS: dict[str, tuple[dict[str, str], str, str]] = {
 def test_bomb(tmp_path: Path, files: dict[str, str], rule: str, place: str) -> None:
     for name, text in files.items():
         (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
-    ended = validate(tmp_path, "s0.yaml")
-    assert (ended.code, set(ended.rules)) == (1, {rule}), ended.out
-    assert PLACE.findall(ended.out)[0] == place
+    result = validate(tmp_path, "s0.yaml")
+    assert (result.code, set(result.rules)) == (1, {rule}), result.out
+    assert PLACE.findall(result.out)[0] == place
 
 
-def test_only_files_of_the_project_are_included(tmp_path: Path) -> None:
+def test_only_files_in_the_project_are_included(tmp_path: Path) -> None:
     secret = tmp_path / "secret.yaml"
     secret.write_text("system: secret\nsecret: confidential\n")
     project = tmp_path / "project"
@@ -81,6 +81,6 @@ def test_only_files_of_the_project_are_included(tmp_path: Path) -> None:
     names += [".", "x" * 5000, "~/a.yaml", "http://127.0.0.1:9/a.yaml"]
     written = ", ".join(f'"{name}"' for name in names)
     (project / "a.yaml").write_text(f"system: a\ninclude: [{written}]\n")
-    ended = validate(project, "a.yaml")
-    assert (ended.code, ended.rules) == (1, ["invalid-include"] * len(names)), ended.out
-    assert "confidential" not in ended.out + ended.err
+    result = validate(project, "a.yaml")
+    assert (result.code, result.rules) == (1, ["invalid-include"] * len(names)), result.out
+    assert "confidential" not in result.out + result.err

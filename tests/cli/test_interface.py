@@ -5,7 +5,7 @@ import json
 from tests.cli.compose import compose
 
 
-def test_a_message_is_shown_with_the_messages_in_it() -> None:
+def test_nested_messages_are_expanded() -> None:
     done = compose("interface", "show", "geometry_msgs/msg/PointStamped")
     assert done.code == 0
     assert done.out.splitlines() == [
@@ -21,12 +21,12 @@ def test_a_message_is_shown_with_the_messages_in_it() -> None:
     ]
 
 
-def test_a_message_is_shown_flat() -> None:
+def test_flat_does_not_expand_nested_messages() -> None:
     done = compose("interface", "show", "geometry_msgs/msg/PointStamped", "--flat")
     assert done.out == "std_msgs/msg/Header header\ngeometry_msgs/msg/Point point\n"
 
 
-def test_services_and_actions_have_parts_and_constants_have_values() -> None:
+def test_services_actions_and_constants_are_shown() -> None:
     shown = compose("interface", "show", "std_srvs/srv/SetBool").out
     assert shown == "bool data\n---\nbool success\nstring message\n"
     action = compose("interface", "show", "composer_interfaces/action/Navigate", "--flat").out
@@ -34,7 +34,7 @@ def test_services_and_actions_have_parts_and_constants_have_values() -> None:
     assert "uint8 DEBUG=10" in compose("interface", "show", "rcl_interfaces/msg/Log").out
 
 
-def test_types_are_listed_by_kind() -> None:
+def test_types_can_be_listed_by_kind() -> None:
     services = compose("interface", "list", "--only-srvs").out.split()
     assert "std_srvs/srv/Trigger" in services
     assert all("/srv/" in name for name in services)
@@ -42,13 +42,13 @@ def test_types_are_listed_by_kind() -> None:
     assert {"std_msgs/msg/String", "composer_interfaces/action/Navigate"} <= set(everything)
 
 
-def test_an_unknown_type_gets_the_nearest() -> None:
+def test_an_unknown_type_gets_a_suggestion() -> None:
     done = compose("interface", "show", "std_msgs/msg/Sting")
     assert done.code == 1
     assert "did you mean 'std_msgs/msg/String'?" in done.err
 
 
-def test_types_are_listed_and_shown_for_programs() -> None:
+def test_json_output() -> None:
     listed = json.loads(compose("interface", "list", "--only-srvs", "--json").out)
     assert listed == compose("interface", "list", "--only-srvs").out.split()
     shown = json.loads(compose("interface", "show", "std_srvs/srv/SetBool", "--json").out)

@@ -1,4 +1,4 @@
-"""How ``compose topic echo`` prints a message."""
+"""The message formats of ``compose topic echo``."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from composer.cli.support.failure import UsageFailure
-from composer.cli.support.message_format import MessageFormat
+from composer.cli.commands.topic.message_format import MessageFormat
+from composer.cli.support.errors import UsageError
 
 SCAN = {"frame": "laser, left", "ranges": [0.5, 1.5, 2.5], "pose": {"x": 1.0}}
 
@@ -29,15 +29,15 @@ SCAN = {"frame": "laser, left", "ranges": [0.5, 1.5, 2.5], "pose": {"x": 1.0}}
          "{frame: 'laser, left', ranges: [0.5, 1.5, 2.5], pose: {x: 1.0}}\n---"),
     ],
 )  # fmt: skip
-def test_a_message_is_printed_as_the_options_say(options: dict[str, Any], expected: str) -> None:
+def test_format_options(options: dict[str, Any], expected: str) -> None:
     assert MessageFormat(**options).text(SCAN) == expected
 
 
-def test_a_part_of_a_message_is_printed_alone() -> None:
+def test_a_single_field_is_printed() -> None:
     assert MessageFormat(csv=True).text(7) == "7"
     assert MessageFormat(flow_style=True).text("wall") == "wall\n---"
 
 
-def test_two_formats_at_once_are_refused() -> None:
-    with pytest.raises(UsageFailure, match="choose one"):
+def test_two_formats_are_rejected() -> None:
+    with pytest.raises(UsageError, match="only one of"):
         MessageFormat(json=True, csv=True)

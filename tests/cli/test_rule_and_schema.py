@@ -8,7 +8,7 @@ from tests.cli.compose import compose
 
 
 @pytest.mark.parametrize("name", ["RC202", "rc202", "unknown-node"])
-def test_a_rule_is_explained_by_code_or_name(name: str) -> None:
+def test_a_rule_is_found_by_code_or_name(name: str) -> None:
     done = compose("rule", name)
     assert done.code == 0
     assert done.out.startswith("RC202 unknown-node (error)\n")
@@ -21,7 +21,7 @@ def test_all_rules_are_listed() -> None:
     assert lines == sorted(lines)
 
 
-def test_a_band_of_rules_is_listed_as_validate_takes_it() -> None:
+def test_a_band_of_rules_is_listed() -> None:
     done = compose("rule", "RC32")
     assert (done.code, done.err) == (0, "")
     codes = [line.split()[0] for line in done.out.splitlines()]
@@ -29,7 +29,7 @@ def test_a_band_of_rules_is_listed_as_validate_takes_it() -> None:
     assert all(code.startswith("RC32") for code in codes)
 
 
-def test_an_unknown_rule_gets_the_nearest() -> None:
+def test_an_unknown_rule_gets_a_suggestion() -> None:
     done = compose("rule", "unknown-nodes")
     assert done.code == 2
     assert "did you mean 'unknown-node'?" in done.err

@@ -1,4 +1,4 @@
-"""What ``compose run`` does before anything starts; tests/ros has the rest."""
+"""``compose run`` before ROS starts; tests/ros covers the rest."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_options_change_the_plan() -> None:
 
 
 @pytest.mark.parametrize("comment", ["", "  # compose: ignore[unknown-node] two will come"])
-def test_a_system_with_errors_is_refused_whatever_its_comments_say(
+def test_a_system_with_errors_is_rejected_even_with_ignore_comments(
     comment: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "broken.yaml"
@@ -39,14 +39,14 @@ def test_a_system_with_errors_is_refused_whatever_its_comments_say(
     assert "is not a node of this system" in done.err
 
 
-def test_a_setting_is_checked_like_what_is_in_the_file() -> None:
+def test_parameter_overrides_are_validated() -> None:
     done = compose("run", "pipeline", "--dry-run", "--set", "planner.max_velocty=1.0")
     assert done.code == 1
     assert "did you mean 'max_velocity'?" in done.err
     assert compose("run", "pipeline", "--dry-run", "--set", "planner.max_velocity=0.5").code == 0
 
 
-def test_what_is_no_file_is_told_as_what_it_is(tmp_path: Path) -> None:
+def test_paths_that_are_not_files_are_reported(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.yaml")
     assert "expected a file, found a pipe" in compose("run", str(tmp_path / "pipe.yaml")).err
     done = compose("run", "a" * 5000)
@@ -54,7 +54,7 @@ def test_what_is_no_file_is_told_as_what_it_is(tmp_path: Path) -> None:
     assert "this file cannot be read: File name too long" in done.err
 
 
-def test_a_node_type_is_not_run(tmp_path: Path) -> None:
+def test_a_node_type_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "relay.yaml"
     path.write_text("node: relay\n")
     done = compose("run", str(path), "--dry-run")
@@ -62,11 +62,11 @@ def test_a_node_type_is_not_run(tmp_path: Path) -> None:
     assert "is a node type, not a system" in done.err
 
 
-def test_a_folder_is_not_run(tmp_path: Path) -> None:
+def test_a_folder_is_a_usage_error(tmp_path: Path) -> None:
     assert compose("run", str(tmp_path)).code == 2
 
 
-def test_without_rclpy_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_rclpy_the_hint_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("composer.cli.support.ros.find_spec", lambda name: None)
     for command in (["run", "pipeline"], ["lifecycle", "nodes"]):
         done = compose(*command)

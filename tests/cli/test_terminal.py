@@ -1,4 +1,4 @@
-"""stdout is data: nothing but what a command writes gets there."""
+"""stdout contains only the data that a command writes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ write("more data")
 """
 
 
-def test_what_libraries_print_does_not_reach_stdout() -> None:
+def test_output_of_libraries_goes_to_stderr() -> None:
     done = subprocess.run(
         [sys.executable, "-c", NOISY], capture_output=True, text=True, check=True, timeout=30
     )

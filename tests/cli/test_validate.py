@@ -36,12 +36,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_clean_file_says_so_on_stderr_and_nothing_on_stdout(folder: Path) -> None:
+def test_a_file_without_problems_prints_nothing_to_stdout(folder: Path) -> None:
     done = compose("validate", "fine.yaml")
-    assert (done.code, done.out, done.err) == (0, "", "1 file checked: clean\n")
+    assert (done.code, done.out, done.err) == (0, "", "1 file checked: no problems found\n")
 
 
-def test_a_finding_has_its_place_a_caret_and_a_hint(folder: Path) -> None:
+def test_a_diagnostic_has_a_location_a_caret_and_a_hint(folder: Path) -> None:
     Path("broken.yaml").write_text(BROKEN)
     done = compose("validate", "fine.yaml", "broken.yaml")
     assert done.code == 1
@@ -61,11 +61,11 @@ def test_a_folder_is_searched_for_systems_and_node_types_only(folder: Path) -> N
     done = compose("validate", ".")
     assert done.code == 0
     assert done.err == (
-        "2 files checked: clean\nleft alone, no 'system:' or 'node:' in it: compose.yaml\n"
+        "2 files checked: no problems found\nskipped, without 'system:' or 'node:': compose.yaml\n"
     )
 
 
-def test_what_is_in_a_node_type_is_told_once_for_all_systems_that_use_it(folder: Path) -> None:
+def test_problems_of_a_shared_node_type_are_reported_once(folder: Path) -> None:
     Path("nodes").mkdir()
     Path("nodes/odd.yaml").write_text("node: odd\nports: {}\n")
     for name in ("first", "second"):
@@ -75,21 +75,21 @@ def test_what_is_in_a_node_type_is_told_once_for_all_systems_that_use_it(folder:
     assert places.count("nodes/odd.yaml") == 1
 
 
-def test_a_named_file_is_checked_whatever_is_in_it(folder: Path) -> None:
+def test_a_file_argument_is_always_checked(folder: Path) -> None:
     Path("other.yaml").write_text("services: {}\n")
     done = compose("validate", "other.yaml")
     assert done.code == 1
     assert "other.yaml:1:1" in done.out
 
 
-def test_stdin_is_a_dash(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_dash_reads_stdin(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(BROKEN.encode())))
     done = compose("validate", "-")
     assert done.code == 1
     assert "<stdin>:3:36" in done.out
 
 
-def test_stdin_may_be_called_what_it_is(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stdin_can_have_a_file_name(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("robot/nodes").mkdir(parents=True)
     Path("robot/nodes/wheel.yaml").write_text("node: wheel\n")
     text = "system: robot\nnodes:\n  left: {type: wheel}\n  right: {type: whel}\n"
@@ -100,7 +100,7 @@ def test_stdin_may_be_called_what_it_is(folder: Path, monkeypatch: pytest.Monkey
     assert "'wheel', which" not in done.out
 
 
-def test_what_a_project_has_chosen_holds(folder: Path) -> None:
+def test_project_settings_apply(folder: Path) -> None:
     Path("composer.yaml").write_text("strict: true\nignore: [RC5]\nseverity: {RC231: info}\n")
     Path("deep.yaml").write_text("system: deep\nnodes:\n  one: {namespace: a/b/c/d/e}\n")
     done = compose("validate", "deep.yaml")
@@ -111,7 +111,7 @@ def test_what_a_project_has_chosen_holds(folder: Path) -> None:
     assert compose("validate", "deep.yaml", "--no-strict").code == 0
 
 
-def test_wrong_settings_are_told_once(folder: Path) -> None:
+def test_wrong_settings_are_reported_once(folder: Path) -> None:
     Path("other.yaml").write_text(FINE)
     Path("composer.yaml").write_text("ignore: [qos-implict]\nstrickt: true\n")
     done = compose("validate", "fine.yaml", "other.yaml", "--format", "json")
@@ -140,23 +140,21 @@ def test_a_path_that_does_not_exist_is_a_usage_error(folder: Path) -> None:
         ("fine", "fine.yaml"),
     ],
 )
-def test_a_path_that_is_almost_right_gets_a_suggestion(
-    folder: Path, written: str, meant: str
-) -> None:
+def test_a_mistyped_path_gets_a_suggestion(folder: Path, written: str, meant: str) -> None:
     Path("systems").mkdir()
     Path("systems/robot.yaml").write_text(FINE)
     assert f"did you mean '{meant}'?" in compose("validate", written).err
     assert f"did you mean '{meant}'?" in compose("run", "--dry-run", written).err
 
 
-def test_the_name_of_an_example_system_is_told_as_its_path(folder: Path) -> None:
+def test_the_name_of_an_example_system_suggests_its_path(folder: Path) -> None:
     done = compose("validate", "pipeline")
     assert done.code == 2
     assert done.err.endswith("/pipeline.yaml'?\n")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-def test_what_may_not_be_read_is_told_and_not_left_alone(folder: Path) -> None:
+def test_unreadable_files_are_reported(folder: Path) -> None:
     Path("secret").mkdir(mode=0)
     Path("other.yaml").touch(mode=0)
     done = compose("validate", ".")
@@ -164,11 +162,11 @@ def test_what_may_not_be_read_is_told_and_not_left_alone(folder: Path) -> None:
     assert "this folder cannot be read: Permission denied\n --> secret:1:1" in done.out
     assert "this file cannot be read: Permission denied\n --> other.yaml:1:1" in done.out
     for command in ("validate", "run", "config"):
-        told = compose(command, "secret/robot.yaml")
-        assert "Permission denied" in told.out + told.err
+        done = compose(command, "secret/robot.yaml")
+        assert "Permission denied" in done.out + done.err
 
 
-def test_an_interface_that_cannot_be_read_is_told_with_its_place(folder: Path) -> None:
+def test_an_invalid_interface_definition_is_reported_with_its_location(folder: Path) -> None:
     definition = Path("interfaces/arm/msg/Grip.msg")
     definition.parent.mkdir(parents=True)
     definition.write_text("# How firm.\nflaot64 force\n")
@@ -178,17 +176,17 @@ def test_an_interface_that_cannot_be_read_is_told_with_its_place(folder: Path) -
     Path("arm.yaml").write_text(f"system: arm\nnodes: {{arm: {{subscriptions: {{a: {port}}}}}}}\n")
     for done in (compose("validate", "arm.yaml"), compose("interface", "show", "arm/msg/Grip")):
         assert done.code == 1
-        told = done.out + done.err
-        assert "the definition of 'arm/msg/Grip' cannot be read: 'flaot64' is" in told
-        assert f"see {definition}:2" in told
+        text = done.out + done.err
+        assert "the definition of 'arm/msg/Grip' cannot be read: 'flaot64' is" in text
+        assert f"see {definition}:2" in text
 
 
-def test_a_folder_without_anything_to_check_is_a_usage_error(folder: Path) -> None:
+def test_a_folder_without_systems_is_a_usage_error(folder: Path) -> None:
     Path("empty").mkdir()
     assert compose("validate", "empty").code == 2
 
 
-def test_warnings_count_when_strict(folder: Path) -> None:
+def test_strict_treats_warnings_as_errors(folder: Path) -> None:
     text = "system: deep\nnodes:\n  one: {namespace: a/b/c/d/e}\n"
     Path("deep.yaml").write_text(text)
     relaxed = compose("validate", "deep.yaml", "--format", "json")
@@ -198,7 +196,7 @@ def test_warnings_count_when_strict(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("rule", ["RC301", "RC3", "qos-incompatible"])
-def test_rules_are_selected_and_ignored_by_code_band_or_name(folder: Path, rule: str) -> None:
+def test_rules_can_be_selected_and_ignored(folder: Path, rule: str) -> None:
     Path("twisted.yaml").write_text(TWISTED)
     (found,) = json.loads(compose("validate", "twisted.yaml", "--format", "json").out)["findings"]
     rule = {"RC301": found["code"], "RC3": found["code"][:3]}.get(rule, found["rule"])
@@ -207,13 +205,13 @@ def test_rules_are_selected_and_ignored_by_code_band_or_name(folder: Path, rule:
     assert compose("validate", "twisted.yaml", "--select", "RC0").code == 0
 
 
-def test_an_unknown_rule_is_a_usage_error_with_the_nearest(folder: Path) -> None:
+def test_an_unknown_rule_is_a_usage_error_with_a_suggestion(folder: Path) -> None:
     done = compose("validate", "fine.yaml", "--ignore", "unknown-nod")
     assert done.code == 2
     assert done.err == "compose: no rule is called 'unknown-nod'\n  did you mean 'unknown-node'?\n"
 
 
-def test_github_annotations_come_by_themselves_in_github_actions(
+def test_github_actions_selects_github_annotations(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     Path("broken.yaml").write_text(BROKEN)
@@ -222,14 +220,14 @@ def test_github_annotations_come_by_themselves_in_github_actions(
     assert compose("validate", "broken.yaml", "--format", "text").out.startswith("error[")
 
 
-def test_sarif_is_one_json_document(folder: Path) -> None:
+def test_sarif_output(folder: Path) -> None:
     Path("broken.yaml").write_text(BROKEN)
     log = json.loads(compose("validate", "broken.yaml", "-f", "sarif").out)
     assert log["version"] == "2.1.0"
     assert len(log["runs"][0]["results"]) == 1
 
 
-def test_colours_are_for_terminals_unless_forced(
+def test_colors_are_only_for_terminals_unless_forced(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     Path("broken.yaml").write_text(BROKEN)

@@ -1,4 +1,4 @@
-"""``compose action``: the actions of the ROS graph, whoever serves them."""
+"""``compose action``: the actions of the ROS graph."""
 
 from __future__ import annotations
 
@@ -10,17 +10,23 @@ from typing import Annotated, Any
 
 import typer
 
-from composer.cli.commands.service import one_type, split_values
-from composer.cli.support.failure import FINDINGS
-from composer.cli.support.finite import finite
-from composer.cli.support.help import examples
-from composer.cli.support.listing import Count, Json, ShowTypes, print_names
-from composer.cli.support.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.commands.service import split_values
+from composer.cli.support.errors import FAILED
+from composer.cli.support.options import (
+    DEFAULT_TIMEOUT_S,
+    Count,
+    Json,
+    ShowTypes,
+    Timeout,
+    examples,
+    finite,
+)
+from composer.cli.support.output import as_json, as_yaml, print_names
+from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import say, write
-from composer.cli.support.values import as_json, as_yaml
 
 app = typer.Typer(
-    help="See the actions, and send goals.",
+    help="List actions and send goals.",
     epilog=examples(
         "compose action list -t",
         "compose action info /navigate",
@@ -41,23 +47,23 @@ def list_actions(
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """List the actions."""
+    """List actions."""
     with ros_session("compose action", timeout) as (session, deadline):
-        from composer.remote.graph_names import Names
+        from composer.remote.graph_names import GraphNames
 
-        actions = Names(session, deadline).actions()
+        actions = GraphNames(session, deadline).actions()
     print_names("action", actions, types=types, count=count, json=json)
 
 
 @app.command("info", epilog=examples("compose action info /navigate"))
 def info(action: Action, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
-    """Print who serves an action and who uses it."""
+    """Print the servers and clients of an action."""
     with ros_session("compose action", timeout) as (session, deadline):
         from dataclasses import asdict
 
-        from composer.remote.graph_names import Names
+        from composer.remote.graph_names import GraphNames
 
-        found = Names(session, deadline).action(action)
+        found = GraphNames(session, deadline).action(action)
     if json:
         write(as_json(asdict(found), indent=2))
         return
@@ -73,14 +79,12 @@ def send_goal(
         list[str] | None,
         typer.Argument(
             metavar="[TYPE] [GOAL]",
-            help="The type may be left out; the goal is YAML.",
+            help="The type is optional if the action is running. The goal is YAML.",
             show_default=False,
         ),
     ] = None,
     *,
-    feedback: Annotated[
-        bool, typer.Option("--feedback", "-f", help="Print what is told on the way.")
-    ] = False,
+    feedback: Annotated[bool, typer.Option("--feedback", "-f", help="Print feedback.")] = False,
     json: Json = False,
     result_timeout: Annotated[
         float | None,
@@ -89,27 +93,30 @@ def send_goal(
             metavar="SECONDS",
             min=0.0,
             callback=finite,
-            help="Cancel the goal unless it has ended by then.",
-            show_default="waits for ever",
+            help="Cancel the goal if it has not ended by then.",
+            show_default="no limit",
         ),
     ] = None,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Send a goal and wait for its end; Ctrl-C cancels it.
+    """Send a goal and wait for the result.
 
-    The time limit (--timeout) is for the server and its acceptance. Exit code 1 unless the goal
-    succeeded.
+    Ctrl-C cancels the goal; a second Ctrl-C exits at once. --timeout limits the wait for the server
+    and for the goal to be accepted.
+
+    Exit code 1 unless the goal succeeds.
     """
     type_name, goal = split_values(values or [])
     with ros_session("compose action", timeout) as (session, deadline):
-        from composer.remote.calls import Sending, sent_goal
-        from composer.remote.graph_names import Names
+        from composer.remote.calls import GoalRequest
+        from composer.remote.calls import send_goal as send
+        from composer.remote.graph_names import GraphNames
         from composer.remote.name_matching import full_name
         from composer.remote.session import Deadline
         from composer.remote.values import to_plain
 
         name = full_name("action", action)
-        found = type_name or one_type(Names(session, deadline), "action", name)
+        found = type_name or GraphNames(session, deadline).only_type("action", name)
 
         def show(message: Any) -> None:
             if feedback:
@@ -117,39 +124,39 @@ def send_goal(
 
         with (
             _interrupts() as interrupted,
-            sent_goal(session, deadline, Sending(name, found, goal, show, interrupted)) as sent,
+            send(session, deadline, GoalRequest(name, found, goal, show, interrupted)) as accepted,
         ):
-            say("goal accepted, Ctrl-C cancels it")
+            say("goal accepted; press Ctrl-C to cancel")
             limit = Deadline(float("inf") if result_timeout is None else result_timeout)
-            outcome = sent.result(lambda: interrupted() or limit.passed)
-            if outcome is None:
+            finished = accepted.result(lambda: interrupted() or limit.passed)
+            if finished is None:
                 say("canceling")
-                outcome = sent.cancel()
-        _print("result", to_plain(outcome.result), json, outcome.status)
-    if outcome.status != "succeeded":
-        raise typer.Exit(FINDINGS)
+                finished = accepted.cancel()
+        _print("result", to_plain(finished.result), json, finished.status)
+    if finished.status != "succeeded":
+        raise typer.Exit(FAILED)
 
 
 @contextmanager
 def _interrupts() -> Iterator[Callable[[], bool]]:
-    """Take the first Ctrl-C as a wish, which what is yielded tells; the second ends all."""
-    asked = threading.Event()
+    """Yield a function that reports the first Ctrl-C; the second one raises KeyboardInterrupt."""
+    received = threading.Event()
 
-    def take(*_: object) -> None:
-        if asked.is_set():
+    def on_signal(*_: object) -> None:
+        if received.is_set():
             raise KeyboardInterrupt
-        asked.set()
+        received.set()
 
-    before = signal.signal(signal.SIGINT, take)
+    before = signal.signal(signal.SIGINT, on_signal)
     try:
-        yield asked.is_set
+        yield received.is_set
     finally:
         signal.signal(signal.SIGINT, before)
 
 
 def _print(kind: str, content: Any, json: bool, status: str | None = None) -> None:
-    told = {kind: content} if status is None else {kind: content, "status": status}
-    write(as_json(told) if json else f"{as_yaml(told)}\n---")
+    shown = {kind: content} if status is None else {kind: content, "status": status}
+    write(as_json(shown) if json else f"{as_yaml(shown)}\n---")
 
 
 _EPILOG = examples(

@@ -1,38 +1,41 @@
-"""``compose config``: a file with everything put into it that it refers to."""
+"""``compose config``: print a system with everything resolved."""
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import typer
 
-from composer.cli.support.failure import FINDINGS
-from composer.cli.support.help import examples
-from composer.cli.support.loaded import SystemName, load_system
+from composer.cli.support.errors import FAILED
+from composer.cli.support.options import examples
+from composer.cli.support.output import as_json
+from composer.cli.support.system_arguments import SystemName, load_system
 from composer.cli.support.terminal import say, write, write_raw
 
-EPILOG = examples(
-    "compose config systems/fleet.yaml",
-    "compose config systems/fleet.yaml --json | jq .nodes",
-    "compose config nodes/watchdog.yaml",
-)
+EPILOGS = {
+    "config": examples(
+        "compose config systems/fleet.yaml",
+        "compose config systems/fleet.yaml --json | jq .nodes",
+        "compose config nodes/watchdog.yaml",
+    )
+}
 
 
 def config(
     system: SystemName,
     *,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of YAML.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of YAML.")] = False,
 ) -> None:
-    """Print a system as one file: what it includes, its copies and its variables put in.
+    """Print a system as a single resolved file.
 
-    What is printed is a system itself, in canonical YAML, and means the same beside the file. Of a
-    node type it shows what that is with all that it extends. Needs no ROS.
+    Includes, copies (for_each) and variables are replaced by their results. The output is a system
+    in canonical YAML, equivalent to the original if saved in the same folder. For a node type, the
+    output contains everything that it extends. ROS is not needed.
 
-    Exit code 1 when there is an error, and nothing is printed.
+    Exit code 1 if the system has errors; then nothing is printed.
     """
     from composer.assembly.canonical import canonical
-    from composer.cli.support.files import system_file
+    from composer.cli.support.system_arguments import system_file
     from composer.document.writer import write_document
     from composer.loading import gives_same_model
     from composer.tree import plain
@@ -40,15 +43,15 @@ def config(
     path = system_file(system)
     loading = load_system(path, shown=system)
     if loading.tree is None or not loading.is_valid:
-        raise typer.Exit(FINDINGS)
+        raise typer.Exit(FAILED)
     whole = canonical(loading.tree)
     text = write_document(whole)
     if not gives_same_model(loading, text):
         say(
-            "note: node types, behaviours and parameter files beside the files that were put in"
-            " are not found from elsewhere"
+            "note: node types, behaviors and parameter files next to an included file are not found"
+            " from this file"
         )
-    if as_json:
-        write(json.dumps(plain(whole), indent=2, ensure_ascii=False))
+    if json:
+        write(as_json(plain(whole), indent=2))
     else:
         write_raw(text)

@@ -1,4 +1,4 @@
-"""``compose diff``: a system as declared, held against what runs."""
+"""``compose diff``: compare a system with the running ROS graph."""
 
 from __future__ import annotations
 
@@ -9,32 +9,31 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from composer.cli.commands.run import Autostart
-from composer.cli.support.failure import FINDINGS, Failure
-from composer.cli.support.files import system_file
-from composer.cli.support.finite import finite
-from composer.cli.support.help import examples
-from composer.cli.support.listing import Json
-from composer.cli.support.loaded import Namespace, SystemName, load_system
-from composer.cli.support.ros import Timeout, ros_session
+from composer.cli.support.errors import FAILED, CommandError
+from composer.cli.support.options import Json, Namespace, Timeout, examples, finite
+from composer.cli.support.output import as_json
+from composer.cli.support.ros import ros_session
+from composer.cli.support.system_arguments import SystemName, load_system, system_file
 from composer.cli.support.terminal import say, write
-from composer.cli.support.values import as_json
 
 if TYPE_CHECKING:
     from composer.drift import Drift, Snapshot
     from composer.model import System
-    from composer.remote.snapshot import Observer
+    from composer.remote.snapshot import GraphObserver
 
-EPILOG = examples(
-    "compose diff pipeline                         exit code 1 when anything differs",
-    "compose diff systems/pipeline.yaml --json     for programs",
-    "compose diff pipeline --watch                 tell what changes, until Ctrl-C",
-    "compose diff pipeline --ignore '/rviz*'       others that may be there, too",
-    "compose diff pipeline --autostart inactive    as it was started",
-)
+EPILOGS = {
+    "diff": examples(
+        "compose diff pipeline                         exit with 1 if there are differences",
+        "compose diff systems/pipeline.yaml --json     print JSON",
+        "compose diff pipeline --watch                 print changes until Ctrl-C",
+        "compose diff pipeline --ignore '/rviz*'       ignore undeclared nodes",
+        "compose diff pipeline --autostart inactive    as given to compose run",
+    )
+}
 
 _TIMEOUT_S = 10.0
 _GRACE_S = 2.0
-#: Between two looks of --watch; a look itself waits half a second for the graph to stand still.
+#: The pause between two snapshots of --watch, each of which takes about half a second.
 _PAUSE_S = 0.5
 
 Compare = Callable[["Snapshot"], tuple["Drift", ...]]
@@ -48,26 +47,32 @@ def diff(
         typer.Option(
             "--set",
             metavar="NODE.PARAMETER=VALUE",
-            help="As it was given to compose run; repeatable.",
+            help="A parameter override, as given to 'compose run'. Repeatable.",
             show_default=False,
         ),
     ] = None,
     namespace: Namespace = None,
     autostart: Annotated[
         Autostart | None,
-        typer.Option(help="How far the nodes were brought up.", show_default="as the file says"),
+        typer.Option(
+            help="The state up to which nodes were brought up, as given to 'compose run'.",
+            show_default="as declared in the system",
+        ),
     ] = None,
     ignore: Annotated[
         list[str] | None,
         typer.Option(
             metavar="PATTERN",
-            help="Full names of nodes that may be there undeclared (* for any text); repeatable.",
+            help="Ignore undeclared nodes whose full names match (* is any text). Repeatable.",
             show_default=False,
         ),
     ] = None,
     json: Json = False,
     watch: Annotated[
-        bool, typer.Option("--watch", "-w", help="Keep looking, tell what appears and is resolved.")
+        bool,
+        typer.Option(
+            "--watch", "-w", help="Keep comparing; print differences as they appear and resolve."
+        ),
     ] = False,
     watch_for: Annotated[
         float | None,
@@ -76,8 +81,8 @@ def diff(
             metavar="SECONDS",
             min=0.0,
             callback=finite,
-            help="End --watch after so long.",
-            show_default="never",
+            help="Stop --watch after this time.",
+            show_default="until Ctrl-C",
         ),
     ] = None,
     grace: Annotated[
@@ -86,38 +91,40 @@ def diff(
             metavar="SECONDS",
             min=0.0,
             callback=finite,
-            help="What lasts no longer than this is no difference.",
+            help="Ignore differences that last no longer than this.",
         ),
     ] = _GRACE_S,
     timeout: Timeout = _TIMEOUT_S,
 ) -> None:
-    """Hold a system against the ROS graph: nodes, endpoints, types, QoS, parameters, states.
+    """Compare a system with the running ROS graph.
 
-    Exit code 1 when anything differs. A system that is just starting gets time to: a difference
-    counts once it has lasted for the grace time.
+    The command compares nodes, endpoints, types, QoS policies, parameters and lifecycle states. A
+    difference counts only after the grace time, so a system that is still starting is not reported.
+
+    Exit code 1 if there are differences.
     """
     declared = _load(system, settings or [], namespace)
     compare = _comparison(declared, autostart, ignore or [])
     with ros_session("compose diff", timeout) as (session, deadline):
-        from composer.remote.snapshot import Observer
+        from composer.remote.snapshot import GraphObserver
 
-        with Observer(session) as observer:
+        with GraphObserver(session) as observer:
             if watch:
-                left = _watched(observer, compare, (timeout, grace, watch_for), json=json)
+                remaining = _watched(observer, compare, (timeout, grace, watch_for), json=json)
             else:
-                left = _settled(observer, compare, deadline.left_s, grace)
-                _print(declared, left, json=json)
-    if left:
-        raise typer.Exit(FINDINGS)
+                remaining = _settled(observer, compare, deadline.left_s, grace)
+                _print(declared, remaining, json=json)
+    if remaining:
+        raise typer.Exit(FAILED)
 
 
 def _load(text: str, settings: list[str], namespace: str | None) -> System:
     path = system_file(text)
     loading = load_system(path, shown=text, settings=settings, namespace=namespace)
     if loading.system is not None and loading.system.node_type:
-        raise Failure(f"'{text}' is a node type, not a system")
+        raise CommandError(f"'{text}' is a node type, not a system")
     if loading.system is None or not loading.is_runnable:
-        raise Failure(f"'{text}' has errors, so nothing can run as it says")
+        raise CommandError(f"'{text}' has errors, so it cannot be compared")
     return loading.system
 
 
@@ -130,29 +137,29 @@ def _comparison(system: System, autostart: Autostart | None, ignored: list[str])
 
 
 def _settled(
-    observer: Observer, compare: Compare, timeout_s: float, grace_s: float
+    observer: GraphObserver, compare: Compare, timeout_s: float, grace_s: float
 ) -> tuple[Drift, ...]:
-    """Return what differs: nothing as soon as nothing does, else what has lasted."""
+    """Return the differences: none as soon as there are none, else those that persist."""
     from composer.drift import Patience
     from composer.remote.session import Deadline
 
     deadline = Deadline(timeout_s)
     patience = Patience(grace_s)
     while True:
-        drifts = compare(observer.look(deadline))
+        drifts = compare(observer.snapshot(deadline))
         patience.update(time.monotonic(), drifts)
         if patience.is_settled(drifts) or deadline.passed:
             return drifts
 
 
 def _watched(
-    observer: Observer,
+    observer: GraphObserver,
     compare: Compare,
     seconds: tuple[float, float, float | None],
     *,
     json: bool,
 ) -> tuple[Drift, ...]:
-    """Tell every change until Ctrl-C, or the end of the time; return what differs then."""
+    """Print changes until Ctrl-C or the end of the time; return the remaining differences."""
     from composer.drift import Patience
     from composer.remote.session import Deadline
 
@@ -161,7 +168,7 @@ def _watched(
     patience = Patience(grace_s)
     try:
         while not end.passed:
-            drifts = compare(observer.look(Deadline(min(timeout_s, end.left_s))))
+            drifts = compare(observer.snapshot(Deadline(min(timeout_s, end.left_s))))
             change = patience.update(time.monotonic(), drifts)
             for drift in change.resolved:
                 write(_event("resolved", drift, json=json))
@@ -169,7 +176,7 @@ def _watched(
                 write(_event("drift", drift, json=json))
             time.sleep(min(_PAUSE_S, end.left_s))
     except KeyboardInterrupt:
-        pass  # that is how it ends
+        pass  # the normal way to stop
     return patience.told
 
 

@@ -1,4 +1,4 @@
-"""``compose doctor``: what keeps ROS 2 from working here, each with its remedy."""
+"""``compose doctor``: check the ROS 2 setup of this computer."""
 
 from __future__ import annotations
 
@@ -11,127 +11,129 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.support.failure import FINDINGS
-from composer.cli.support.help import examples
-from composer.cli.support.listing import Json
-from composer.cli.support.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.support.errors import FAILED
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
+from composer.cli.support.output import as_json
+from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import say, write
-from composer.cli.support.values import as_json
 
 if TYPE_CHECKING:
-    from composer.doctor.finding import Finding, Level
+    from composer.doctor.result import CheckResult, Level
 
-EPILOG = examples(
-    "compose doctor",
-    "compose doctor --json",
-    "compose doctor --strict                     in CI: warnings count, too",
-)
-_SEE_ABOVE = "do what is said above, then run this again"
+EPILOGS = {
+    "doctor": examples(
+        "compose doctor",
+        "compose doctor --json",
+        "compose doctor --strict                     treat warnings as errors, for CI",
+    )
+}
+_RETRY = "fix the errors above, then run 'compose doctor' again"
 _LEVEL_WIDTH, _AREA_WIDTH = 7, 11
 
 
 def doctor(
     *,
-    strict: Annotated[bool, typer.Option("--strict", help="Warnings count as errors do.")] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Treat warnings as errors.")] = False,
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Look at the environment, the network, versions and the live ROS graph.
+    """Check the ROS 2 setup and the running graph.
 
-    It finds nodes that cannot meet, publishers and subscriptions whose QoS or type does not fit,
-    interfaces that are not built; and says what to do. Without ROS it looks at the rest.
+    The command checks versions, environment variables, the network, discovery, interface packages,
+    and the types and QoS policies of running nodes. Each problem is reported with a remedy. Without
+    ROS, the running graph is not checked.
 
-    Exit code 1 when there is an error (with --strict: or a warning).
+    Exit code 1 if there are errors, or warnings with --strict.
     """
-    from composer.doctor.finding import Level
+    from composer.doctor.result import Level
 
-    found = []
-    for finding in _findings(timeout):
-        found.append(finding)
+    results = []
+    for result in _check_all(timeout):
+        results.append(result)
         if not json:
-            write(_text(finding))
+            write(_text(result))
     if json:
-        write(as_json([asdict(finding) for finding in found], indent=2))
-    errors, warnings = (_count(found, level) for level in (Level.ERROR, Level.WARNING))
+        write(as_json([asdict(result) for result in results], indent=2))
+    errors, warnings = (_count(results, level) for level in (Level.ERROR, Level.WARNING))
     say(f"{_counted(errors, 'error')}, {_counted(warnings, 'warning')}")
     if errors or (strict and warnings):
-        raise typer.Exit(FINDINGS)
+        raise typer.Exit(FAILED)
 
 
-def _findings(timeout: float) -> Iterator[Finding]:
-    from composer.doctor.environment import discovery_range, look_at_environment
-    from composer.doctor.finding import Level, note
-    from composer.doctor.network import look_at_network
-    from composer.doctor.versions import look_at_versions
+def _check_all(timeout: float) -> Iterator[CheckResult]:
+    from composer.doctor.environment import check_environment, discovery_range
+    from composer.doctor.network import check_network
+    from composer.doctor.result import Level, note
+    from composer.doctor.versions import check_versions
     from composer.report.tool import tool_version
     from composer.runtime.process.environment import complete_environment
     from composer.runtime.process.shared_memory import SHARED_MEMORY
 
-    yield from look_at_versions(tool_version())
+    yield from check_versions(tool_version())
     variables = dict(os.environ)
     complete_environment(variables)
-    environment = list(look_at_environment(variables))
+    environment = list(check_environment(variables))
     yield from environment
     reach = discovery_range(os.environ)
-    # For LOCALHOST rmw_fastrtps chooses the transports itself, shared memory among them.
+    # With LOCALHOST, rmw_fastrtps selects the transports itself, including shared memory.
     transports = os.environ.get("FASTDDS_BUILTIN_TRANSPORTS")
     uses_shared_memory = reach == "LOCALHOST" or transports != "UDPv4"
-    yield from look_at_network(reach, shared_memory=SHARED_MEMORY if uses_shared_memory else None)
-    yield from _interface_findings()
-    if any(finding.level is Level.ERROR for finding in environment):
-        yield note("graph", "not looked at: the environment does not let ROS start", _SEE_ABOVE)
+    yield from check_network(reach, shared_memory=SHARED_MEMORY if uses_shared_memory else None)
+    yield from _check_interfaces()
+    if any(result.level is Level.ERROR for result in environment):
+        yield note("graph", "not checked: the environment does not let ROS start", _RETRY)
     elif find_spec("rclpy") is None:
-        yield note("graph", "not looked at: that needs rclpy", _SEE_ABOVE)
+        yield note("graph", "not checked: rclpy is not installed", _RETRY)
     else:
-        yield from _live_findings(timeout)
+        yield from _check_live_graph(timeout)
 
 
-def _interface_findings() -> Iterator[Finding]:
-    from composer.doctor.interfaces import look_at_interfaces
+def _check_interfaces() -> Iterator[CheckResult]:
+    from composer.doctor.interfaces import check_interfaces
     from composer.interfaces import Interfaces
     from composer.interfaces.sources import find_packages
     from composer.node_types import interface_folders
     from composer.project import Project
 
     folders = interface_folders(Project.at(Path.cwd()))
-    yield from look_at_interfaces(
+    yield from check_interfaces(
         find_packages(folders).packages(), Interfaces.load(folders), Interfaces.load()
     )
 
 
-def _live_findings(timeout: float) -> Iterator[Finding]:
-    from composer.doctor.finding import error
+def _check_live_graph(timeout: float) -> Iterator[CheckResult]:
+    from composer.doctor.result import error
 
     try:
         with ros_session("compose doctor", timeout, carries_messages=True) as (session, deadline):
             from composer.doctor.graph import (
-                look_at_delivery,
-                look_at_discovery,
-                look_at_graph,
-                look_at_middleware,
+                check_delivery,
+                check_discovery,
+                check_graph,
+                check_middleware,
             )
 
-            yield look_at_middleware()
-            yield look_at_delivery(session)
-            yield look_at_discovery(session, deadline)
-            yield from look_at_graph(session, deadline)
+            yield check_middleware()
+            yield check_delivery(session)
+            yield check_discovery(session, deadline)
+            yield from check_graph(session, deadline)
     except (ImportError, RuntimeError) as problem:  # rclpy's own errors are RuntimeErrors
         yield error(
             "middleware",
             f"ROS does not start: {problem}",
-            'install it anew (pip install --force-reinstall "ros2-composer[ros]"), or source'
-            " /opt/ros/jazzy/setup.bash in a new terminal; not both",
+            'reinstall it (pip install --force-reinstall "ros2-composer[ros]"), or source'
+            " /opt/ros/jazzy/setup.bash in a new terminal, but not both",
         )
 
 
-def _text(finding: Finding) -> str:
-    head = f"{finding.level.value:<{_LEVEL_WIDTH}}  {finding.area:<{_AREA_WIDTH}}  "
-    line = head + finding.message
-    return line if finding.remedy is None else f"{line}\n{' ' * len(head)}-> {finding.remedy}"
+def _text(result: CheckResult) -> str:
+    head = f"{result.level.value:<{_LEVEL_WIDTH}}  {result.area:<{_AREA_WIDTH}}  "
+    line = head + result.message
+    return line if result.remedy is None else f"{line}\n{' ' * len(head)}-> {result.remedy}"
 
 
-def _count(found: list[Finding], level: Level) -> int:
-    return sum(finding.level is level for finding in found)
+def _count(results: list[CheckResult], level: Level) -> int:
+    return sum(result.level is level for result in results)
 
 
 def _counted(number: int, noun: str) -> str:

@@ -1,4 +1,4 @@
-"""``compose graph``: systems, or what runs, as a diagram."""
+"""``compose graph``: draw systems, or the running ROS graph."""
 
 from __future__ import annotations
 
@@ -9,12 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.support.failure import Failure, UsageFailure
-from composer.cli.support.files import system_file
-from composer.cli.support.finite import finite
-from composer.cli.support.help import examples
-from composer.cli.support.loaded import complete_system, load_system
-from composer.cli.support.ros import Timeout
+from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.options import Timeout, examples, finite
+from composer.cli.support.system_arguments import complete_system, load_system, system_file
 from composer.cli.support.terminal import say, write_bytes
 
 if TYPE_CHECKING:
@@ -22,19 +19,21 @@ if TYPE_CHECKING:
     from composer.graph.scene import Scene
     from composer.model import System
 
-EPILOG = examples(
-    "compose graph systems/pipeline.yaml                   Mermaid text, for a README",
-    "compose graph pipeline -o pipeline.html               a page to explore, works offline",
-    "compose graph pipeline -o pipeline.svg                a picture, no other program needed",
-    "compose graph pipeline --view lifecycle -o order.png  who waits for whom",
-    "compose graph pipeline -f dot | dot -Tpdf > p.pdf     by Graphviz",
-    "compose graph robot.yaml base.yaml -o both.svg        several systems in one picture",
-    "compose graph --live -o now.html                      what runs, whoever started it",
-)
+EPILOGS = {
+    "graph": examples(
+        "compose graph systems/pipeline.yaml                   print Mermaid text",
+        "compose graph pipeline -o pipeline.html               write an interactive page",
+        "compose graph pipeline -o pipeline.svg                write an image",
+        "compose graph pipeline --view lifecycle -o order.png  draw the bring-up order",
+        "compose graph pipeline -f dot | dot -Tpdf > p.pdf     use Graphviz",
+        "compose graph robot.yaml base.yaml -o both.svg        draw several systems together",
+        "compose graph --live -o now.html                      draw the running ROS graph",
+    )
+}
 
 
-class Format(StrEnum):
-    """What a diagram is written as; as in composer.graph.output, which takes long to import."""
+class DiagramFormat(StrEnum):
+    """The same as composer.graph.output.Format, which is slow to import."""
 
     MERMAID = "mermaid"
     DOT = "dot"
@@ -44,8 +43,8 @@ class Format(StrEnum):
     HTML = "html"
 
 
-class View(StrEnum):
-    """What a diagram shows; the same as composer.graph.View."""
+class DiagramView(StrEnum):
+    """The same as composer.graph.View, which is slow to import."""
 
     NODES = "nodes"
     CONNECTIONS = "connections"
@@ -54,28 +53,28 @@ class View(StrEnum):
     STATES = "states"
 
 
-class Layout(StrEnum):
-    """Who places things; the same as composer.graph.placing.Engine."""
+class LayoutEngine(StrEnum):
+    """The same as composer.graph.placing.Engine, which is slow to import."""
 
     AUTO = "auto"
     GRAPHVIZ = "graphviz"
     BUNDLED = "bundled"
 
 
-_BY_ENDING = {
-    ".mmd": Format.MERMAID,
-    ".mermaid": Format.MERMAID,
-    ".dot": Format.DOT,
-    ".gv": Format.DOT,
-    ".svg": Format.SVG,
-    ".png": Format.PNG,
-    ".json": Format.JSON,
-    ".html": Format.HTML,
-    ".htm": Format.HTML,
+_FORMATS = {
+    ".mmd": DiagramFormat.MERMAID,
+    ".mermaid": DiagramFormat.MERMAID,
+    ".dot": DiagramFormat.DOT,
+    ".gv": DiagramFormat.DOT,
+    ".svg": DiagramFormat.SVG,
+    ".png": DiagramFormat.PNG,
+    ".json": DiagramFormat.JSON,
+    ".html": DiagramFormat.HTML,
+    ".htm": DiagramFormat.HTML,
 }
 
-#: What only a declaration tells.
-_DECLARED_ONLY = (View.LIFECYCLE, View.DEPLOYMENT)
+#: Views of what only a file declares.
+_DECLARED_ONLY = (DiagramView.LIFECYCLE, DiagramView.DEPLOYMENT)
 _LIVE_TIMEOUT_S = 10.0
 _MEASURE_S = 2.0
 
@@ -85,7 +84,7 @@ def graph(
         list[str] | None,
         typer.Argument(
             metavar="SYSTEM...",
-            help="System files, or names of example systems; several make one picture.",
+            help="System files or names of example systems, drawn in one diagram.",
             show_default=False,
             autocompletion=complete_system,
         ),
@@ -97,33 +96,36 @@ def graph(
             "--output",
             "-o",
             metavar="FILE",
-            help="Write there instead of to stdout; the ending says as what.",
+            help="Write to FILE instead of stdout. Its suffix selects the format.",
             show_default=False,
         ),
     ] = None,
     output_format: Annotated[
-        Format | None,
+        DiagramFormat | None,
         typer.Option(
-            "--format", "-f", help="Default: by FILE's ending, else mermaid.", show_default=False
+            "--format",
+            "-f",
+            help="Output format. Default: from the suffix of FILE, else mermaid.",
+            show_default=False,
         ),
     ] = None,
     view: Annotated[
-        View,
+        DiagramView,
         typer.Option(
-            help="nodes and what joins them; connections of ports with QoS; lifecycle: who waits"
-            " for whom; deployment on executors; states of the lifecycle. A page (html) has all"
-            " of them and shows this one first.",
+            help="What to draw: nodes and their connections; connections between ports with their"
+            " QoS; dependencies of the lifecycle; deployment on executors; lifecycle states. An"
+            " HTML page contains all views and opens with this one.",
         ),
-    ] = View.NODES,
+    ] = DiagramView.NODES,
     layout: Annotated[
-        Layout,
+        LayoutEngine,
         typer.Option(
-            help="Who places things in svg, png and html: auto is Graphviz where it is installed,"
-            " else bundled, which gives the same bytes on every machine.",
+            help="Layout engine for svg, png and html. auto uses Graphviz if it is installed, else"
+            " bundled. bundled has the same output on every machine.",
         ),
-    ] = Layout.AUTO,
+    ] = LayoutEngine.AUTO,
     live: Annotated[
-        bool, typer.Option("--live", help="Draw what runs in the ROS graph instead of a file.")
+        bool, typer.Option("--live", help="Draw the running ROS graph instead of a file.")
     ] = False,
     measure: Annotated[
         float,
@@ -131,23 +133,24 @@ def graph(
             metavar="SECONDS",
             min=0.0,
             callback=finite,
-            help="With --live: how long to count messages; 0: not.",
+            help="With --live: time to measure message rates. 0 disables it.",
         ),
     ] = _MEASURE_S,
     timeout: Timeout = _LIVE_TIMEOUT_S,
 ) -> None:
-    """Draw systems. What a finding is about is marked red. Needs no ROS, except --live."""
+    """Draw systems as diagrams.
+
+    Parts with errors or warnings are marked in red. ROS is needed only with --live.
+    """
     chosen = output_format or _format_of(output)
-    if output is None and chosen is Format.PNG and sys.stdout.isatty():
-        raise UsageFailure("a PNG is nothing for a terminal", hint="-o FILE.png writes it")
+    if output is None and chosen is DiagramFormat.PNG and sys.stdout.isatty():
+        raise UsageError("refusing to write a PNG to a terminal", hint="use -o FILE.png")
     if bool(systems) == live:
-        raise UsageFailure(
-            "say what to draw: one system or more, or --live", hint="compose graph --help"
-        )
+        raise UsageError("specify either systems or --live", hint="see 'compose graph --help'")
     if live and view in _DECLARED_ONLY:
-        raise UsageFailure(
-            f"--view {view} is about what a file declares; the ROS graph does not tell it",
-            hint="with --live: nodes, connections or states",
+        raise UsageError(
+            f"--view {view} needs a system file; the ROS graph does not contain this information",
+            hint="use nodes, connections or states with --live",
         )
     scene = _live(timeout, measure) if live else _declared(systems or [])
     drawn = _drawn(scene, chosen, view, layout, live=live)
@@ -159,16 +162,16 @@ def graph(
 
 def _declared(names: list[str]) -> Scene:
     systems: list[System] = []
-    findings: list[Diagnostic] = []
+    diagnostics: list[Diagnostic] = []
     for name in names:
         loading = load_system(system_file(name), shown=name)
         if loading.system is None:
-            raise Failure(f"'{name}' is too broken to be drawn")
+            raise CommandError(f"'{name}' cannot be drawn because of its errors")
         systems.append(loading.system)
-        findings.extend(loading.diagnostics)
+        diagnostics.extend(loading.diagnostics)
     from composer.graph import scene_of
 
-    return scene_of(systems, findings)
+    return scene_of(systems, diagnostics)
 
 
 def _live(timeout_s: float, measure_s: float) -> Scene:
@@ -179,41 +182,44 @@ def _live(timeout_s: float, measure_s: float) -> Scene:
         deadline,
     ):
         from composer.graph import live_scene_of
-        from composer.remote.snapshot import Observer
+        from composer.remote.snapshot import GraphObserver
 
-        with Observer(session) as observer:
-            snapshot = observer.look(deadline)
+        with GraphObserver(session) as observer:
+            snapshot = observer.snapshot(deadline)
             return live_scene_of(snapshot, observer.rates(deadline, measure_s))
 
 
-def _drawn(scene: Scene, form: Format, view: View, layout: Layout, *, live: bool) -> bytes:
+def _drawn(
+    scene: Scene, form: DiagramFormat, view: DiagramView, layout: LayoutEngine, *, live: bool
+) -> bytes:
     from composer import graph as graphs
     from composer.graph import mermaid, output
     from composer.graph.graphviz import GraphvizFailed
     from composer.graph.png import PngMissing
 
     views = [view]
-    if form is Format.HTML:
-        views = [each for each in View if not (live and each in _DECLARED_ONLY)]
+    if form is DiagramFormat.HTML:
+        views = [each for each in DiagramView if not (live and each in _DECLARED_ONLY)]
     pictures = [graphs.build_graph(scene, graphs.View(each.value)) for each in views]
-    if form is Format.MERMAID and mermaid.is_too_large(pictures[0]):
-        say("Mermaid's viewers refuse a diagram of this size; FILE.html and FILE.svg have no limit")
+    if form is DiagramFormat.MERMAID and mermaid.is_too_large(pictures[0]):
+        say("warning: Mermaid refuses to render a diagram of this size; use html or svg instead")
     target = (output.Format(form.value), output.Engine(layout.value))
     try:
         return output.render(pictures, *target, shown=views.index(view))
     except GraphvizFailed as error:
-        raise Failure(str(error), hint="--layout bundled needs no Graphviz") from error
+        raise CommandError(str(error), hint="--layout bundled needs no Graphviz") from error
     except PngMissing as error:
-        raise Failure(str(error)) from error
+        raise CommandError(str(error)) from error
 
 
-def _format_of(output: Path | None) -> Format:
+def _format_of(output: Path | None) -> DiagramFormat:
     if output is None:
-        return Format.MERMAID
-    found = _BY_ENDING.get(output.suffix.lower())
+        return DiagramFormat.MERMAID
+    found = _FORMATS.get(output.suffix.lower())
     if found is None:
-        raise UsageFailure(
-            f"'{output}' does not say what to write", hint="endings: " + " ".join(_BY_ENDING)
+        raise UsageError(
+            f"the suffix of '{output}' is not a known format",
+            hint="use one of " + " ".join(_FORMATS) + ", or --format",
         )
     return found
 
@@ -222,5 +228,5 @@ def _save(output: Path, drawn: bytes) -> None:
     try:
         output.write_bytes(drawn)
     except OSError as error:
-        raise Failure(f"cannot write '{output}': {error.strerror}") from error
+        raise CommandError(f"cannot write '{output}': {error.strerror}") from error
     say(f"wrote {output}")

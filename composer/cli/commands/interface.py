@@ -1,4 +1,4 @@
-"""``compose interface``: message, service and action types. Needs no ROS."""
+"""``compose interface``: message, service and action types. ROS is not needed."""
 
 from __future__ import annotations
 
@@ -7,17 +7,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from composer.cli.support.failure import Failure
-from composer.cli.support.help import examples
-from composer.cli.support.listing import Json
+from composer.cli.support.errors import CommandError
+from composer.cli.support.options import Json, examples
+from composer.cli.support.output import as_json
 from composer.cli.support.terminal import write
-from composer.cli.support.values import as_json
 
 if TYPE_CHECKING:
     from composer.interfaces import Interfaces, Message
 
 app = typer.Typer(
-    help="See message, service and action types: installed ones, the project's, and ROS's own.",
+    help="""Show message, service and action types.
+
+    These are the types of installed packages, of the project, and those bundled with ROS 2. ROS is
+    not needed.
+    """,
     epilog=examples(
         "compose interface list --only-srvs", "compose interface show nav_msgs/msg/Odometry"
     ),
@@ -29,15 +32,21 @@ app = typer.Typer(
 @app.command("list", epilog=examples("compose interface list", "compose interface list -s"))
 def list_interfaces(
     *,
-    only_messages: Annotated[bool, typer.Option("--only-msgs", "-m", help="Messages.")] = False,
-    only_services: Annotated[bool, typer.Option("--only-srvs", "-s", help="Services.")] = False,
-    only_actions: Annotated[bool, typer.Option("--only-actions", "-a", help="Actions.")] = False,
+    only_messages: Annotated[
+        bool, typer.Option("--only-msgs", "-m", help="List messages.")
+    ] = False,
+    only_services: Annotated[
+        bool, typer.Option("--only-srvs", "-s", help="List services.")
+    ] = False,
+    only_actions: Annotated[
+        bool, typer.Option("--only-actions", "-a", help="List actions.")
+    ] = False,
     json: Json = False,
 ) -> None:
-    """List the types that are known."""
-    asked = {"msg": only_messages, "srv": only_services, "action": only_actions}
+    """List the known types."""
+    only = {"msg": only_messages, "srv": only_services, "action": only_actions}
     interfaces = _interfaces()
-    folders = [folder for folder, wanted in asked.items() if wanted or not any(asked.values())]
+    folders = [folder for folder, chosen in only.items() if chosen or not any(only.values())]
     names = [name for folder in folders for name in interfaces.names(folder)]
     if json:
         write(as_json(names, indent=2))
@@ -53,22 +62,25 @@ def list_interfaces(
     ),
 )
 def show(
-    name: Annotated[str, typer.Argument(metavar="TYPE", help="std_msgs/msg/String")],
+    name: Annotated[str, typer.Argument(metavar="TYPE", help="Such as std_msgs/msg/String.")],
     *,
-    flat: Annotated[bool, typer.Option("--flat", help="Do not open the messages in it.")] = False,
+    flat: Annotated[bool, typer.Option("--flat", help="Do not expand nested messages.")] = False,
     json: Json = False,
 ) -> None:
-    """Print the fields of a type; messages in it are opened, indented."""
+    """Print the definition of a type.
+
+    Nested messages are expanded and indented.
+    """
     from composer.interfaces.similar import similar_interface
 
     interfaces = _interfaces()
     found = interfaces.find(name)
     problem = interfaces.problem(name)
     if problem is not None:
-        raise Failure(str(problem), hint=f"see {problem.place}")
+        raise CommandError(str(problem), hint=f"see {problem.place}")
     if found is None:
         known = [item for folder in ("msg", "srv", "action") for item in interfaces.names(folder)]
-        raise Failure(f"there is no type '{name}'", hint=similar_interface(name, known))
+        raise CommandError(f"there is no type '{name}'", hint=similar_interface(name, known))
     if json:
         parts = {title: _as_data(part) for title, part in _parts(found).items()}
         write(as_json({"name": name, **parts}, indent=2))
@@ -98,7 +110,7 @@ def _parts(found: Any) -> dict[str, Message]:
 
 
 def _as_data(message: Message) -> dict[str, Any]:
-    """Return the fields and constants; messages in it are named, not opened."""
+    """Return the fields and constants; nested messages are not expanded."""
     return {
         "fields": [
             {"name": field.name, "type": str(field.type), "default": field.default}

@@ -1,8 +1,7 @@
-"""``compose lifecycle``: the states of nodes in other processes, and transitions between them."""
+"""``compose lifecycle``: lifecycle states and transitions of running nodes."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import StrEnum
@@ -10,19 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.support.failure import FINDINGS, Failure, UsageFailure
-from composer.cli.support.help import examples
-from composer.cli.support.listing import say_none_found
-from composer.cli.support.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.support.errors import FAILED, CommandError, UsageError
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
+from composer.cli.support.output import as_json, say_none_found
+from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import columns, say, write
 
 if TYPE_CHECKING:
-    from composer.remote.lifecycle import Control
+    from composer.remote.lifecycle import LifecycleClient
 
 app = typer.Typer(
-    help="""See and change the lifecycle state of running nodes, from another terminal.
+    help="""Show and change lifecycle states of running nodes.
 
-    Works for every lifecycle node in the ROS graph, whoever wrote it.
+    Works with every lifecycle node in the ROS graph.
     """,
     epilog=examples(
         "compose lifecycle nodes",
@@ -39,36 +38,35 @@ NodeName = Annotated[
     str,
     typer.Argument(
         metavar="NODE",
-        help="A full name (/planning/planner), or the last part of just one (planner).",
+        help="The full name (/planning/planner), or its last part (planner) if unambiguous.",
         show_default=False,
     ),
 ]
-_HOW = "for example: compose lifecycle set planner deactivate"
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
+_EXAMPLE = "for example: compose lifecycle set planner deactivate"
 
 
 @contextmanager
-def _control(timeout_s: float) -> Iterator[Control]:
+def _client(timeout_s: float) -> Iterator[LifecycleClient]:
     with ros_session("compose lifecycle", timeout_s) as (session, deadline):
-        from composer.remote.lifecycle import Control
+        from composer.remote.lifecycle import LifecycleClient
 
-        yield Control(session, deadline)
+        yield LifecycleClient(session, deadline)
 
 
 @app.command("nodes", epilog=examples("compose lifecycle nodes", "compose lifecycle nodes --json"))
-def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, as_json: Json = False) -> None:
-    """List the lifecycle nodes and their states.
+def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False) -> None:
+    """List lifecycle nodes and their states.
 
-    Exit code 1 when a system runs on this computer and does not answer: its nodes are missing.
+    Exit code 1 if a system on this computer does not respond, because its nodes are missing then.
     """
-    with _control(timeout) as control:
-        states = control.states(control.nodes())
-        if as_json:
-            write(json.dumps(states, indent=2))
+    with _client(timeout) as client:
+        states = client.states(client.nodes())
+        if json:
+            write(as_json(states, indent=2))
         elif states:
-            write(columns([(name, state or "(no answer)") for name, state in states.items()]))
-        control.check_all_answer()
-    if not states and not as_json:
+            write(columns([(name, state or "(no response)") for name, state in states.items()]))
+        client.check_all_respond()
+    if not states and not json:
         say_none_found("lifecycle node")
 
 
@@ -79,26 +77,26 @@ def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, as_json: Json = False) -> None:
     ),
 )
 def get(node: NodeName, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
-    """Print the state of a node."""
-    with _control(timeout) as control:
-        write(control.state(control.find(node)))
+    """Print the lifecycle state of a node."""
+    with _client(timeout) as client:
+        write(client.state(client.find(node)))
 
 
 @app.command("list", epilog=examples("compose lifecycle list planner"))
 def list_transitions(
-    node: NodeName, timeout: Timeout = DEFAULT_TIMEOUT_S, as_json: Json = False
+    node: NodeName, timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False
 ) -> None:
-    """List the transitions that are possible now."""
-    with _control(timeout) as control:
-        transitions = control.transitions(control.find(node))
-    if as_json:
+    """List the available transitions of a node."""
+    with _client(timeout) as client:
+        transitions = client.transitions(client.find(node))
+    if json:
         found = [{"id": item.id, "label": item.label, "goal": item.goal} for item in transitions]
-        write(json.dumps(found, indent=2))
+        write(as_json(found, indent=2))
     elif transitions:
         write("\n".join(item.label for item in transitions))
 
 
-class State(StrEnum):
+class GoalState(StrEnum):
     """The primary states."""
 
     UNCONFIGURED = "unconfigured"
@@ -111,9 +109,9 @@ class State(StrEnum):
     "set",
     epilog=examples(
         "compose lifecycle set planner deactivate",
-        "compose lifecycle set planner camera activate      one after the other",
-        "compose lifecycle set '/perception/*' deactivate   whatever matches",
-        "compose lifecycle set planner --to active          by the legal way, in several steps",
+        "compose lifecycle set planner camera activate      several nodes",
+        "compose lifecycle set '/perception/*' deactivate   all nodes that match",
+        "compose lifecycle set planner --to active          as many transitions as needed",
         "compose lifecycle set --system pipeline --to inactive",
     ),
 )
@@ -122,16 +120,19 @@ def set_state(
         list[str] | None,
         typer.Argument(
             metavar="TARGET... TRANSITION",
-            help="Nodes (full names, last parts, patterns), then configure, activate, deactivate, "
-            "cleanup or shutdown; with --to no transition.",
+            help="Nodes (names or patterns), followed by configure, activate, deactivate, cleanup "
+            "or shutdown. With --to, no transition is given.",
             show_default=False,
         ),
     ] = None,
     *,
     to: Annotated[
-        State | None,
+        GoalState | None,
         typer.Option(
-            "--to", metavar="STATE", help="Go there by the legal way.", show_default=False
+            "--to",
+            metavar="STATE",
+            help="Go to this state, with as many transitions as needed.",
+            show_default=False,
         ),
     ] = None,
     system: Annotated[
@@ -139,46 +140,48 @@ def set_state(
         typer.Option(
             "--system",
             metavar="SYSTEM",
-            help="All nodes of a running system, in order.",
+            help="Change all nodes of a running system, in order.",
             show_default=False,
         ),
     ] = None,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Take nodes through a transition, or to a state.
+    """Change the lifecycle state of nodes.
 
-    What is not possible in a node's state is refused with exit code 1 and never sent; the other
-    nodes are dealt with all the same. The nodes of a system go up in the order of its bring-up and
-    down in reverse.
+    The nodes of a system are brought up in its bring-up order and taken down in reverse order. A
+    transition that is not available in the state of a node is not requested; the command continues
+    with the other nodes.
+
+    Exit code 1 if a transition is not available or fails.
     """
     targets, transition = _split(list(words or ()), to, system)
     with ros_session("compose lifecycle set", timeout) as (session, deadline):
-        from composer.remote.lifecycle_batch import Request, change_each, nodes_of_system
+        from composer.remote.lifecycle_batch import LifecycleRequest, change_each, nodes_of_system
 
-        wish = Request(transition, None if to is None else to.value)
-        nodes = None if system is None else nodes_of_system(session, deadline, system, wish)
+        request = LifecycleRequest(transition, None if to is None else to.value)
+        nodes = None if system is None else nodes_of_system(session, deadline, system, request)
         failed = False
-        for outcome in change_each(session, deadline, targets if nodes is None else nodes, wish):
+        for outcome in change_each(session, deadline, targets if nodes is None else nodes, request):
             if outcome.error is None:
-                write(str(outcome.change))
+                write(str(outcome.result))
             else:
                 failed = True
-                say(Failure(str(outcome.error), hint=outcome.error.hint).text())
+                say(CommandError(str(outcome.error), hint=outcome.error.hint).text())
     if failed:
-        raise typer.Exit(FINDINGS)
+        raise typer.Exit(FAILED)
 
 
-def _split(words: list[str], to: State | None, system: str | None) -> tuple[list[str], str | None]:
-    """Return targets and transition. Raises UsageFailure."""
+def _split(
+    words: list[str], to: GoalState | None, system: str | None
+) -> tuple[list[str], str | None]:
+    """Return targets and transition. Raises UsageError."""
     transition = None
     if to is None:
         if not words:
-            raise UsageFailure("say which transition, or --to which state", hint=_HOW)
+            raise UsageError("specify a transition, or a state with --to", hint=_EXAMPLE)
         transition = words.pop()
     if system is None and not words:
-        raise UsageFailure("say which nodes, or --system which system", hint=_HOW)
+        raise UsageError("specify nodes, or a system with --system", hint=_EXAMPLE)
     if system is not None and words:
-        raise UsageFailure(
-            f"'{words[0]}' and --system: name nodes or a system, not both", hint=_HOW
-        )
+        raise UsageError(f"specify nodes or --system, not both (got '{words[0]}')", hint=_EXAMPLE)
     return words, transition

@@ -1,4 +1,4 @@
-"""``compose node``: the nodes of the ROS graph, whoever wrote them."""
+"""``compose node``: the nodes of the ROS graph."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from typing import Annotated
 
 import typer
 
-from composer.cli.support.help import examples
-from composer.cli.support.listing import Count, Hidden, Json, say_none_found
-from composer.cli.support.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Count, Hidden, Json, Timeout, examples
+from composer.cli.support.output import as_json, say_none_found
+from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import columns, write
-from composer.cli.support.values import as_json
 
 app = typer.Typer(
-    help="See the nodes that run, and what each offers and uses.",
+    help="List and inspect running nodes.",
     epilog=examples("compose node list", "compose node info planner"),
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -38,11 +37,11 @@ def list_nodes(
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """List the nodes."""
+    """List nodes."""
     with ros_session("compose node", timeout) as (session, deadline):
-        from composer.remote.graph_names import Names
+        from composer.remote.graph_names import GraphNames
 
-        nodes = Names(session, deadline).nodes(hidden=hidden)
+        nodes = GraphNames(session, deadline).nodes(hidden=hidden)
     if count:
         write(str(len(nodes)))
     elif json:
@@ -56,18 +55,21 @@ def list_nodes(
 @app.command("info", epilog=examples("compose node info planner"))
 def info(
     name: Annotated[
-        str, typer.Argument(metavar="NODE", help="Its full name, or the last part of just one.")
+        str,
+        typer.Argument(
+            metavar="NODE", help="The full name of a node, or its last part if unambiguous."
+        ),
     ],
     *,
     hidden: Hidden = False,
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Print what a node publishes, subscribes to, serves and calls."""
+    """Print the topics, services and actions of a node."""
     with ros_session("compose node", timeout) as (session, deadline):
-        from composer.remote.graph_names import Names
+        from composer.remote.graph_names import GraphNames
 
-        found = asdict(Names(session, deadline).node(name, hidden=hidden))
+        found = asdict(GraphNames(session, deadline).node(name, hidden=hidden))
     if json:
         write(as_json(found, indent=2))
         return

@@ -10,19 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from composer.cli.support.failure import Failure, UsageFailure
-from composer.cli.support.help import examples
-from composer.cli.support.listing import Json, say_none_found
-from composer.cli.support.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
+from composer.cli.support.output import as_json, as_yaml, say_none_found
+from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import columns, say, use_color, write
-from composer.cli.support.values import as_json, as_yaml
 
 if TYPE_CHECKING:
-    from composer.remote.parameters import Description, Parameters
+    from composer.remote.parameters import ParameterClient, ParameterDescription
     from composer.resolve.parameter_files import ParameterFiles
 
 app = typer.Typer(
-    help="See and set the parameters of running nodes.",
+    help="List, get and set parameters of running nodes.",
     epilog=examples(
         "compose param list planner",
         "compose param get planner max_velocity",
@@ -34,30 +33,37 @@ app = typer.Typer(
 )
 
 Node = Annotated[
-    str, typer.Argument(metavar="NODE", help="Its full name, or the last part of just one.")
+    str,
+    typer.Argument(
+        metavar="NODE", help="The full name of a node, or its last part if unambiguous."
+    ),
 ]
 Name = Annotated[str, typer.Argument(metavar="PARAMETER")]
 
 
 @contextmanager
-def _parameters(node: str, timeout: float) -> Iterator[Parameters]:
+def _parameters(node: str, timeout: float) -> Iterator[ParameterClient]:
     with ros_session("compose param", timeout) as (session, deadline):
-        from composer.remote.parameters import Parameters
+        from composer.remote.parameters import ParameterClient
 
-        yield Parameters(session, deadline, node)
+        yield ParameterClient(session, deadline, node)
 
 
 @app.command("list", epilog=examples("compose param list planner", "compose param list"))
 def list_parameters(
     node: Annotated[
         str | None,
-        typer.Argument(metavar="[NODE]", help="Left out: all nodes.", show_default=False),
+        typer.Argument(
+            metavar="[NODE]",
+            help="The full name of a node, or its last part. Default: all nodes.",
+            show_default=False,
+        ),
     ] = None,
     *,
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """List the parameters of a node, or of all nodes."""
+    """List the parameters of a node or of all nodes."""
     if node is None:
         _list_all(json, timeout)
         return
@@ -81,7 +87,9 @@ def _list_all(json: bool, timeout: float) -> None:
         say_none_found("node")
     for node, names in found.items():
         if names is None:
-            say(f"{node} did not answer: its parameter services may be off, or its process busy")
+            say(
+                f"{node} did not respond: its parameter services may be disabled, or it may be busy"
+            )
         else:
             write("\n".join((f"{node}:", *(f"  {name}" for name in names))))
 
@@ -100,16 +108,19 @@ def get(
 def set_value(
     node: Node,
     name: Name,
-    value: Annotated[str, typer.Argument(metavar="VALUE", help="As in YAML.")],
+    value: Annotated[str, typer.Argument(metavar="VALUE", help="The value, as YAML.")],
     *,
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Set a parameter. A value that the node refuses is told with its reason, exit code 1."""
+    """Set a parameter.
+
+    Exit code 1 if the node rejects the value; the reason is printed.
+    """
     with _parameters(node, timeout) as parameters:
         (described,) = parameters.describe([name])
-        taken = parameters.set({name: value if described.type == "string" else _yaml(value)})
-    _print_taken(parameters.node, taken, json)
+        values_set = parameters.set({name: value if described.type == "string" else _yaml(value)})
+    _print_values(parameters.node, values_set, json)
 
 
 @app.command("describe", epilog=examples("compose param describe planner max_velocity"))
@@ -120,9 +131,9 @@ def describe(
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Print what a node says of parameters: type, bounds, meaning.
+    """Print the type, range and description of parameters.
 
-    The JSON of one is a map, that of several is a list.
+    With --json, the output is an object for one parameter and an array for several.
     """
     with _parameters(node, timeout) as parameters:
         described = [_facts(found) for found in parameters.describe(names)]
@@ -135,7 +146,7 @@ def describe(
 
 @app.command("dump", epilog=examples("compose param dump planner > planner.yaml"))
 def dump(node: Node, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
-    """Print all parameters as a ROS parameter file."""
+    """Print the parameters of a node as a parameter file."""
     with _parameters(node, timeout) as parameters:
         values = parameters.values(parameters.names())
     content = {parameters.node: {"ros__parameters": values}}
@@ -150,25 +161,28 @@ def load(
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Set the parameters that a ROS parameter file has for a node, by its name or by wildcards."""
+    """Set the parameters of a node from a parameter file.
+
+    The file can name the node in full or with wildcards.
+    """
     sections = _read(file)
     with _parameters(node, timeout) as parameters:
         values = _values_for(parameters.node, sections, parameters.names())
         if not values:
-            raise Failure(
-                f"'{file}' has nothing for {parameters.node}",
-                hint=f"it would stand under '{parameters.node}: ros__parameters:'",
+            raise CommandError(
+                f"'{file}' has no parameters for {parameters.node}",
+                hint=f"add them under '{parameters.node}: ros__parameters:'",
             )
-        taken = parameters.load(values)
-    _print_taken(parameters.node, taken, json)
+        values_set = parameters.load(values)
+    _print_values(parameters.node, values_set, json)
 
 
-def _print_taken(node: str, taken: dict[str, Any], json: bool) -> None:
-    """Print what a node has taken; the JSON is a ROS parameter file, as that of ``dump``."""
+def _print_values(node: str, values: dict[str, Any], json: bool) -> None:
+    """Print the values that were set; the JSON is a ROS parameter file, as with ``dump``."""
     if json:
-        write(as_json({node: {"ros__parameters": taken}}, indent=2))
+        write(as_json({node: {"ros__parameters": values}}, indent=2))
     else:
-        write("\n".join(f"{node} {name}: {as_json(value)}" for name, value in taken.items()))
+        write("\n".join(f"{node} {name}: {as_json(value)}" for name, value in values.items()))
 
 
 def _yaml(text: str) -> Any:
@@ -177,8 +191,8 @@ def _yaml(text: str) -> Any:
     try:
         return yaml.safe_load(text)
     except yaml.YAMLError as error:
-        problem = getattr(error, "problem", None) or "it cannot be read"
-        raise UsageFailure(f"'{text:.40}' is not YAML: {problem}") from error
+        problem = getattr(error, "problem", None) or "it cannot be parsed"
+        raise UsageError(f"'{text:.40}' is not YAML: {problem}") from error
 
 
 def _read(file: Path) -> ParameterFiles:
@@ -186,10 +200,10 @@ def _read(file: Path) -> ParameterFiles:
     from composer.resolve.parameter_files import ParameterFiles, read_parameter_file
 
     sections = ParameterFiles()
-    findings = read_parameter_file(file, sections)
-    if findings:
-        say(render(findings, color=use_color(sys.stderr)))
-        raise Failure(f"'{file}' is not a ROS parameter file")
+    diagnostics = read_parameter_file(file, sections)
+    if diagnostics:
+        say(render(diagnostics, color=use_color(sys.stderr)))
+        raise CommandError(f"'{file}' is not a ROS parameter file")
     return sections
 
 
@@ -200,7 +214,7 @@ def _values_for(node: str, sections: ParameterFiles, declared: Iterable[str]) ->
     return {name: plain(entry.value) for name, entry in given.items()}
 
 
-def _facts(found: Description) -> dict[str, Any]:
+def _facts(found: ParameterDescription) -> dict[str, Any]:
     facts = {
         "name": found.name,
         "type": found.type,

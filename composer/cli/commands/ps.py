@@ -1,28 +1,28 @@
-"""``compose ps``: the running systems and their nodes at a glance."""
+"""``compose ps``: the running systems and their nodes."""
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from composer.cli.support.help import examples
-from composer.cli.support.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
-from composer.cli.support.system_name import AnyRunningSystem, name_of_system
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
+from composer.cli.support.output import as_json
+from composer.cli.support.ros import ros_session
+from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
 from composer.cli.support.terminal import columns, write
 
 if TYPE_CHECKING:
     from composer.remote.process_list import ProcessList
     from composer.remote.systems import NodeReport, SystemReport
 
-EPILOG = examples(
-    "compose ps                 every running system, and lifecycle nodes of others",
-    "compose ps pipeline        one system",
-    "compose ps --json          for programs",
-)
+EPILOGS = {
+    "ps": examples(
+        "compose ps                 all running systems and other lifecycle nodes",
+        "compose ps pipeline        a single system",
+        "compose ps --json          print JSON",
+    )
+}
 
 _HEAD = ("node", "state", "since", "restarts", "errors", "out Hz", "in Hz", "last error")
 
@@ -30,26 +30,27 @@ _HEAD = ("node", "state", "since", "restarts", "errors", "out Hz", "in Hz", "las
 def ps(
     system: AnyRunningSystem = None,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")] = False,
+    json: Json = False,
 ) -> None:
-    """List running systems: the state of each node, since when, its rates, what went wrong last.
+    """List running systems and their nodes.
 
-    Rates are of topic messages over the last second. With --json what callbacks take is told, too;
-    'compose top' shows it. Lifecycle nodes that no composer runs are listed with their states. Who
-    does not answer is said to be so.
+    For each node, the list has the state and its duration, the number of restarts and errors, the
+    message rates over the last second, and the last error. Lifecycle nodes that do not belong to a
+    system are listed with their states. With --json, the output includes callback timings, which
+    'compose top' shows as a table.
     """
-    name = None if system is None else name_of_system(system)
+    name = None if system is None else running_system_name(system)
     with ros_session("compose ps", timeout) as (session, deadline):
         from composer.remote.process_list import list_one, list_processes
 
         if name is None:
-            listed = list_processes(session, deadline, callbacks=as_json)
+            listed = list_processes(session, deadline, callbacks=json)
         else:
-            listed = list_one(session, deadline, name, callbacks=as_json)
-    write(_json(listed) if as_json else _text(listed))
+            listed = list_one(session, deadline, name, callbacks=json)
+    write(_as_json(listed) if json else _as_text(listed))
 
 
-def _json(listed: ProcessList) -> str:
+def _as_json(listed: ProcessList) -> str:
     content: dict[str, Any] = {
         "systems": [
             {"name": name} | ({"answered": False} if report is None else _report(report))
@@ -57,11 +58,11 @@ def _json(listed: ProcessList) -> str:
         ],
         "nodes": [{"node": node, "state": state} for node, state in listed.others.items()],
     }
-    return json.dumps(content, indent=2)
+    return as_json(content, indent=2)
 
 
 def _report(report: SystemReport) -> dict[str, Any]:
-    """Return the report with the callbacks of each node where the node is."""
+    """Return the report with the callbacks below their nodes."""
     content = asdict(report)
     content.pop("callbacks_at_s")
     callbacks = content.pop("callbacks")
@@ -74,18 +75,18 @@ def _report(report: SystemReport) -> dict[str, Any]:
     return content
 
 
-def _text(listed: ProcessList) -> str:
+def _as_text(listed: ProcessList) -> str:
     parts = [_system(name, report) for name, report in listed.systems.items()]
     if listed.others:
-        rows = [(node, state or "(no answer)") for node, state in listed.others.items()]
+        rows = [(node, state or "(no response)") for node, state in listed.others.items()]
         title = "other lifecycle nodes" if parts else "lifecycle nodes"
         parts.append(f"{title}\n{columns(rows)}")
-    return "\n\n".join(parts) or "nothing is running"
+    return "\n\n".join(parts) or "no system is running"
 
 
 def _system(name: str, report: SystemReport | None) -> str:
     if report is None:
-        return f"{name}: no answer, its process may be busy or gone"
+        return f"{name}: no response, its process may be busy or gone"
     where = f"host {report.host}, process {report.pid}"
     rows = [_HEAD, *(_row(node) for node in report.nodes)]
     return f"{name}: {report.activity}, {report.message} ({where})\n{columns(rows)}"
@@ -95,7 +96,7 @@ def _row(node: NodeReport) -> tuple[str, ...]:
     return (
         node.node,
         f"{node.state} (failed)" if node.held_down else node.state,
-        duration(time.time() - node.since_s),
+        _duration(time.time() - node.since_s),
         str(node.restarts),
         str(node.errors),
         f"{node.sent_hz:.1f}",
@@ -104,8 +105,8 @@ def _row(node: NodeReport) -> tuple[str, ...]:
     )
 
 
-def duration(seconds: float) -> str:
-    """Return a time as people say it: ``12 s``, ``3 min``, ``5 h``, ``2 d``."""
+def _duration(seconds: float) -> str:
+    """Return a duration in its largest fitting unit: ``12 s``, ``3 min``, ``5 h``, ``2 d``."""
     for limit_s, unit_s, unit in ((120, 1, "s"), (7200, 60, "min"), (172_800, 3600, "h")):
         if seconds < limit_s:
             return f"{max(0, int(seconds / unit_s))} {unit}"

@@ -1,4 +1,4 @@
-"""``compose rule``: what a finding means and how to mend it."""
+"""``compose rule``: explain the rules of ``compose validate``."""
 
 from __future__ import annotations
 
@@ -6,26 +6,33 @@ from typing import Annotated
 
 import typer
 
-from composer.cli.support.failure import UsageFailure
-from composer.cli.support.help import examples
+from composer.cli.support.errors import UsageError
+from composer.cli.support.options import examples
 from composer.cli.support.terminal import columns, write, write_raw
 
-EPILOG = examples(
-    "compose rule                            all rules, one a line",
-    "compose rule RC202",
-    "compose rule unknown-node",
-)
+EPILOGS = {
+    "rule": examples(
+        "compose rule                            list all rules",
+        "compose rule RC202",
+        "compose rule unknown-node",
+    )
+}
 
 
 def rule(
     code: Annotated[
         str | None,
         typer.Argument(
-            metavar="CODE", help="A code (RC301), a band (RC3) or a name.", show_default=False
+            metavar="CODE",
+            help="A code (RC301), a band of codes (RC3) or a name.",
+            show_default=False,
         ),
     ] = None,
 ) -> None:
-    """Explain a rule: what is wrong, why it matters, and an example of it and of its cure."""
+    """Explain a rule, with examples.
+
+    Without CODE, list all rules.
+    """
     from composer.diagnostics import suggestion
     from composer.report.rule_page import all_rules, explain, find_rule
 
@@ -38,4 +45,4 @@ def rule(
         write(columns([(item.code, item.severity.value, item.name) for item in band]))
     else:
         names = [name for item in rules for name in (item.code, item.name)]
-        raise UsageFailure(f"no rule is called '{code}'", hint=suggestion(str(code), names))
+        raise UsageError(f"there is no rule '{code}'", hint=suggestion(str(code), names))

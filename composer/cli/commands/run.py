@@ -1,4 +1,4 @@
-"""``compose run``: validate, plan, bring up, keep up, tear down."""
+"""``compose run``: validate, bring up, supervise and shut down a system."""
 
 from __future__ import annotations
 
@@ -11,13 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.support.failure import FINDINGS, Failure
-from composer.cli.support.files import system_file
-from composer.cli.support.finite import finite
-from composer.cli.support.hard_exit import end_now, end_within
-from composer.cli.support.help import examples
-from composer.cli.support.loaded import Namespace, SystemName, load_system
+from composer.cli.support.errors import FAILED, CommandError
+from composer.cli.support.options import Namespace, examples, finite
 from composer.cli.support.ros import require_interfaces, require_ros
+from composer.cli.support.system_arguments import SystemName, load_system, system_file
 from composer.cli.support.terminal import say, write
 
 if TYPE_CHECKING:
@@ -26,33 +23,35 @@ if TYPE_CHECKING:
     from composer.runtime.host import HostOptions
     from composer.runtime.supervision.events import Outcome
 
-EPILOG = examples(
-    "compose run pipeline                                  an example system, until Ctrl-C",
-    "compose run systems/pipeline.yaml --for 10            ten seconds",
-    "compose run pipeline --dry-run                        the plan only, needs no ROS",
-    "compose run pipeline --set planner.max_velocity=0.5   another parameter value",
-    "compose run pipeline --namespace /robot1",
-    "compose run pipeline --use-sim-time                   with a simulator that publishes /clock",
-    "compose run pipeline --autostart inactive             then: compose lifecycle set ...",
-    "compose run pipeline --wait --timeout 10              in the background, once it is up",
-)
+EPILOGS = {
+    "run": examples(
+        "compose run pipeline                                  run an example system until Ctrl-C",
+        "compose run systems/pipeline.yaml --for 10            run for ten seconds",
+        "compose run pipeline --dry-run                        print the plan; needs no ROS",
+        "compose run pipeline --set planner.max_velocity=0.5   set a parameter",
+        "compose run pipeline --namespace /robot1              use another namespace",
+        "compose run pipeline --use-sim-time                   use the time of a simulator",
+        "compose run pipeline --autostart inactive             configure nodes, do not activate",
+        "compose run pipeline --wait --timeout 10              run in the background",
+    )
+}
 
-#: How long ``--wait`` waits when nobody says it.
+#: The default of ``--timeout`` with ``--wait``.
 _WAIT_S = 60.0
-#: What a process may need before it keeps limits by itself, on a busy machine.
+#: How long the process may take to start, on a busy machine, before its own limits apply.
 _START_S = 20.0
 
 
 class Autostart(StrEnum):
-    """How far nodes are brought up."""
+    """The states up to which nodes can be brought up."""
 
     ACTIVE = "active"
     INACTIVE = "inactive"
     UNCONFIGURED = "unconfigured"
 
 
-class Level(StrEnum):
-    """rcl's severities."""
+class LogSeverity(StrEnum):
+    """The log severities of ROS."""
 
     DEBUG = "debug"
     INFO = "info"
@@ -71,19 +70,19 @@ def run(
             metavar="SECONDS",
             min=0.0,
             callback=finite,
-            help="Stop by itself after so long.",
+            help="Shut down after this time.",
             show_default=False,
         ),
     ] = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Print the plan and its causes, start nothing.")
+        bool, typer.Option("--dry-run", help="Print the plan with its causes and exit.")
     ] = False,
     settings: Annotated[
         list[str] | None,
         typer.Option(
             "--set",
             metavar="NODE.PARAMETER=VALUE",
-            help="Override a parameter; repeatable.",
+            help="Override a parameter. Repeatable.",
             show_default=False,
         ),
     ] = None,
@@ -92,31 +91,35 @@ def run(
         bool,
         typer.Option(
             "--use-sim-time",
-            help="Let the time of all nodes that say nothing else be that of /clock.",
+            help="Use /clock unless a node sets use_sim_time.",
         ),
     ] = False,
     autostart: Annotated[
         Autostart | None,
-        typer.Option(help="How far to bring the nodes up.", show_default="as the file says"),
+        typer.Option(
+            help="Bring nodes up to this state.", show_default="as declared in the system"
+        ),
     ] = None,
-    log_level: Annotated[Level, typer.Option(help="What nodes log.")] = Level.INFO,
+    log_level: Annotated[
+        LogSeverity, typer.Option(help="Minimum severity of log messages.")
+    ] = LogSeverity.INFO,
     tracing: Annotated[
         bool,
         typer.Option(
             "--tracing/--no-tracing",
-            help="Take the times of callbacks, for 'compose top'. Off only to measure its cost.",
+            help="Record callback timings for 'compose top'.",
         ),
     ] = True,
     check_mutation: Annotated[
         bool,
         typer.Option(
             "--check-mutation",
-            help="Name callbacks that change what was published or received. Slow.",
+            help="Report callbacks that modify published or received messages. Slow.",
         ),
     ] = False,
     wait: Annotated[
         bool,
-        typer.Option("--wait", help="Run in the background, and return once the system is up."),
+        typer.Option("--wait", help="Run in the background; return once the system is up."),
     ] = False,
     timeout: Annotated[
         float | None,
@@ -125,8 +128,8 @@ def run(
             metavar="SECONDS",
             min=0.0,
             callback=finite,
-            help="Take the system down again if it is not up by then.",
-            show_default="none, 60 with --wait",
+            help="Maximum time for the bring-up; then the system is shut down.",
+            show_default="no limit; 60 with --wait",
         ),
     ] = None,
     grace: Annotated[
@@ -136,14 +139,17 @@ def run(
             metavar="SECONDS",
             min=0.0,
             callback=finite,
-            help="How long the end may take at the most.",
+            help="Maximum time for shutdown.",
         ),
     ] = 10.0,
 ) -> None:
-    """Run a system: all nodes in this process, up in dependency order, down in reverse.
+    """Run a system.
 
-    Ctrl-C stops it. Exit code 1 when the system has errors (nothing is started then), when it does
-    not come up (what was started is taken back then), or a node failed for good.
+    The system is validated first, and nothing is started if it has errors. All nodes run in this
+    process. They are brought up in dependency order and shut down in reverse order. If the bring-up
+    fails, it is rolled back. Press Ctrl-C to shut down.
+
+    Exit code 1 if the system has errors, the bring-up fails, or a node fails permanently.
     """
     declared = _load(system, settings or [], namespace, use_sim_time=use_sim_time)
     from composer.model import PrimaryState
@@ -155,13 +161,13 @@ def run(
             write(str(plan))
         return
     if not wait:
-        # Nothing has begun, so Ctrl-C may end the process at once until the host hears it: raised
-        # while ROS is being loaded, it can be taken for a failure of that, or be lost.
+        # Let Ctrl-C end the process at once until the host handles it: while ROS is being imported,
+        # a KeyboardInterrupt can be lost or become an ImportError.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     require_ros("compose run")
     require_interfaces(declared)
     if wait:
-        from composer.cli.support.background import run_in_background
+        from composer.cli.support.process import run_in_background
 
         up_s = _WAIT_S if timeout is None else timeout
         given = _arguments(system, settings or [], namespace, autostart, log_level)
@@ -189,12 +195,12 @@ def _load(text: str, settings: list[str], namespace: str | None, *, use_sim_time
         use_sim_time=use_sim_time,
     )
     if loading.system is not None and loading.system.node_type:
-        raise Failure(
+        raise CommandError(
             f"'{text}' is a node type, not a system",
-            hint="a system names it under 'nodes:'; compose validate checks it alone",
+            hint="use it in a system under 'nodes:'; 'compose validate' checks it on its own",
         )
     if loading.system is None or not loading.is_runnable:
-        raise typer.Exit(FINDINGS)
+        raise typer.Exit(FAILED)
     return loading.system
 
 
@@ -203,9 +209,9 @@ def _arguments(
     settings: list[str],
     namespace: str | None,
     autostart: Autostart | None,
-    level: Level,
+    level: LogSeverity,
 ) -> list[str]:
-    """Return the command line that says the same once more."""
+    """Return the command line for the process in the background."""
     arguments = [system, "--log-level", level.value]
     for setting in settings:
         arguments += ["--set", setting]
@@ -222,6 +228,7 @@ def _numbers(options: dict[str, float | None]) -> list[str]:
 
 
 def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
+    from composer.cli.support.process import end_now
     from composer.cli.support.progress import Progress, summary
     from composer.plan import tear_down
     from composer.runtime.host import Host
@@ -232,7 +239,7 @@ def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
     try:
         outcome = host.run()
     except StartRefused as refusal:
-        raise Failure(str(refusal), hint=refusal.hint) from refusal
+        raise CommandError(str(refusal), hint=refusal.hint) from refusal
     say(summary(outcome))
     if outcome.hung:
         end_now(outcome.exit_code)
@@ -240,8 +247,9 @@ def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
 
 
 def _options(
-    run_for: float | None, timeout: float | None, grace: float, level: Level
+    run_for: float | None, timeout: float | None, grace: float, level: LogSeverity
 ) -> HostOptions:
+    from composer.cli.support.process import end_within
     from composer.model import LogLevel
     from composer.runtime.host import HostOptions
 

@@ -1,26 +1,28 @@
-"""``compose schema``: the JSON Schemas, for editors."""
+"""``compose schema``: print the JSON Schemas, for editors."""
 
 from __future__ import annotations
 
-import json
 from enum import StrEnum
 from typing import Annotated
 
 import typer
 
-from composer.cli.support.help import examples
+from composer.cli.support.options import examples
+from composer.cli.support.output import as_json
 from composer.cli.support.terminal import write
 
-EPILOG = examples(
-    "compose schema system > schemas/system.schema.json",
-    "compose schema node > schemas/node.schema.json",
-    "compose schema project      composer.yaml",
-    "compose schema report       what compose validate --format json writes",
-)
+EPILOGS = {
+    "schema": examples(
+        "compose schema system > schemas/system.schema.json",
+        "compose schema node > schemas/node.schema.json",
+        "compose schema project      the schema of composer.yaml",
+        "compose schema report       the schema of 'compose validate --format json'",
+    )
+}
 
 
-class Name(StrEnum):
-    """What a schema is about."""
+class SchemaName(StrEnum):
+    """The files that have a schema."""
 
     SYSTEM = "system"
     NODE = "node"
@@ -28,12 +30,12 @@ class Name(StrEnum):
     REPORT = "report"
 
 
-def schema(name: Annotated[Name, typer.Argument(help="The kind of file.")]) -> None:
-    """Print the JSON Schema (draft-07) of systems, node types, settings or reports.
+def schema(name: Annotated[SchemaName, typer.Argument(help="The kind of file.")]) -> None:
+    """Print a JSON Schema (draft-07) for editors.
 
-    An editor with a YAML language server completes and checks by it: put
-    "# yaml-language-server: $schema=../schemas/system.schema.json" on the first line of a file.
+    An editor with a YAML language server uses it for completion and checks. Add this as the first
+    line of a file: "# yaml-language-server: $schema=../schemas/system.schema.json".
     """
     from composer.schema import schema as find
 
-    write(json.dumps(find(name.value), indent=2))
+    write(as_json(find(name.value), indent=2))

@@ -1,22 +1,26 @@
-"""``compose service``: the services of the ROS graph, whoever serves them."""
+"""``compose service``: the services of the ROS graph."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from composer.cli.support.help import examples
-from composer.cli.support.listing import Count, Hidden, Json, ShowTypes, print_names
-from composer.cli.support.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.support.options import (
+    DEFAULT_TIMEOUT_S,
+    Count,
+    Hidden,
+    Json,
+    ShowTypes,
+    Timeout,
+    examples,
+)
+from composer.cli.support.output import as_json, as_yaml, print_names
+from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import write
-from composer.cli.support.values import as_json, as_yaml
-
-if TYPE_CHECKING:
-    from composer.remote.graph_names import Names
 
 app = typer.Typer(
-    help="See the services, and call them.",
+    help="List and call services.",
     epilog=examples(
         "compose service list -t",
         "compose service type /plan_trajectory",
@@ -38,11 +42,11 @@ def list_services(
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """List the services."""
+    """List services."""
     with ros_session("compose service", timeout) as (session, deadline):
-        from composer.remote.graph_names import Names
+        from composer.remote.graph_names import GraphNames
 
-        services = Names(session, deadline).services(hidden=hidden)
+        services = GraphNames(session, deadline).services(hidden=hidden)
     print_names("service", services, types=types, count=count, json=json)
 
 
@@ -50,9 +54,9 @@ def list_services(
 def type_of(service: Service, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
     """Print the type of a service."""
     with ros_session("compose service", timeout) as (session, deadline):
-        from composer.remote.graph_names import Names
+        from composer.remote.graph_names import GraphNames
 
-        types = Names(session, deadline).types("service", service)
+        types = GraphNames(session, deadline).types("service", service)
     write(as_json(list(types), indent=2) if json else "\n".join(types))
 
 
@@ -70,7 +74,7 @@ def call(
         list[str] | None,
         typer.Argument(
             metavar="[TYPE] [REQUEST]",
-            help="The type may be left out; the request is YAML.",
+            help="The type is optional if the service is running. The request is YAML.",
             show_default=False,
         ),
     ] = None,
@@ -82,19 +86,19 @@ def call(
     type_name, request = split_values(values or [])
     with ros_session("compose service", timeout) as (session, deadline):
         from composer.remote.calls import call_service
-        from composer.remote.graph_names import Names
+        from composer.remote.graph_names import GraphNames
         from composer.remote.name_matching import full_name
         from composer.remote.values import to_plain
 
         name = full_name("service", service)
-        found = type_name or one_type(Names(session, deadline), "service", name)
+        found = type_name or GraphNames(session, deadline).only_type("service", name)
         response = to_plain(call_service(session, deadline, name, found, request))
     write(as_json(response, indent=2) if json else as_yaml(response))
 
 
 def split_values(values: list[str]) -> tuple[str | None, str]:
-    """Return the type, if it is given, and the YAML. Raises UsageFailure."""
-    from composer.cli.support.failure import UsageFailure
+    """Return the type, if given, and the YAML. Raises UsageError."""
+    from composer.cli.support.errors import UsageError
 
     match values:
         case []:
@@ -106,14 +110,4 @@ def split_values(values: list[str]) -> tuple[str | None, str]:
         case [type_name, text]:
             return type_name, text
         case _:
-            raise UsageFailure("too many arguments", hint="quote the YAML: '{data: true}'")
-
-
-def one_type(names: Names, kind: str, name: str) -> str:
-    """Return the only type of a service or action. Raises RosError where there are more."""
-    from composer.remote.session import RosError
-
-    types = names.types(kind, name)
-    if len(types) > 1:
-        raise RosError(f"{kind} '{name}' has more than one type", f"say which: {', '.join(types)}")
-    return types[0]
+            raise UsageError("too many arguments", hint="quote the YAML, such as '{data: true}'")

@@ -1,4 +1,4 @@
-"""``compose validate``: every finding of every file, in one run."""
+"""``compose validate``: report all diagnostics of all files in one run."""
 
 from __future__ import annotations
 
@@ -13,29 +13,31 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.support.failure import FINDINGS, UsageFailure
-from composer.cli.support.files import example_systems, is_there, nearest_path
-from composer.cli.support.help import examples
+from composer.cli.support.errors import FAILED, UsageError
+from composer.cli.support.options import examples
+from composer.cli.support.system_arguments import example_systems, nearest_path, path_exists
 from composer.cli.support.terminal import say, use_color, write_raw
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
 
-EPILOG = examples(
-    "compose validate systems nodes",
-    "compose validate systems/pipeline.yaml --strict",
-    "compose validate systems --format sarif > findings.sarif",
-    "compose validate systems --ignore qos-implicit --ignore RC5",
-    "cat pipeline.yaml | compose validate -",
-)
+EPILOGS = {
+    "validate": examples(
+        "compose validate systems nodes",
+        "compose validate systems/pipeline.yaml --strict",
+        "compose validate systems --format sarif > report.sarif",
+        "compose validate systems --ignore qos-implicit --ignore RC5",
+        "cat pipeline.yaml | compose validate -",
+    )
+}
 
 
 _STDIN = Path("-")
-_NAMED = 3  # of many files
+_MAX_LISTED = 3
 
 
-class Format(StrEnum):
-    """How findings are written."""
+class ReportFormat(StrEnum):
+    """The formats of reports."""
 
     TEXT = "text"
     JSON = "json"
@@ -43,10 +45,8 @@ class Format(StrEnum):
     GITHUB = "github"
 
 
-Rules = Annotated[
-    list[str] | None,
-    typer.Option(metavar="RULE", help="A code (RC301), a band (RC3) or a name; repeatable."),
-]
+Rules = list[str] | None
+_RULE = "a code (RC301), a band (RC3) or a name. Repeatable."
 
 
 def validate(
@@ -54,17 +54,17 @@ def validate(
         list[Path],
         typer.Argument(
             metavar="PATH...",
-            help="Files, folders (searched for systems and node types), or - for stdin.",
+            help="Files, folders to search for systems and node types, or - for stdin.",
             show_default=False,
         ),
     ],
     *,
     output_format: Annotated[
-        Format | None,
+        ReportFormat | None,
         typer.Option(
             "--format",
             "-f",
-            help="Default: text; github inside GitHub Actions.",
+            help="Output format. Default: text, or github in GitHub Actions.",
             show_default=False,
         ),
     ] = None,
@@ -72,42 +72,47 @@ def validate(
         bool | None,
         typer.Option(
             "--strict/--no-strict",
-            help="Warnings count as errors do. Default: as the project says, else not.",
+            help="Treat warnings as errors. Default: as set in the project, else no.",
             show_default=False,
         ),
     ] = None,
-    select: Rules = None,
-    ignore: Rules = None,
+    select: Annotated[
+        Rules, typer.Option(metavar="RULE", help=f"Report only this rule: {_RULE}")
+    ] = None,
+    ignore: Annotated[
+        Rules, typer.Option(metavar="RULE", help=f"Do not report this rule: {_RULE}")
+    ] = None,
     stdin_name: Annotated[
         str,
         typer.Option(
-            metavar="PATH", help="What stdin is called; its node types are looked for there."
+            metavar="PATH", help="The file name of stdin, used in reports and to find node types."
         ),
     ] = "<stdin>",
 ) -> None:
-    """Check systems and node types without starting anything. Needs no ROS.
+    """Check systems and node types.
 
-    What holds for a whole project can be said in its composer.yaml, or in the table [tool.composer]
-    of its pyproject.toml: strict, select, ignore, severity, nodes, interfaces.
+    Nothing is started, and ROS is not needed. Settings for a whole project can be set in its
+    composer.yaml or in the [tool.composer] table of its pyproject.toml: strict, select, ignore,
+    severity, nodes and interfaces.
 
-    Exit code 1 when there is an error (with --strict: or a warning).
+    Exit code 1 if there are errors, or warnings with --strict.
     """
     checked = _check(paths, stdin_name)
-    findings = _chosen(checked.findings, select or [], ignore or [])
-    _print(findings, output_format or _default_format())
-    closing = "" if findings else ": clean"
-    say(f"{checked.files} file{'' if checked.files == 1 else 's'} checked{closing}")
+    diagnostics = _selected(checked.diagnostics, select or [], ignore or [])
+    _print(diagnostics, output_format or _default_format())
+    suffix = "" if diagnostics else ": no problems found"
+    say(f"{checked.files} file{'' if checked.files == 1 else 's'} checked{suffix}")
     if checked.foreign:
-        say(f"left alone, no 'system:' or 'node:' in it: {_first(checked.foreign)}")
-    weighs_warnings = checked.strict if strict is None else strict
-    if any(_weighs(finding, weighs_warnings) for finding in findings):
-        raise typer.Exit(FINDINGS)
+        say(f"skipped, without 'system:' or 'node:': {_listed(checked.foreign)}")
+    is_strict = checked.strict if strict is None else strict
+    if any(_is_error(item, is_strict) for item in diagnostics):
+        raise typer.Exit(FAILED)
 
 
 @dataclass(frozen=True, slots=True)
 class _Checked:
     files: int
-    findings: list[Diagnostic]
+    diagnostics: list[Diagnostic]
     strict: bool
     foreign: tuple[Path, ...]
 
@@ -118,68 +123,71 @@ def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
     from composer.loading import collect_diagnostics, load_bytes, load_files
 
     for path in paths:
-        if path != _STDIN and not is_there(path):
-            raise UsageFailure(f"there is no file or folder '{path}'", hint=_meant(path))
+        if path != _STDIN and not path_exists(path):
+            raise UsageError(f"there is no file or folder '{path}'", hint=_path_hint(path))
     found = find_files(path for path in paths if path != _STDIN)
     loadings = load_files(found.files)
     if _STDIN in paths:
         content = sys.stdin.buffer.read(MAX_BYTES + 1)
         loadings.insert(0, load_bytes(content, Path.cwd(), shown=stdin_name))
-    findings = [*found.diagnostics, *collect_diagnostics(loadings)]
-    if not loadings and not findings:
-        raise UsageFailure("there is no system and no node type in " + ", ".join(map(str, paths)))
+    diagnostics = [*found.diagnostics, *collect_diagnostics(loadings)]
+    if not loadings and not diagnostics:
+        raise UsageError("there is no system and no node type in " + ", ".join(map(str, paths)))
     return _Checked(
         files=len(loadings),
-        findings=findings,
+        diagnostics=diagnostics,
         strict=any(loading.project.settings.strict for loading in loadings),
         foreign=found.foreign,
     )
 
 
-def _meant(path: Path) -> str | None:
-    """Return a hint at the path that may have been meant; here, examples go by their paths, too."""
+def _path_hint(path: Path) -> str | None:
+    """Return a hint with a similar path, or with the path of the example system."""
     examples = example_systems()
     close = examples.get(str(path)) or nearest_path(path)
     return None if close is None else f"did you mean '{close}'?"
 
 
-def _first(paths: Sequence[Path]) -> str:
-    """Return some of many paths."""
+def _listed(paths: Sequence[Path]) -> str:
+    """Return the first paths, and how many more there are."""
     from composer.report.display import visible
 
-    named = ", ".join(visible(str(path)) for path in paths[:_NAMED])
-    return named if len(paths) <= _NAMED else f"{named} and {len(paths) - _NAMED} more"
+    named = ", ".join(visible(str(path)) for path in paths[:_MAX_LISTED])
+    return named if len(paths) <= _MAX_LISTED else f"{named} and {len(paths) - _MAX_LISTED} more"
 
 
-def _chosen(findings: list[Diagnostic], select: list[str], ignore: list[str]) -> list[Diagnostic]:
+def _selected(
+    diagnostics: list[Diagnostic], select: list[str], ignore: list[str]
+) -> list[Diagnostic]:
     if not select and not ignore:
-        return findings
+        return diagnostics
     from composer.report.rule_page import all_rules
     from composer.report.selection import UnknownRule, chosen
 
     try:
-        return chosen(findings, all_rules(), select, ignore)
+        return chosen(diagnostics, all_rules(), select, ignore)
     except UnknownRule as error:
-        raise UsageFailure(str(error), hint=error.hint) from error
+        raise UsageError(str(error), hint=error.hint) from error
 
 
-def _default_format() -> Format:
-    return Format.GITHUB if os.environ.get("GITHUB_ACTIONS") == "true" else Format.TEXT
+def _default_format() -> ReportFormat:
+    return ReportFormat.GITHUB if os.environ.get("GITHUB_ACTIONS") == "true" else ReportFormat.TEXT
 
 
-def _print(findings: list[Diagnostic], output_format: Format) -> None:
-    if output_format is Format.TEXT:
-        if findings:
+def _print(diagnostics: list[Diagnostic], output_format: ReportFormat) -> None:
+    if output_format is ReportFormat.TEXT:
+        if diagnostics:
             from composer.report.text import render as render_text
 
-            write_raw(render_text(findings, color=use_color(sys.stdout)))
+            write_raw(render_text(diagnostics, color=use_color(sys.stdout)))
         return
-    # The others are seldom wanted, and bring much with them.
+    # Imported on demand: the other formats are rarely used and slow to import.
     render = import_module(f"composer.report.{output_format}").render
-    write_raw(render(findings))
+    write_raw(render(diagnostics))
 
 
-def _weighs(finding: Diagnostic, strict: bool) -> bool:
+def _is_error(diagnostic: Diagnostic, strict: bool) -> bool:
     from composer.diagnostics import Severity
 
-    return finding.severity is Severity.ERROR or (strict and finding.severity is Severity.WARNING)
+    severity = diagnostic.severity
+    return severity is Severity.ERROR or (strict and severity is Severity.WARNING)

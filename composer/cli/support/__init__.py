@@ -1,1 +1,1 @@
-"""What commands share: options, tables, progress, terminal output and failures."""
+"""What commands share: options, arguments, ROS sessions, output and errors."""

@@ -1,11 +1,11 @@
-"""What ``compose run`` shows of the host's events, in the manner of the nodes' log lines."""
+"""What ``compose run`` prints: events in the format of log lines, and a summary at the end."""
 
 from __future__ import annotations
 
 from typing import TextIO
 
-from composer.cli.support.background import tell_ready
-from composer.cli.support.callback_table import callback_table
+from composer.cli.support.callback_tables import summary_table
+from composer.cli.support.process import report_ready
 from composer.cli.support.terminal import columns, use_color
 from composer.runtime.supervision.events import (
     BroughtUp,
@@ -25,11 +25,11 @@ from composer.runtime.supervision.events import (
 )
 
 _GREEN, _YELLOW, _RED, _DIM = "32", "33", "31", "2"
-_CALLBACKS = 10  # of the busiest callbacks, in the summary
+_MAX_CALLBACKS = 10
 
 
 class Progress:
-    """Prints one line an event. Exceptions of callbacks are in the nodes' logs already."""
+    """Print one line per event, except for faults, which the nodes have logged."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -40,7 +40,7 @@ class Progress:
         if isinstance(event, CallbackFailed):
             return
         if isinstance(event, BroughtUp):
-            tell_ready(str(event))
+            report_ready(str(event))
         line = f"[{event.elapsed_s:.3f}] [{_severity(event)}] [compose] {event}"
         if isinstance(event, Logged):
             line = str(event)
@@ -73,7 +73,7 @@ def _code(event: Event) -> str:
 
 
 def summary(outcome: Outcome) -> str:
-    """Return what ends a run: a table of what each node did, and one of what its callbacks took."""
+    """Return the summary of a run: a table of its nodes and one of its busiest callbacks."""
     head = ("node", "state", "received", "sent", "calls", "dropped", "errors")
     rows = [head, *map(_row, outcome.nodes)]
     parts = [
@@ -81,7 +81,7 @@ def summary(outcome: Outcome) -> str:
     ]
     called = [callback for callback in outcome.callbacks if callback.count or callback.dropped]
     if called:
-        parts.append(callback_table(called, _CALLBACKS))
+        parts.append(summary_table(called, _MAX_CALLBACKS))
     parts += [f"chain {chain.chain}: {chain.text}" for chain in outcome.chains]
     return "\n".join(parts)
 

@@ -1,4 +1,4 @@
-"""The terminal: data to stdout, talk to stderr, colours only where they can be seen."""
+"""Output streams: data to stdout, messages to stderr, colors only on terminals."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn, TextIO
 
-#: What a shell reports for a program that wrote into a closed pipe (128 + SIGPIPE).
+#: The exit code that shells report after a write to a closed pipe (128 + SIGPIPE).
 CLOSED_PIPE = 141
 
 
 def write(text: str) -> None:
-    """Print ``text``, which is data, and a newline. Ends the process quietly when nobody reads."""
+    """Print ``text`` and a newline to stdout. Ends the process quietly if the pipe is closed."""
     try:
         print(text, flush=True)
     except BrokenPipeError:
@@ -20,7 +20,7 @@ def write(text: str) -> None:
 
 
 def write_raw(text: str) -> None:
-    """Like :func:`write`, but exactly ``text``."""
+    """Write exactly ``text`` to stdout, like :func:`write`."""
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
@@ -29,7 +29,7 @@ def write_raw(text: str) -> None:
 
 
 def write_bytes(data: bytes) -> None:
-    """Like :func:`write_raw`, for data that is no text."""
+    """Write binary data to stdout, like :func:`write_raw`."""
     try:
         sys.stdout.flush()
         sys.stdout.buffer.write(data)
@@ -39,14 +39,14 @@ def write_bytes(data: bytes) -> None:
 
 
 def say(text: str) -> None:
-    """Print ``text``, which is for the person and no data, to stderr."""
+    """Print ``text``, a message for the user, to stderr."""
     print(text, file=sys.stderr, flush=True)
 
 
 def columns(rows: Sequence[Sequence[str]], numbers_from: int | None = None) -> str:
     """Return the rows as lines with their cells aligned, two spaces apart.
 
-    Columns from ``numbers_from`` on (counted from 0) are aligned on the right.
+    Columns from ``numbers_from`` on (counted from 0) are right-aligned.
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     numbers = len(widths) if numbers_from is None else numbers_from
@@ -60,7 +60,7 @@ def columns(rows: Sequence[Sequence[str]], numbers_from: int | None = None) -> s
 
 
 def use_color(stream: TextIO) -> bool:
-    """Say whether ``stream`` shows colours: NO_COLOR and FORCE_COLOR decide, else a terminal.
+    """Say whether to use colors: NO_COLOR and FORCE_COLOR decide, else whether it is a terminal.
 
     See https://no-color.org and https://force-color.org.
     """
@@ -72,12 +72,12 @@ def use_color(stream: TextIO) -> bool:
 
 
 def keep_stdout_for_data() -> None:
-    """Lead what libraries print to file descriptor 1 to stderr; stdout stays ours alone.
+    """Redirect what libraries print to file descriptor 1 to stderr.
 
-    Fast DDS prints its errors there, where another program may be reading what we write.
+    Fast DDS prints errors there, which would corrupt the data that another program reads.
     """
     stdout = sys.__stdout__
-    if stdout is None or sys.stdout is not stdout:  # done already, or somebody captures it
+    if stdout is None or sys.stdout is not stdout:  # done already, or captured by a test
         return
     stdout.flush()
     ours = os.dup(stdout.fileno())
@@ -86,10 +86,10 @@ def keep_stdout_for_data() -> None:
 
 
 def drop_stdout() -> None:
-    """Let stdout lead nowhere, so that nothing fails on a closed pipe any more."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)
+    """Redirect stdout to the null device, so that later writes to a closed pipe do not fail."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, sys.stdout.fileno())
+    os.close(null)
 
 
 def _end_quietly() -> NoReturn:

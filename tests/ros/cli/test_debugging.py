@@ -1,4 +1,4 @@
-"""The debugging commands for nodes and topics, each a process, on a hand-written rclpy node."""
+"""The commands for nodes and topics, with a plain rclpy node in another process."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_nodes() -> None:
     assert json.loads(listed(("/lab/talker",), "node", "list", "--json")) == ["/lab/talker"]
 
 
-def test_a_node_tells_what_it_offers_and_uses() -> None:
+def test_node_info() -> None:
     names = ("/lab/count", "/lab/in", "/lab/add", "/lab/navigate")
     found = json.loads(listed(names, "node", "info", "talker", "--json"))
     assert ["/lab/count", ["std_msgs/msg/Int32"]] in found["publishers"]
@@ -61,7 +61,7 @@ def test_topics() -> None:
     assert types["/lab/count"] == ["std_msgs/msg/Int32"]
 
 
-def test_a_topic_tells_who_is_at_its_ends_with_which_qos() -> None:
+def test_topic_info() -> None:
     found = json.loads(listed(("/lab/talker",), "topic", "info", "/lab/text", "--json"))
     assert found["types"] == ["std_msgs/msg/String"]
     assert found["subscriptions"] == []
@@ -81,13 +81,13 @@ def test_a_topic_tells_who_is_at_its_ends_with_which_qos() -> None:
     assert kept in listed((kept,), "topic", "info", "-v", "/lab/text")
 
 
-def test_echo_gets_what_a_best_effort_publisher_sends() -> None:
+def test_echo_receives_from_a_best_effort_publisher() -> None:
     lines = said("topic", "echo", "/lab/count", "--count", "5", "--json").splitlines()
     values = [json.loads(line)["data"] for line in lines]
     assert values == list(range(values[0], values[0] + 5))
 
 
-def test_echo_gets_what_was_published_before_and_cuts_it() -> None:
+def test_echo_receives_earlier_messages_and_truncates_them() -> None:
     text = yaml.safe_load(said("topic", "echo", "/lab/text", "--once").removesuffix("---\n"))
     assert text == {"data": "x" * 128 + "..."}
     full = said("topic", "echo", "/lab/text", "--once", "--full-length", "--field", "data")
@@ -104,11 +104,11 @@ def test_echo_filters_by_an_expression() -> None:
     assert done.stderr.startswith("compose: --filter: ")
 
 
-def test_echo_says_what_is_wrong_with_names_and_fields() -> None:
+def test_echo_reports_unknown_names_and_fields() -> None:
     assert "did you mean '/lab/count'?" in error("topic", "echo", "/lab/cuont", "--once")
     assert "valid here: data" in error("topic", "echo", "/lab/count", "--once", "--field", "odd")
     silent = ("topic", "echo", "/lab/in", "std_msgs/msg/String", "--timeout", "0.3")
-    assert "nothing came over '/lab/in' for 0.3 s" in error(*silent)
+    assert "no message received on '/lab/in' for 0.3 s" in error(*silent)
 
 
 def test_echo_ends_quietly_at_ctrl_c() -> None:
@@ -121,12 +121,12 @@ def test_echo_ends_quietly_at_ctrl_c() -> None:
     assert "Traceback" not in err
 
 
-def test_echo_and_hz_agree_with_a_hand_written_subscriber_to_one_percent() -> None:
-    with hand_written_subscriber() as heard:
-        # Who starts too late for the first message, or is kept from a processor at the first or
-        # the last one, looks at something else than the others: once more, with more time.
+def test_echo_and_hz_agree_with_a_plain_subscription() -> None:
+    with plain_subscription() as received:
+        # A process that starts after the first message, or is not scheduled during the first or
+        # last one, sees other messages: try again with more time.
         for lead in (150, 300, 600):
-            values, seen_s, rate = side_by_side(heard, lead)
+            values, seen_s, rate = side_by_side(received, lead)
             by_hand_hz = (len(seen_s) - 1) / (max(seen_s.values()) - min(seen_s.values()))
             close_hz = pytest.approx(by_hand_hz, rel=0.01)
             if len(seen_s) == len(values) and rate["average_hz"] == close_hz:
@@ -138,40 +138,41 @@ def test_echo_and_hz_agree_with_a_hand_written_subscriber_to_one_percent() -> No
 
 
 def side_by_side(
-    heard: list[tuple[float, int]], lead: int
+    received: list[tuple[float, int]], lead: int
 ) -> tuple[list[int], dict[int, float], dict[str, Any]]:
-    """Let echo and hz look at the same 250 messages, which begin in ``lead`` messages.
+    """Run echo and hz on the same 250 messages, starting ``lead`` messages from now.
 
-    Returns what echo printed, when each of these was heard by hand, and what hz found.
+    Returns the values that echo printed, when the subscription received each of them, and the
+    rate that hz measured.
     """
-    first = heard[-1][1] + lead
+    first = received[-1][1] + lead
     since = ("--filter", f"message.data >= {first}", "--count", "250")
     by_echo = start("topic", "echo", "/lab/count", *since, "--field", "data", "--csv")
     by_hz = start("topic", "hz", "/lab/count", *since, "--json")
     rate = json.loads(finished(by_hz).splitlines()[-1])
     values = [int(line) for line in finished(by_echo).splitlines()]
     until_s = time.monotonic() + PATIENCE_S
-    while heard[-1][1] < values[-1]:
+    while received[-1][1] < values[-1]:
         assert time.monotonic() < until_s
         time.sleep(0.02)
-    seen_s = {value: at_s for at_s, value in tuple(heard) if first <= value <= values[-1]}
+    seen_s = {value: at_s for at_s, value in tuple(received) if first <= value <= values[-1]}
     return values, seen_s, rate
 
 
 @contextmanager
-def hand_written_subscriber() -> Iterator[list[tuple[float, int]]]:
+def plain_subscription() -> Iterator[list[tuple[float, int]]]:
     """Yield a list to which a plain subscription adds the time and the number of each message.
 
-    It has begun by then, and its queue is deep enough for a moment without a processor.
+    It has received a message already; its queue is deep enough for a busy machine.
     """
-    heard: list[tuple[float, int]] = []
+    received: list[tuple[float, int]] = []
     context = rclpy.Context()
     context.init([])
     node = rclpy.create_node("by_hand", context=context)
     node.create_subscription(
         Int32,
         "/lab/count",
-        lambda message: heard.append((time.monotonic(), message.data)),
+        lambda message: received.append((time.monotonic(), message.data)),
         QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT),
     )
     executor = SingleThreadedExecutor(context=context)
@@ -180,10 +181,10 @@ def hand_written_subscriber() -> Iterator[list[tuple[float, int]]]:
     thread.start()
     try:
         until_s = time.monotonic() + PATIENCE_S
-        while not heard:
+        while not received:
             assert time.monotonic() < until_s
             time.sleep(0.02)
-        yield heard
+        yield received
     finally:
         executor.shutdown()
         thread.join()
@@ -191,7 +192,7 @@ def hand_written_subscriber() -> Iterator[list[tuple[float, int]]]:
         context.try_shutdown()
 
 
-def test_hz_tells_people_in_words() -> None:
+def test_hz_prints_text() -> None:
     assert "average rate: " in said("topic", "hz", "/lab/count", "--count", "10")
 
 
@@ -203,35 +204,35 @@ def test_bw_counts_serialized_bytes() -> None:
     assert found["bytes_per_s"] == expected
 
 
-def test_measuring_looks_at_wanted_messages_only_and_does_not_wait_for_ever() -> None:
+def test_measurements_can_be_filtered_and_time_out() -> None:
     even = ("--filter", "message.data % 2 == 0", "--count", "20", "--json")
     expected = pytest.approx(25.0, rel=0.3)  # of 50 on a busy machine
     rate = ("topic", "hz", "/lab/count", *even)
     found = measured(lambda found: found["average_hz"] == expected, *rate)
     assert found["average_hz"] == expected
-    # Of a best-effort publisher a reliable subscription hears nothing. The topic has to be found
-    # within the same time.
+    # A reliable subscription receives nothing from a best-effort publisher. The limit also applies
+    # to the discovery of the topic.
     silent = ("topic", "bw", "/lab/count", "--qos-reliability", "reliable", "--timeout", "5")
-    assert "nothing came over '/lab/count' for 5 s" in error(*silent)
+    assert "no message received on '/lab/count' for 5 s" in error(*silent)
 
 
-def test_what_is_published_arrives() -> None:
+def test_published_messages_arrive() -> None:
     arguments = ("/lab/in", "std_msgs/msg/String", '{data: "number {count}"}')
     done = compose("topic", "pub", "-r", "20", "--times", "2", "--print", "2", *arguments)
     assert (done.returncode, done.stdout) == (0, "")
     assert done.stderr == "published #2: std_msgs.msg.String(data='number 1')\n"
-    last = "number 1\n---\n"  # the talker may still be at the one before
+    last = "number 1\n---\n"  # the talker may still publish the one before
     echo = ("topic", "echo", "/lab/heard", "--once", "--field", "data")
     assert listed((last,), *echo) == last
     once = ("topic", "pub", "--once", "--json", "--qos-history", "keep_all", *arguments)
     assert json.loads(said(*once)) == {"data": "number 0"}
 
 
-def test_publishing_says_what_is_wrong() -> None:
+def test_publishing_reports_errors() -> None:
     topic = ("topic", "pub", "--once", "/lab/in", "std_msgs/msg/String")
     assert "String has no field 'dta'" in error(*topic, "{dta: hello}")
     assert "takes a text" in error(*topic, "{data: 5}")
     assert "is not a YAML map" in error(*topic, "hello")
     assert "is not installed" in error("topic", "pub", "/lab/in", "std_msgs/msg/Strin")
-    nobody = ("topic", "pub", "--once", "/nobody", "std_msgs/msg/String", "--timeout", "0.5")
-    assert "0 of 1 subscriptions to '/nobody'" in error(*nobody)
+    unused = ("topic", "pub", "--once", "/unused", "std_msgs/msg/String", "--timeout", "0.5")
+    assert "found 0 of 1 subscriptions to '/unused'" in error(*unused)

@@ -1,4 +1,4 @@
-"""The debugging commands for services, actions and parameters, on a hand-written rclpy node."""
+"""The commands for services, actions and parameters, with a plain rclpy node."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def test_services() -> None:
     assert "/lab/add" in listed(("/lab/add\n",), "service", "list").split()
     assert said("service", "type", "/lab/add") == "std_srvs/srv/SetBool\n"
     assert json.loads(said("service", "type", "/lab/add", "--json")) == ["std_srvs/srv/SetBool"]
-    answer = {"success": True, "message": "switched"}
-    assert yaml.safe_load(said("service", "call", "/lab/add", "{data: true}")) == answer
+    response = {"success": True, "message": "switched"}
+    assert yaml.safe_load(said("service", "call", "/lab/add", "{data: true}")) == response
     typed = ("service", "call", "/lab/add", "std_srvs/srv/SetBool", "{data: true}", "--json")
-    assert json.loads(said(*typed)) == answer
+    assert json.loads(said(*typed)) == response
     assert "SetBool_Request has no field 'dta'" in error("service", "call", "/lab/add", "{dta: 1}")
     assert "did you mean '/lab/add'?" in error("service", "call", "/lab/ad", "{data: true}")
     gone = ("service", "call", "/lab/gone", "std_srvs/srv/SetBool", "{}", "--timeout", "0.5")
-    assert "did not answer within 0.5 s" in error(*gone)
+    assert "did not respond within 0.5 s" in error(*gone)
 
 
 def test_actions() -> None:
@@ -47,29 +47,29 @@ def test_actions() -> None:
     assert json.loads(said("action", "info", "lab/navigate", "--json")) == info
 
 
-def test_a_goal_gives_feedback_and_a_result() -> None:
+def test_a_goal_prints_feedback_and_the_result() -> None:
     goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: 1.0}", "--feedback", "--json")
-    told = [json.loads(line) for line in said(*goal).splitlines()]
-    assert [item["feedback"]["progress_percent"] for item in told[:-1]] == [0.0, 1.0, 2.0]
-    assert told[-1]["status"] == "succeeded"
-    assert told[-1]["result"]["distance_traveled"] == 2.5
+    printed = [json.loads(line) for line in said(*goal).splitlines()]
+    assert [item["feedback"]["progress_percent"] for item in printed[:-1]] == [0.0, 1.0, 2.0]
+    assert printed[-1]["status"] == "succeeded"
+    assert printed[-1]["result"]["distance_traveled"] == 2.5
 
 
-def test_feedback_that_comes_together_with_the_result_is_shown() -> None:
+def test_feedback_that_arrives_with_the_result_is_printed() -> None:
     goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: 1.0}", "--feedback", "--json")
     process = start(*goal)
     assert process.stdout is not None
     first = json.loads(next(line for line in process.stdout if "feedback" in line))
     process.send_signal(signal.SIGSTOP)
-    time.sleep(0.5)  # the talker tells the rest and ends the goal
+    time.sleep(0.5)  # the talker sends the rest and ends the goal
     process.send_signal(signal.SIGCONT)
-    told = [first, *map(json.loads, process.stdout)]
+    printed = [first, *map(json.loads, process.stdout)]
     finished(process)
-    assert [item["feedback"]["progress_percent"] for item in told[:-1]] == [0.0, 1.0, 2.0]
-    assert told[-1]["status"] == "succeeded"
+    assert [item["feedback"]["progress_percent"] for item in printed[:-1]] == [0.0, 1.0, 2.0]
+    assert printed[-1]["status"] == "succeeded"
 
 
-def test_a_rejected_goal_is_told() -> None:
+def test_a_rejected_goal_is_reported() -> None:
     assert "'/lab/navigate' rejected the goal" in error(
         "action", "send_goal", "/lab/navigate", "composer_interfaces/action/Navigate", "{}"
     )
@@ -96,7 +96,7 @@ def test_ctrl_c_cancels_a_goal() -> None:
     assert "Traceback" not in err
 
 
-def test_parameters_are_read_and_set() -> None:
+def test_parameters_can_be_read_and_set() -> None:
     assert {"speed", "name", "gains"} <= set(said("param", "list", "talker").split())
     assert said("param", "get", "talker", "speed") == "1.5\n"
     assert said("param", "set", "talker", "speed", "2") == "/lab/talker speed: 2.0\n"
@@ -109,11 +109,11 @@ def test_parameters_are_read_and_set() -> None:
     assert json.loads(said("param", "get", "talker", "gains", "--json")) == [3.0, 4.5]
 
 
-def test_a_parameter_that_is_not_taken_is_told_with_the_reason() -> None:
+def test_rejected_parameters_are_reported_with_the_reason() -> None:
     assert "out of range" in error("param", "set", "talker", "speed", "99")
-    told = compose("param", "set", "talker", "gains", "[3").stderr
-    assert told == "compose: '[3' is not YAML: expected ',' or ']', but got '<stream end>'\n"
-    assert "'speed' is a double, which 'fast' is not" in error(
+    text = compose("param", "set", "talker", "gains", "[3").stderr
+    assert text == "compose: '[3' is not YAML: expected ',' or ']', but got '<stream end>'\n"
+    assert "parameter 'speed' has type double, got 'fast'" in error(
         "param", "set", "talker", "speed", "fast"
     )
     assert "did you mean 'speed'?" in error("param", "set", "talker", "sped", "1")
@@ -139,20 +139,20 @@ def test_parameters_of_all_nodes_are_listed_and_several_described() -> None:
     assert [item["name"] for item in several] == ["speed", "name"]
 
 
-def test_what_is_dumped_can_be_loaded(tmp_path: Path) -> None:
+def test_a_dump_can_be_loaded(tmp_path: Path) -> None:
     file = tmp_path / "talker.yaml"
     dumped = yaml.safe_load(said("param", "dump", "talker"))
     values = dumped["/lab/talker"]["ros__parameters"]
     assert values["start_type_description_service"] is True  # read-only, as in every ROS node
     values.update(speed=0.25, name="loaded")
     file.write_text(yaml.safe_dump(dumped))
-    taken = json.loads(said("param", "load", "talker", str(file), "--json"))
+    loaded = json.loads(said("param", "load", "talker", str(file), "--json"))
     del values["start_type_description_service"]
-    assert taken == dumped
+    assert loaded == dumped
     assert said("param", "get", "talker", "speed") == "0.25\n"
 
 
-def test_a_parameter_file_may_nest_names_and_use_wildcards(tmp_path: Path) -> None:
+def test_parameter_files_can_nest_names_and_use_wildcards(tmp_path: Path) -> None:
     file = tmp_path / "robot.yaml"
     file.write_text(
         "/**: {ros__parameters: {speed: 1, for_others: 5}}\n"
@@ -162,6 +162,6 @@ def test_a_parameter_file_may_nest_names_and_use_wildcards(tmp_path: Path) -> No
         "/lab/talker speed: 1.0\n/lab/talker limits.reach: 2.0\n"
     )
     file.write_text("/other: {ros__parameters: {speed: 1.0}}\n")
-    assert "has nothing for /lab/talker" in error("param", "load", "talker", str(file))
+    assert "has no parameters for /lab/talker" in error("param", "load", "talker", str(file))
     file.write_text("/lab/talker: {speed: 1.0}\n")
     assert "RC043 parameter-file" in error("param", "load", "talker", str(file))

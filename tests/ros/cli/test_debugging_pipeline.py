@@ -1,4 +1,4 @@
-"""The debugging commands on a system that ``compose run`` runs in another terminal."""
+"""The commands for the ROS graph, with a system that runs in another process."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def pipeline(tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int) ->
         run.stop(signal.SIGTERM)
 
 
-#: What a command line prints; they look only, so several may run side by side.
-ANSWERS = {
+#: Part of the output of each command; they only read, so they can run in parallel.
+OUTPUTS = {
     ("node", "list"): "/planning/planner\n",
     ("node", "info", "planner"): "  Subscribers:\n    /sensor_data:  nav_msgs/msg/Odometry\n",
     ("topic", "list", "-t"): "/sensor_data  ",
@@ -41,26 +41,26 @@ ANSWERS = {
 }
 
 
-def test_every_command_that_looks_answers() -> None:
+def test_commands_that_read() -> None:
     with ThreadPoolExecutor(4) as pool:
-        told = pool.map(answer, ANSWERS)
-    for (arguments, expected), text in zip(ANSWERS.items(), told, strict=True):
+        texts = pool.map(output_of, OUTPUTS)
+    for (arguments, expected), text in zip(OUTPUTS.items(), texts, strict=True):
         assert expected in text, arguments
 
 
-def answer(arguments: tuple[str, ...]) -> str:
-    """Ask, and ask again for what is listed: on a busy machine discovery outlasts a command."""
+def output_of(arguments: tuple[str, ...]) -> str:
+    """Return the output; retry lists, because discovery may take longer on a busy machine."""
     patient = (*arguments, "--timeout", "20")
     if "list" not in arguments and "info" not in arguments:
         return said(*patient)
-    return listed((ANSWERS[arguments],), *patient)
+    return listed((OUTPUTS[arguments],), *patient)
 
 
 def test_a_goal_is_reached() -> None:
     goal = ("action", "send-goal", "/navigate", "{target: {x: 0.3}, max_velocity: 2.0}")
-    told = [json.loads(line) for line in said(*goal, "--feedback", "--json").splitlines()]
-    assert told[-1]["status"] == "succeeded"
-    assert all(0.0 <= item["feedback"]["progress_percent"] <= 100.0 for item in told[:-1])
+    printed = [json.loads(line) for line in said(*goal, "--feedback", "--json").splitlines()]
+    assert printed[-1]["status"] == "succeeded"
+    assert all(0.0 <= item["feedback"]["progress_percent"] <= 100.0 for item in printed[:-1])
 
 
 def test_a_parameter_is_set_and_a_message_published() -> None:
@@ -70,31 +70,31 @@ def test_a_parameter_is_set_and_a_message_published() -> None:
     assert json.loads(said(*once, "{linear: {x: 0.1}}"))["linear"]["x"] == 0.1
 
 
-def test_the_doctor_finds_no_fault() -> None:
+def test_doctor_reports_no_problems() -> None:
     found = json.loads(said("doctor", "--json"))
     assert [item for item in found if item["level"] in ("warning", "error")] == []
     (graph,) = (item["message"] for item in found if item["area"] == "graph")
-    assert graph.startswith("all ends fit: ")
+    assert graph.startswith("all endpoints are compatible: ")
 
 
 def test_messages_are_fresh() -> None:
     until_s = time.monotonic() + PATIENCE_S
     while True:
-        # It reports each second, too, which twenty messages may take longer than.
-        told = said("topic", "delay", "/sensor_data", "--count", "20", "--json").splitlines()
-        delay = json.loads(told[-1])
-        # A command that gets no processor for a moment finds old messages afterwards.
+        # Twenty messages may take longer than a second, then there is more than one report.
+        reports = said("topic", "delay", "/sensor_data", "--count", "20", "--json").splitlines()
+        delay = json.loads(reports[-1])
+        # A command that is not scheduled for a moment receives old messages afterwards.
         if delay["average_s"] < 0.1 or time.monotonic() > until_s:
             break
     assert 0.0 < delay["average_s"] < 0.1
 
 
-def test_who_is_at_the_ends_and_what_is_offered() -> None:
+def test_topic_info() -> None:
     found = json.loads(said("topic", "info", "-v", "/sensor_data", "--json"))
-    assert [end["node"] for end in found["publishers"]] == ["/perception/sensor_simulator"]
-    assert [end["qos"]["reliability"] for end in found["subscriptions"]] == ["best_effort"] * 2
+    assert [item["node"] for item in found["publishers"]] == ["/perception/sensor_simulator"]
+    assert [item["qos"]["reliability"] for item in found["subscriptions"]] == ["best_effort"] * 2
 
 
-def test_a_service_answers_in_yaml() -> None:
-    answer = yaml.safe_load(said("service", "call", "/plan_trajectory", "{max_velocity: 0.5}"))
-    assert "success" in answer
+def test_a_response_is_printed_as_yaml() -> None:
+    response = yaml.safe_load(said("service", "call", "/plan_trajectory", "{max_velocity: 0.5}"))
+    assert "success" in response

@@ -1,4 +1,4 @@
-"""``compose diff``: a system that runs in one process, held against its file from another."""
+"""``compose diff`` on a system that runs in another process."""
 
 from __future__ import annotations
 
@@ -26,35 +26,35 @@ def pipeline(tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int) ->
         assert run.stop()[0] == 0
 
 
-def told(done: subprocess.CompletedProcess[str]) -> list[str]:
-    """Return the differences, without hints and places."""
+def differences(done: subprocess.CompletedProcess[str]) -> list[str]:
+    """Return the differences, without hints and locations."""
     return [line for line in done.stdout.splitlines() if not line.startswith(" ")]
 
 
-def test_a_system_that_runs_as_declared_is_clean(pipeline: Running) -> None:
+def test_a_system_without_differences(pipeline: Running) -> None:
     done = compose("diff", "pipeline")
     assert (done.returncode, done.stdout) == (0, "")
     assert done.stderr == "pipeline: runs as declared\n"
 
 
-def test_a_changed_parameter_is_named_with_both_values_and_its_place(pipeline: Running) -> None:
+def test_a_changed_parameter_is_reported_with_its_declaration(pipeline: Running) -> None:
     assert compose("param", "set", PLANNER, "max_velocity", "0.5").returncode == 0
     done = compose("diff", "pipeline")
     assert done.returncode == 1
-    assert told(done) == [f"{PLANNER}: parameter max_velocity is 0.5, declared 1.0"]
+    assert differences(done) == [f"{PLANNER}: parameter max_velocity is 0.5, declared 1.0"]
     assert "declared at " in done.stdout
     assert "planner.yaml:" in done.stdout
     assert compose("param", "set", PLANNER, "max_velocity", "1.0").returncode == 0
 
 
-def test_a_node_that_was_cleaned_up_is_named_with_the_endpoints_that_are_gone(
+def test_a_cleaned_up_node_is_reported_with_its_missing_endpoints(
     pipeline: Running,
 ) -> None:
     for transition in ("deactivate", "cleanup"):
         assert compose("lifecycle", "set", PLANNER, transition).returncode == 0
     done = compose("diff", "pipeline")
     assert done.returncode == 1
-    assert told(done) == [
+    assert differences(done) == [
         f"{PLANNER}: lifecycle state is unconfigured, declared active",
         f"{PLANNER}: subscription /sensor_data is missing",
         f"{PLANNER}: service /plan_trajectory is missing",
@@ -63,7 +63,7 @@ def test_a_node_that_was_cleaned_up_is_named_with_the_endpoints_that_are_gone(
         assert compose("lifecycle", "set", PLANNER, transition).returncode == 0
 
 
-def test_a_second_publisher_of_another_type_from_outside_is_named(pipeline: Running) -> None:
+def test_an_external_publisher_of_another_type_is_reported(pipeline: Running) -> None:
     conflict = (
         "/intruder: type of its publisher /sensor_data is std_msgs/msg/String,"
         " declared nav_msgs/msg/Odometry"
@@ -79,10 +79,10 @@ def test_a_second_publisher_of_another_type_from_outside_is_named(pipeline: Runn
         ]
         assert [item["kind"] for item in data["drift"]] == ["wrong type", "extra node"]
         ignoring = compose("diff", "pipeline", "--ignore", "/intr*")
-        assert (ignoring.returncode, told(ignoring)) == (1, [conflict])
+        assert (ignoring.returncode, differences(ignoring)) == (1, [conflict])
 
 
-def test_watch_tells_what_appears_and_what_is_resolved(pipeline: Running) -> None:
+def test_watch_prints_new_and_resolved_differences(pipeline: Running) -> None:
     watch = subprocess.Popen(
         [*COMPOSE, "diff", "pipeline", "--watch", "--grace", "1.5"],
         stdout=subprocess.PIPE,
@@ -108,20 +108,23 @@ def read_until(stream: TextIO, begin: str) -> str:
     return next(line.rstrip() for line in stream if line.startswith(begin))
 
 
-def test_a_system_that_is_just_starting_is_no_false_alarm(tmp_path: Path) -> None:
+def test_a_starting_system_is_not_reported(tmp_path: Path) -> None:
     with running(tmp_path / "log.txt", "talker_listener"):
-        # On a busy machine a start may take longer than the grace time is when nobody says it.
+        # On a busy machine, a start may take longer than the default grace time.
         limits = ("--grace", "15", "--timeout", "25")
         done = compose("diff", "talker_listener", "--ignore", "/*/*", *limits)
         assert (done.returncode, done.stdout) == (0, "")
 
 
-def test_nothing_that_runs_is_told_in_time() -> None:
+def test_an_empty_graph_is_reported_in_time() -> None:
     started_s = time.monotonic()
     done = compose("diff", "talker_listener", "--timeout", "4", "--ignore", "*")
     assert time.monotonic() - started_s < 20.0
     assert done.returncode == 1
-    assert told(done) == ["/talker: the node is not there", "/listener: the node is not there"]
+    assert differences(done) == [
+        "/talker: the node is not there",
+        "/listener: the node is not there",
+    ]
 
 
 DECLARED = """
@@ -134,7 +137,7 @@ nodes:
 """
 
 
-def test_qos_really_offered_and_names_that_are_nearly_right(tmp_path: Path) -> None:
+def test_different_qos_and_similar_names_are_reported(tmp_path: Path) -> None:
     declared, other = tmp_path / "declared.yaml", tmp_path / "other.yaml"
     declared.write_text(DECLARED)
     changed = DECLARED.replace("command", "sensor_data").replace("  listener:", "  listner:")
@@ -143,7 +146,7 @@ def test_qos_really_offered_and_names_that_are_nearly_right(tmp_path: Path) -> N
         run.wait_for("2 of 2 nodes active")
         done = compose("diff", str(declared), "--namespace", "/twin", "--ignore", "/[!t]*")
     assert done.returncode == 1
-    assert told(done) == [
+    assert differences(done) == [
         "/twin/talker: reliability of publisher /twin/chatter is best_effort, declared reliable",
         "/twin/listener: the node is not there",
         "/twin/listner: the node is there, but not declared",
@@ -151,7 +154,7 @@ def test_qos_really_offered_and_names_that_are_nearly_right(tmp_path: Path) -> N
     assert "'/twin/listner' is there: is it meant?" in done.stdout
 
 
-def test_how_it_was_started_is_how_it_is_held(tmp_path: Path) -> None:
+def test_start_options_apply_to_the_comparison(tmp_path: Path) -> None:
     arguments = ("talker_listener", "--namespace", "/robot1", "--autostart", "inactive")
     with running(tmp_path / "log.txt", *arguments) as run:
         run.wait_for("0 of 2 nodes active")

@@ -1,4 +1,4 @@
-"""``compose graph --live``: what runs, ours and anybody's, with states and measured rates."""
+"""``compose graph --live``: the running nodes with states and measured rates."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EXPECTED = (
 def live(
     tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int
 ) -> Iterator[dict[str, Any]]:
-    """The diagram of the pipeline and of nodes that somebody else wrote."""
+    """The diagram of the pipeline and of plain rclpy nodes."""
     log = tmp_path_factory.mktemp("live") / "log.txt"
     with hand_written("hand_written.py"), running(log, "pipeline") as run:
         run.wait_for("3 of 3 nodes active")
@@ -32,7 +32,7 @@ def live(
 
 
 def all_drawn() -> dict[str, Any]:
-    """Ask again until all is there: on a busy machine discovery and answers outlast a command."""
+    """Draw until the diagram is complete, because discovery may take longer on a busy machine."""
     until_s = time.monotonic() + PATIENCE_S
     while True:
         found = drawn()
@@ -61,7 +61,7 @@ def edges(live: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {edge["key"]: edge for edge in live["edges"]}
 
 
-def test_all_nodes_are_there_with_their_states(live: dict[str, Any]) -> None:
+def test_all_nodes_are_drawn_with_their_states(live: dict[str, Any]) -> None:
     states = {
         key: vertex["details"].get("state")
         for key, vertex in vertices(live).items()
@@ -72,11 +72,11 @@ def test_all_nodes_are_there_with_their_states(live: dict[str, Any]) -> None:
     assert states["node:/other/arm"] == "unconfigured"
 
 
-def test_a_name_that_two_nodes_have_is_marked(live: dict[str, Any]) -> None:
+def test_a_duplicate_node_name_is_marked(live: dict[str, Any]) -> None:
     assert vertices(live)["node:/planning/planner"]["wrong"] == "2 nodes have this name"
 
 
-def test_topics_services_and_actions_join_them(live: dict[str, Any]) -> None:
+def test_topics_services_and_actions_are_drawn(live: dict[str, Any]) -> None:
     found = edges(live)
     publishes = found["publisher:/perception/sensor_simulator./sensor_data"]
     assert publishes["target"] == "topic:/sensor_data"
@@ -92,7 +92,7 @@ def test_rates_are_measured(live: dict[str, Any]) -> None:
     until_s = time.monotonic() + PATIENCE_S
     while True:
         found = edges(live)["publisher:/perception/sensor_simulator./sensor_data"]
-        # A simulator that gets no processor for a moment sends less for that long.
+        # A simulator that is not scheduled for a moment sends fewer messages.
         if found["details"].get("rate_hz") == expected or time.monotonic() > until_s:
             break
         live = drawn()
@@ -100,13 +100,13 @@ def test_rates_are_measured(live: dict[str, Any]) -> None:
     assert found["label"][0].endswith(" Hz")
 
 
-def test_what_nodes_have_for_tools_is_left_out(live: dict[str, Any]) -> None:
+def test_endpoints_for_tools_are_left_out(live: dict[str, Any]) -> None:
     names = [key for key in vertices(live) if "parameter" in key or "rosout" in key]
     assert names == []
     assert not any("transition_event" in key or "get_state" in key for key in vertices(live))
 
 
-def test_views_that_need_a_declaration_are_refused() -> None:
+def test_views_that_need_a_file_are_rejected() -> None:
     done = compose("graph", "--live", "--view", "deployment")
     assert (done.returncode, done.stdout) == (2, "")
     assert "nodes, connections or states" in done.stderr

@@ -1,4 +1,4 @@
-"""``compose run`` and ``compose lifecycle`` as people use them: two terminals, real ROS."""
+"""``compose run`` and ``compose lifecycle`` in separate processes."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def log(tmp_path: Path) -> Path:
 
 
 def states_in(text: str) -> list[str]:
-    """Return the state changes that were shown, as 'node state'."""
+    """Return the state changes in the log, as 'node state'."""
     lines = [line.rpartition("[compose] ")[2] for line in text.splitlines() if "[compose]" in line]
     return [line for line in lines if line.startswith("/") and len(line.split()) == 2]
 
 
-def test_a_system_comes_up_in_order_stops_by_itself_and_sums_up() -> None:
+def test_a_system_comes_up_in_order_stops_and_prints_a_summary() -> None:
     done = compose("run", "pipeline", "--for", "2")
     assert (done.returncode, done.stdout) == (0, "")
     shown = states_in(done.stderr)
@@ -45,7 +45,7 @@ def test_a_system_comes_up_in_order_stops_by_itself_and_sums_up() -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_tears_down_in_reverse_and_leaves_no_trace(log: Path, number: int) -> None:
+def test_a_signal_shuts_down_in_reverse_order(log: Path, number: int) -> None:
     with running(log, "pipeline") as run:
         run.wait_for("3 of 3 nodes active")
         code, out, err = run.stop(number)
@@ -58,7 +58,7 @@ def test_a_signal_tears_down_in_reverse_and_leaves_no_trace(log: Path, number: i
     ]
 
 
-def test_a_node_is_deactivated_and_activated_from_another_terminal(log: Path) -> None:
+def test_a_node_is_deactivated_and_activated_from_another_process(log: Path) -> None:
     with running(log, "pipeline") as run:
         run.wait_for("3 of 3 nodes active")
         expected = dict.fromkeys(
@@ -79,7 +79,7 @@ def test_a_node_is_deactivated_and_activated_from_another_terminal(log: Path) ->
         refused = compose("lifecycle", "set", "planner", "configure")
         assert (refused.returncode, refused.stdout) == (1, "")
         assert "'configure' is not possible: /planning/planner is inactive" in refused.stderr
-        assert "possible now: " in refused.stderr
+        assert "available transitions: " in refused.stderr
         assert compose("lifecycle", "set", "/planning/planner", "activate").returncode == 0
         assert run.stop()[0] == 0
 
@@ -93,7 +93,7 @@ def test_autostart_and_namespace(log: Path) -> None:
         assert run.stop()[0] == 0
 
 
-def test_simulated_time_from_the_command_line_and_back_from_another_terminal(log: Path) -> None:
+def test_simulated_time_can_be_enabled_and_disabled(log: Path) -> None:
     with running(log, "talker_listener", "--use-sim-time", "--for", "60") as run:
         run.wait_for("2 of 2 nodes active")
         assert compose("param", "get", "/talker", "use_sim_time").stdout.strip() == "true"
@@ -119,7 +119,7 @@ def test_a_node_that_fails_ends_the_run_with_exit_code_1(tmp_path: Path) -> None
     assert states_in(done.stderr)[-1].endswith("finalized")
 
 
-def test_an_environment_that_ros_would_misread_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_invalid_environment_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "-1")
     for arguments in (["run", "minimal", "--for", "1"], ["lifecycle", "nodes"]):
         done = compose(*arguments)
@@ -127,7 +127,7 @@ def test_an_environment_that_ros_would_misread_is_refused(monkeypatch: pytest.Mo
         assert "compose: ROS_DOMAIN_ID is '-1'" in done.stderr
 
 
-def test_an_interface_package_that_is_not_built_is_told_before_anything_starts(
+def test_a_missing_interface_package_is_reported_before_the_start(
     tmp_path: Path,
 ) -> None:
     package = tmp_path / "interfaces" / "arm_interfaces"
@@ -152,16 +152,16 @@ def test_an_interface_package_that_is_not_built_is_told_before_anything_starts(
 def test_an_empty_list_is_explained(command: str, kind: str) -> None:
     done = compose(*command.split())
     assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr.startswith(f"no {kind} was found: ")
+    assert done.stderr.startswith(f"no {kind} found: ")
 
 
-def test_no_nodes_at_all_is_told_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_empty_graph_is_reported_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     started_s = time.monotonic()
     done = compose("lifecycle", "get", "planner", "--timeout", "1")
     assert time.monotonic() - started_s < 15.0
     assert done.returncode == 1
-    assert "no lifecycle node was found at all" in done.stderr
+    assert "no lifecycle node found at all" in done.stderr
 
 
 def test_ctrl_c_ends_a_waiting_command_without_a_traceback(peer: Peer) -> None:
@@ -172,7 +172,7 @@ def test_ctrl_c_ends_a_waiting_command_without_a_traceback(peer: Peer) -> None:
         text=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )
-    # It says nothing until it ends, but its publisher is seen: from then on it waits.
+    # It prints nothing until it ends; it waits once its publisher is discovered.
     wait_until(lambda: peer.node.count_publishers("/unheard"), "the command")
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=PATIENCE_S)

@@ -1,4 +1,4 @@
-"""Running systems from another terminal: ps, up, down, pause, resume, reset, lifecycle set."""
+"""Commands to running systems: ps, up, down, pause, resume, reset, top, lifecycle set."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Planner(Behavior):
 
 
 def refused(*arguments: object) -> str:
-    """Run a command that has to fail and return what it says."""
+    """Run a command that must fail; return its stderr."""
     done = compose(*arguments)
     assert done.returncode == 1, done.stdout + done.stderr
     assert "Traceback" not in done.stderr
@@ -55,12 +55,12 @@ def refused(*arguments: object) -> str:
 
 
 def on_a_terminal(*arguments: str) -> str:
-    """Run a command on a terminal of its own and return all that is shown there."""
+    """Run a command in a new terminal; return its output."""
     ours, theirs = os.openpty()
     shown = b""
     with subprocess.Popen([*COMPOSE, *arguments], stdin=theirs, stdout=theirs, stderr=theirs):
         os.close(theirs)
-        with suppress(OSError):  # so Linux tells that the other end is closed
+        with suppress(OSError):  # raised by Linux when the other side is closed
             while part := os.read(ours, 65_536):
                 shown += part
     os.close(ours)
@@ -69,7 +69,7 @@ def on_a_terminal(*arguments: str) -> str:
 
 @pytest.fixture(autouse=True)
 def nothing_stays_running() -> Iterator[None]:
-    """End what a failed test left in the background: it would hinder all that come after."""
+    """End the systems that a failed test left in the background."""
     yield
     for pid in local_systems().values():
         with suppress(ProcessLookupError, ValueError):
@@ -91,8 +91,8 @@ class Robot:
     def __init__(self, path: Path, *options: object) -> None:
         self.path = path
         self.began_s = time.time()
-        self.told = said("run", path, "--wait", "--timeout", 20, *options)
-        found = re.search(r"\(process (\d+), log (.*)\)", self.told)
+        self.text = said("run", path, "--wait", "--timeout", 20, *options)
+        found = re.search(r"\(process (\d+), log (.*)\)", self.text)
         assert found is not None
         self.pid, self.log = int(found[1]), Path(found[2])
 
@@ -120,14 +120,14 @@ def robot(path: Path) -> Iterator[Robot]:
 
 
 def planner_in(text: str) -> dict[str, Any]:
-    """Return what ``ps --json`` tells of the planner."""
+    """Return the planner from the output of ``ps --json``."""
     (system,) = json.loads(text)["systems"]
     found: dict[str, Any] = system["nodes"][0]
     return found
 
 
 def callback_in(text: str) -> dict[str, Any]:
-    """Return the one callback that ``top --once --json`` tells of."""
+    """Return the only callback from the output of ``top --once --json``."""
     (line,) = text.splitlines()
     found: dict[str, Any]
     (found,) = json.loads(line)["callbacks"]
@@ -135,16 +135,14 @@ def callback_in(text: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("options", [(), ("--json",)])
-def test_one_look_at_callbacks_stays_on_the_terminal(
-    robot: Robot, options: tuple[str, ...]
-) -> None:
+def test_top_once_does_not_use_the_full_screen(robot: Robot, options: tuple[str, ...]) -> None:
     shown = on_a_terminal("top", "--once", *options)
     assert "/fleet/planner" in shown
     assert "\x1b" not in shown
 
 
-def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None:
-    assert robot.told.startswith("2 of 3 nodes active after")
+def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
+    assert robot.text.startswith("2 of 3 nodes active after")
     text = said("ps")
     line, head, *rows = text.splitlines()
     assert line.startswith("/fleet/robot: running, 2 of 3 nodes active (host ")
@@ -155,7 +153,7 @@ def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None
         ["/fleet/motor", "active"],
         ["/fleet/camera", "inactive"],
     ]
-    # A system that gets no processor for a moment sends less in that second.
+    # A system that is not scheduled for a moment sends fewer messages in that second.
     text = asked_until(
         lambda text: planner_in(text)["sent_hz"] == pytest.approx(20.0, abs=3.0), "ps", "--json"
     )
@@ -181,10 +179,10 @@ def test_a_system_runs_in_the_background_until_it_is_ended(robot: Robot) -> None
     refusal = refused("run", robot.path)
     assert f"process {robot.pid}" in refusal
     assert "system '/fleet/robot' already runs in ROS domain" in refusal
-    assert "end it with 'compose down /fleet/robot'" in refusal
+    assert "stop it with 'compose down /fleet/robot'" in refusal
 
     assert said("down", "robot").startswith("/fleet/robot: the system has stopped")
-    # It gives its name back, which 'down' waits for, and then sums up.
+    # 'down' waits until the instance lock is released; the summary is printed later.
     summary = re.compile(r"ran for .*\n/fleet/planner +timer 'tick' +\d+", re.DOTALL)
     wait_until(lambda: summary.search(robot.log.read_text()), "the summary")
     refusal = refused("down", robot.path)
@@ -211,7 +209,7 @@ def test_commands_to_a_whole_system(robot: Robot) -> None:
     assert refused("up", "rowbot").splitlines()[1] == "  did you mean '/fleet/robot'?"
 
 
-def test_several_nodes_patterns_and_systems_are_moved_at_once(robot: Robot) -> None:
+def test_lifecycle_set_with_several_nodes_patterns_and_systems(robot: Robot) -> None:
     moved = said("lifecycle", "set", "motor", "planner", "deactivate")
     assert moved == "/fleet/motor: active -> inactive\n/fleet/planner: active -> inactive\n"
     moved = said("lifecycle", "set", "/fleet/[mp]*", "--to", "active")
@@ -233,20 +231,22 @@ def test_several_nodes_patterns_and_systems_are_moved_at_once(robot: Robot) -> N
     done = compose("lifecycle", "set", "camera", "motor", "cleanup")
     assert (done.returncode, done.stdout) == (1, "/fleet/motor: inactive -> unconfigured\n")
     assert "'cleanup' is not possible: /fleet/camera is unconfigured" in done.stderr
-    assert "possible now: configure, shutdown" in done.stderr
-    assert "there is no lifecycle node like 'x*'" in refused("lifecycle", "set", "x*", "cleanup")
+    assert "available transitions: configure, shutdown" in done.stderr
+    assert "there is no lifecycle node matching 'x*'" in refused(
+        "lifecycle", "set", "x*", "cleanup"
+    )
     said("lifecycle", "set", "camera", "--to", "finalized")
     refusal = refused("lifecycle", "set", "camera", "--to", "active")
-    assert "there is no way to 'active': /fleet/camera is finalized" in refusal
+    assert "'active' cannot be reached: /fleet/camera is finalized" in refusal
     for arguments in (["motor"], ["--to", "active"], ["--system", "robot", "motor", "activate"]):
         assert compose("lifecycle", "set", *arguments).returncode in (1, 2)
 
 
-def test_what_does_not_answer_is_said_to_be_so_in_time(robot: Robot) -> None:
+def test_unresponsive_nodes_and_systems_are_reported_in_time(robot: Robot) -> None:
     said("lifecycle", "set", "planner", "deactivate")
     said("param", "set", "/fleet/planner", "fault", "hang")
     refusal = refused("lifecycle", "set", "planner", "activate", "--timeout", 5)
-    assert "/fleet/planner did not answer within 5 s" in refusal
+    assert "/fleet/planner did not respond within 5 s" in refusal
     began_s = time.monotonic()
     assert robot.states()["/fleet/planner"] == "activating"
     assert time.monotonic() - began_s < 15.0
@@ -256,22 +256,22 @@ def test_what_does_not_answer_is_said_to_be_so_in_time(robot: Robot) -> None:
         refusal = refused("pause", "robot", "--timeout", 1.5)
         assert f"its process is {robot.pid}" in refusal
         began_s = time.monotonic()
-        assert "no answer, its process may be busy or gone" in said("ps")
+        assert "no response, its process may be busy or gone" in said("ps")
         assert time.monotonic() - began_s < 15.0
     finally:
         robot.kill(signal.SIGCONT)
 
 
-def test_a_system_that_was_killed_is_said_not_to_run(robot: Robot) -> None:
+def test_a_killed_system_is_not_running(robot: Robot) -> None:
     robot.kill()
     wait_until(lambda: not local_systems(), "its end")
     began_s = time.monotonic()
-    assert said("ps") == "nothing is running\n"
+    assert said("ps") == "no system is running\n"
     assert said("lifecycle", "nodes") == ""
     commands = ("ps", "up", "down", "pause", "resume", "reset")
-    for told in errors(*((command, "robot") for command in commands)):
-        assert "there is no running system 'robot'" in told
-    by_path, misspelt, by_name, in_a_system, asked = errors(
+    for text in errors(*((command, "robot") for command in commands)):
+        assert "there is no running system 'robot'" in text
+    by_path, misspelled, by_name, in_a_system, get = errors(
         ("ps", robot.path),
         ("ps", robot.path.with_name("robt.yaml")),
         ("lifecycle", "set", "planner", "deactivate"),
@@ -279,14 +279,14 @@ def test_a_system_that_was_killed_is_said_not_to_run(robot: Robot) -> None:
         ("lifecycle", "get", "/fleet/planner"),
     )
     assert "no system is running: start one with" in by_path
-    assert "did you mean" in misspelt
+    assert "did you mean" in misspelled
     assert "there is no running system" in in_a_system
-    for told in (by_name, asked):
-        assert "there is no lifecycle node " in told
+    for text in (by_name, get):
+        assert "there is no lifecycle node " in text
     assert time.monotonic() - began_s < 11 * 5.0
 
 
-def test_a_command_does_not_wait_for_a_process_that_has_ended(robot: Robot) -> None:
+def test_a_command_does_not_wait_for_an_ended_process(robot: Robot) -> None:
     said("param", "set", "/fleet/planner", "fault", "hang")
     said("pause", "robot")
     limit_s = 25.0
@@ -303,25 +303,25 @@ def test_a_command_does_not_wait_for_a_process_that_has_ended(robot: Robot) -> N
     assert "/fleet/robot did not resume: its process has ended" in refusal
 
 
-def test_a_list_that_lacks_the_nodes_of_a_system_says_so(robot: Robot) -> None:
+def test_an_incomplete_list_of_nodes_is_an_error(robot: Robot) -> None:
     robot.kill(signal.SIGSTOP)
-    asking = (("nodes",), ("get", "planner"), ("set", "/fleet/*", "cleanup"))
-    for refusal in errors(*(("lifecycle", *arguments) for arguments in asking)):
-        assert "system '/fleet/robot' does not answer, so its nodes are not known" in refusal
+    queries = (("nodes",), ("get", "planner"), ("set", "/fleet/*", "cleanup"))
+    for refusal in errors(*(("lifecycle", *arguments) for arguments in queries)):
+        assert "system '/fleet/robot' does not respond, so its nodes are not known" in refusal
         assert f"its process {robot.pid} may be busy or stopped" in refusal
 
 
-def test_a_system_that_does_not_come_up_is_no_background_process(path: Path) -> None:
+def test_a_failed_bring_up_ends_the_background_process(path: Path) -> None:
     refusal = refused("run", path, "--wait", "--set", "planner.fault=configure")
     assert "the system did not come up (exit code 1):" in refusal
     assert "/fleet/planner failed" in refusal
-    # Up to where it hangs a start takes longer on a busy machine.
+    # The limit is long enough to reach the node that hangs on a busy machine.
     refusal = refused("run", path, "--timeout", 5, "--set", "planner.fault=hang", "--grace", 3)
     assert "activate failed: bring-up timed out after 5 s" in refusal
 
 
-def test_of_two_hosts_the_second_one_yields(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two hosts share no lock files; neither do two processes with runtime folders of their own."""
+def test_the_second_of_two_hosts_shuts_down(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two hosts do not share lock files; separate runtime folders have the same effect."""
     first_folder, second_folder = path.parent / "first", path.parent / "second"
     for folder in (first_folder, second_folder):
         folder.mkdir()

@@ -1,7 +1,7 @@
-"""Commands that are not answered at first: what they send again, what they do not, what they say.
+"""Lost responses: reads are retried, writes are sent once.
 
-The peer loses the first request to each of its services, as far as a command can tell: Fast DDS
-loses an answer for a client that the server has not met yet. A second request it answers.
+The peer ignores the first request to each of its services and responds to the second one. Fast DDS
+drops a response if the server has not discovered the client yet.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def forgetful(ros_domain_id: int) -> Iterator[subprocess.Popen[str]]:
 
 
 def requests(process: subprocess.Popen[str]) -> Counter[str]:
-    """End the peer and return how many requests came to each of its services."""
+    """End the peer; return how many requests each of its services received."""
     process.kill()
     assert process.stdout is not None
     return Counter(process.stdout.read().split())
@@ -44,30 +44,30 @@ def requests(process: subprocess.Popen[str]) -> Counter[str]:
         ),
     ],
 )
-def test_what_only_reads_is_asked_again(
+def test_reads_are_retried(
     forgetful: subprocess.Popen[str], command: str, expected: str, services: list[str]
 ) -> None:
     assert said(*command.split(), "--timeout", "20") == expected
-    came = requests(forgetful)
-    assert all(came[service] >= 2 for service in services), came
+    received = requests(forgetful)
+    assert all(received[service] >= 2 for service in services), received
 
 
-def test_what_changes_something_is_sent_once(forgetful: subprocess.Popen[str]) -> None:
+def test_writes_are_sent_once(forgetful: subprocess.Popen[str]) -> None:
     commands = {
         "service call /lab/switch": "switch",
         "lifecycle set forgetful configure": "change_state",
         "param set forgetful speed 2": "set_parameters",
     }
-    # A second request would be answered, and the command would succeed.
-    for told in errors(*((*command.split(), "--timeout", "8") for command in commands)):
-        assert "did not answer within 8 s" in told
-    came = requests(forgetful)
-    assert {service: came[service] for service in commands.values()} == dict.fromkeys(
+    # With a second request, the command would succeed.
+    for text in errors(*((*command.split(), "--timeout", "8") for command in commands)):
+        assert "did not respond within 8 s" in text
+    received = requests(forgetful)
+    assert {service: received[service] for service in commands.values()} == dict.fromkeys(
         commands.values(), 1
     )
 
 
-def test_a_subscription_that_acknowledges_nothing_is_told(
+def test_a_missing_acknowledgment_prints_a_warning(
     forgetful: subprocess.Popen[str],
 ) -> None:
     arguments = ("--times", "2", "--rate", "0.5", "/lab/in", "std_msgs/msg/String")
@@ -80,7 +80,6 @@ def test_a_subscription_that_acknowledges_nothing_is_told(
     published, warning, hint = rest.splitlines()
     assert published.startswith("published #2: ")
     assert warning == (
-        "warning: not every reliable subscription to '/lab/in' has acknowledged what was"
-        " published within 1 s"
+        "warning: not every reliable subscription to '/lab/in' acknowledged all messages within 1 s"
     )
     assert "may be stopped" in hint

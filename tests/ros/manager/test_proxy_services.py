@@ -23,10 +23,10 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter
 
 from composer.drift import NodeSeen
-from composer.remote.lifecycle import Control, TransitionRefused
-from composer.remote.parameters import ParameterRefused, Parameters, names_by_node
+from composer.remote.lifecycle import LifecycleClient, TransitionError
+from composer.remote.parameters import ParameterClient, ParameterRejectedError, names_by_node
 from composer.remote.session import Deadline, Session
-from composer.remote.snapshot import Observer
+from composer.remote.snapshot import GraphObserver
 from tests.ros.support.commands import COMPOSE
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
@@ -123,25 +123,25 @@ def test_proxy_services_have_standard_types(system: RunningSystem, peer: Peer) -
 
 
 def test_commands_use_the_proxy_services(session: Session) -> None:
-    control = Control(session, Deadline(20.0))
-    assert control.find("talker") == TALKER
-    assert set(control.nodes()) >= {TALKER, "/whole"}
-    assert control.states([TALKER, "/whole"]) == {TALKER: "active", "/whole": "active"}
-    with pytest.raises(TransitionRefused, match="'configure' is not possible"):
-        control.change(TALKER, "configure")
-    assert str(control.take(TALKER, "unconfigured")) == f"{TALKER}: active -> unconfigured"
-    assert str(control.take(TALKER, "active")) == f"{TALKER}: unconfigured -> active"
-    assert [legal.label for legal in control.transitions(TALKER)] == ["deactivate", "shutdown"]
+    client = LifecycleClient(session, Deadline(20.0))
+    assert client.find("talker") == TALKER
+    assert set(client.nodes()) >= {TALKER, "/whole"}
+    assert client.states([TALKER, "/whole"]) == {TALKER: "active", "/whole": "active"}
+    with pytest.raises(TransitionError, match="'configure' is not possible"):
+        client.change_state(TALKER, "configure")
+    assert str(client.go_to_state(TALKER, "unconfigured")) == f"{TALKER}: active -> unconfigured"
+    assert str(client.go_to_state(TALKER, "active")) == f"{TALKER}: unconfigured -> active"
+    assert [legal.label for legal in client.transitions(TALKER)] == ["deactivate", "shutdown"]
 
 
 def test_parameters_are_those_of_the_node(session: Session) -> None:
     deadline = Deadline(20.0)
-    parameters = Parameters(session, deadline, "talker")
+    parameters = ParameterClient(session, deadline, "talker")
     assert {"label", "speed"} <= set(parameters.names())
     assert parameters.set({"speed": 4}) == {"speed": 4.0}
     assert parameters.values(["speed"]) == {"speed": 4.0}
     assert [item.name for item in parameters.describe(["speed", "label"])] == ["speed", "label"]
-    with pytest.raises(ParameterRefused, match="refused speed: "):
+    with pytest.raises(ParameterRejectedError, match="rejected speed: "):
         parameters.set({"speed": 9.0})
     listed = names_by_node(session, deadline)
     assert {"label", "speed"} <= set(listed[TALKER] or ())
@@ -155,10 +155,10 @@ def test_an_observer_reads_states_and_parameters(session: Session) -> None:
         assert node is not None
         return node
 
-    with Observer(session) as observer:
-        snapshot = observer.look(Deadline(20.0))
+    with GraphObserver(session) as observer:
+        snapshot = observer.snapshot(Deadline(20.0))
     assert (observed(TALKER).state, observed("/whole").state) == ("active", "active")
-    speed = Parameters(session, Deadline(20.0), TALKER).values(["speed"])
+    speed = ParameterClient(session, Deadline(20.0), TALKER).values(["speed"])
     assert (observed(TALKER).parameters or {})["speed"] == speed["speed"] > 1.0
     assert (observed("/whole").parameters or {})["size"] == 3
     assert not [name for name in observed("/lean/manager").parameters or {} if "speed" in name]

@@ -1,4 +1,4 @@
-"""The lifecycle of nodes in another process, written by hand with rclpy."""
+"""The lifecycle of plain rclpy nodes in another process."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from composer.remote.lifecycle import Control, TransitionRefused
-from composer.remote.name_matching import NotThere
-from composer.remote.session import Deadline, NoAnswer, Session
+from composer.remote.lifecycle import LifecycleClient, TransitionError
+from composer.remote.name_matching import NotFoundError
+from composer.remote.session import Deadline, NoResponseError, Session
 from tests.ros.support.commands import hand_written
 
 
@@ -27,82 +27,84 @@ def session() -> Iterator[Session]:
 
 
 @pytest.fixture
-def control(session: Session) -> Control:
-    return Control(session, Deadline(20.0))
+def client(session: Session) -> LifecycleClient:
+    return LifecycleClient(session, Deadline(20.0))
 
 
-def to_unconfigured(control: Control, node: str) -> None:
+def to_unconfigured(client: LifecycleClient, node: str) -> None:
     for transition in ("deactivate", "cleanup"):
-        if transition in [legal.label for legal in control.transitions(node)]:
-            control.change(node, transition)
+        if transition in [item.label for item in client.transitions(node)]:
+            client.change_state(node, transition)
 
 
-def test_all_nodes_are_found_with_their_states(control: Control) -> None:
+def test_all_nodes_are_listed_with_their_states(client: LifecycleClient) -> None:
     expected = ("/other/arm", "/other/planner", "/planning/planner")
-    control.find("/planning/planner")
-    assert control.nodes() == expected
-    assert control.states(expected) == dict.fromkeys(expected, "unconfigured")
+    client.find("/planning/planner")
+    assert client.nodes() == expected
+    assert client.states(expected) == dict.fromkeys(expected, "unconfigured")
 
 
-def test_a_node_is_found_by_its_full_name_and_by_the_last_part_of_just_one(
-    control: Control,
+def test_a_node_is_found_by_its_full_name_or_last_part(
+    client: LifecycleClient,
 ) -> None:
-    assert control.find("/planning/planner") == "/planning/planner"
-    assert control.find("arm") == "/other/arm"
-    assert control.find("planning/planner") == "/planning/planner"
+    assert client.find("/planning/planner") == "/planning/planner"
+    assert client.find("arm") == "/other/arm"
+    assert client.find("planning/planner") == "/planning/planner"
 
 
-def test_a_name_that_means_two_nodes_is_refused_with_both(control: Control) -> None:
-    with pytest.raises(NotThere, match="'planner' is more than one lifecycle node") as refusal:
-        control.find("planner")
-    assert refusal.value.hint == "say which: /other/planner, /planning/planner"
+def test_an_ambiguous_name_is_an_error(client: LifecycleClient) -> None:
+    with pytest.raises(
+        NotFoundError, match="'planner' matches more than one lifecycle node"
+    ) as raised:
+        client.find("planner")
+    assert raised.value.hint == "use a full name: /other/planner, /planning/planner"
 
 
 @pytest.mark.parametrize("name", ["planer", "/planning/planer"])
-def test_an_unknown_name_gets_the_nearest_one(control: Control, name: str) -> None:
-    with pytest.raises(NotThere) as refusal:
-        control.find(name)
-    assert refusal.value.hint in (
+def test_an_unknown_name_gets_a_suggestion(client: LifecycleClient, name: str) -> None:
+    with pytest.raises(NotFoundError) as raised:
+        client.find(name)
+    assert raised.value.hint in (
         "did you mean '/planning/planner'?",
         "did you mean '/other/planner'?",
     )
 
 
-def test_a_node_goes_where_it_is_told(control: Control) -> None:
+def test_a_transition(client: LifecycleClient) -> None:
     node = "/planning/planner"
-    to_unconfigured(control, node)
-    change = control.change(node, "configure")
+    to_unconfigured(client, node)
+    change = client.change_state(node, "configure")
     assert (change.before, change.after) == ("unconfigured", "inactive")
-    assert control.state(node) == "inactive"
-    labels = {transition.label for transition in control.transitions(node)}
+    assert client.state(node) == "inactive"
+    labels = {transition.label for transition in client.transitions(node)}
     assert labels == {"activate", "cleanup", "shutdown"}
-    to_unconfigured(control, node)
+    to_unconfigured(client, node)
 
 
 @pytest.mark.parametrize("transition", ["activate", "cleanup", "levitate", "transition_success"])
-def test_what_is_not_legal_is_never_sent_and_the_process_lives(
-    control: Control, transition: str, peer: subprocess.Popen[str]
+def test_an_unavailable_transition_is_not_requested(
+    client: LifecycleClient, transition: str, peer: subprocess.Popen[str]
 ) -> None:
-    to_unconfigured(control, "/planning/planner")
-    with pytest.raises(TransitionRefused) as refusal:
-        control.change("/planning/planner", transition)
-    assert (
-        str(refusal.value) == f"'{transition}' is not possible: /planning/planner is unconfigured"
-    )
-    assert refusal.value.hint == "possible now: configure, shutdown"
-    assert control.state("/planning/planner") == "unconfigured"
+    to_unconfigured(client, "/planning/planner")
+    with pytest.raises(TransitionError) as raised:
+        client.change_state("/planning/planner", transition)
+    assert str(raised.value) == f"'{transition}' is not possible: /planning/planner is unconfigured"
+    assert raised.value.hint == "available transitions: configure, shutdown"
+    assert client.state("/planning/planner") == "unconfigured"
     assert peer.poll() is None
 
 
-def test_a_transition_that_the_node_refuses_is_told_with_the_state(control: Control) -> None:
-    with pytest.raises(TransitionRefused, match="/other/arm refused 'configure'") as refusal:
-        control.change("/other/arm", "configure")
-    assert "it is unconfigured now" in str(refusal.value)
+def test_a_failed_transition_is_reported_with_the_state(
+    client: LifecycleClient,
+) -> None:
+    with pytest.raises(TransitionError, match="'configure' of /other/arm failed") as raised:
+        client.change_state("/other/arm", "configure")
+    assert "it is unconfigured now" in str(raised.value)
 
 
-def test_a_node_that_takes_too_long_is_given_up_in_time(session: Session) -> None:
+def test_a_slow_transition_times_out(session: Session) -> None:
     started_s = time.monotonic()
-    control = Control(session, Deadline(1.0))
-    with pytest.raises(NoAnswer, match="/other/planner did not answer within 1 s"):
-        control.change("/other/planner", "configure")
+    client = LifecycleClient(session, Deadline(1.0))
+    with pytest.raises(NoResponseError, match="/other/planner did not respond within 1 s"):
+        client.change_state("/other/planner", "configure")
     assert time.monotonic() - started_s < 5.0  # it takes 6 s

@@ -5,55 +5,55 @@ from pathlib import Path
 
 import pytest
 
-from composer.doctor.environment import discovery_range, look_at_environment
-from composer.doctor.finding import Finding, Level
-from composer.doctor.interfaces import look_at_interfaces
-from composer.doctor.network import look_at_network
-from composer.doctor.versions import rclpy_finding
+from composer.doctor.environment import check_environment, discovery_range
+from composer.doctor.interfaces import check_interfaces
+from composer.doctor.network import check_network
+from composer.doctor.result import CheckResult, Level
+from composer.doctor.versions import check_rclpy
 from composer.interfaces import Interfaces
 
 
-def bad(findings: list[Finding]) -> list[tuple[str, str]]:
-    return [(item.level.value, item.message) for item in findings if item.level is not Level.OK]
+def problems(results: list[CheckResult]) -> list[tuple[str, str]]:
+    return [(item.level.value, item.message) for item in results if item.level is not Level.OK]
 
 
 @pytest.mark.parametrize(
     ("environment", "level", "message"),
     [
         ({"ROS_DOMAIN_ID": "x"}, "error", "which is not a domain id"),
-        ({"ROS_DOMAIN_ID": "150"}, "warning", "other programs may be given its ports"),
-        ({"ROS_DISTRO": "humble"}, "warning", "made for jazzy"),
-        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, "warning", "no other process is found"),
+        ({"ROS_DOMAIN_ID": "150"}, "warning", "its ports may be in use by other programs"),
+        ({"ROS_DISTRO": "humble"}, "warning", "supports jazzy"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, "warning", "no other process is discovered"),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, "note", "other computers are not"),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOKALHOST"}, "error", "is not a discovery range"),
         ({"ROS_LOCALHOST_ONLY": "1"}, "warning", "deprecated"),
         ({"ROS_DISCOVERY_SERVER": "10.0.0.1:11811"}, "note", "10.0.0.1:11811"),
-        ({"FASTDDS_DEFAULT_PROFILES_FILE": "/gone.xml"}, "error", "which is no file"),
+        ({"FASTDDS_DEFAULT_PROFILES_FILE": "/gone.xml"}, "error", "which is not a file"),
         ({"AMENT_PREFIX_PATH": "/gone/install"}, "warning", "'/gone/install'"),
         ({"ROS_SECURITY_ENABLE": "true"}, "error", "ROS_SECURITY_KEYSTORE is not set"),
     ],
 )
-def test_a_variable_that_is_not_well_is_told(
+def test_problematic_variables_are_reported(
     environment: dict[str, str], level: str, message: str
 ) -> None:
-    ((found_level, found),) = bad(list(look_at_environment(environment)))
+    ((found_level, found),) = problems(list(check_environment(environment)))
     assert found_level == level
     assert message in found
 
 
-def test_every_variable_that_hinders_a_start_is_told_at_once() -> None:
+def test_all_invalid_variables_are_reported() -> None:
     environment = {"ROS_DOMAIN_ID": "-1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "HERE"}
-    assert [level for level, _ in bad(list(look_at_environment(environment)))] == ["error"] * 2
+    assert [level for level, _ in problems(list(check_environment(environment)))] == ["error"] * 2
 
 
 @pytest.mark.parametrize("domain_id", ["", "0", "101", "215", "232"])
-def test_a_plain_environment_is_fine(domain_id: str) -> None:
-    (finding,) = look_at_environment({"ROS_DOMAIN_ID": domain_id})
-    assert finding.level is Level.OK
-    assert f"ROS_DOMAIN_ID {domain_id or '0'}, discovery range SUBNET" in finding.message
+def test_a_valid_environment_is_ok(domain_id: str) -> None:
+    (result,) = check_environment({"ROS_DOMAIN_ID": domain_id})
+    assert result.level is Level.OK
+    assert f"ROS_DOMAIN_ID {domain_id or '0'}, discovery range SUBNET" in result.message
 
 
-def test_the_default_discovery_range_is_the_subnet() -> None:
+def test_the_default_discovery_range_is_subnet() -> None:
     assert discovery_range({}) == "SUBNET"
     assert discovery_range({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}) == "SUBNET"
     assert discovery_range({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}) == "OFF"
@@ -64,62 +64,62 @@ def device(folder: Path, name: str, flags: int) -> None:
     (folder / name / "flags").write_text(f"{flags:#x}\n")
 
 
-def test_only_interfaces_that_are_up_and_have_multicast_reach_others(tmp_path: Path) -> None:
+def test_usable_interfaces_are_up_and_support_multicast(tmp_path: Path) -> None:
     device(tmp_path, "lo", 0x1009)
     device(tmp_path, "down", 0x1002)
     device(tmp_path, "tunnel", 0x91)
-    found = list(look_at_network("SUBNET", devices=tmp_path, shared_memory=None))
+    found = list(check_network("SUBNET", devices=tmp_path, shared_memory=None))
     assert "no network interface is up" in found[0].message
     device(tmp_path, "eth0", 0x1003)
-    found = list(look_at_network("SUBNET", devices=tmp_path, shared_memory=None))
+    found = list(check_network("SUBNET", devices=tmp_path, shared_memory=None))
     assert found[0].message == "interfaces with multicast: eth0"
 
 
-def test_the_network_does_not_matter_on_one_computer(tmp_path: Path) -> None:
-    assert list(look_at_network("LOCALHOST", devices=tmp_path, shared_memory=None)) == []
+def test_the_network_is_not_checked_for_localhost(tmp_path: Path) -> None:
+    assert list(check_network("LOCALHOST", devices=tmp_path, shared_memory=None)) == []
 
 
-def test_only_segments_that_nobody_holds_are_left_behind(tmp_path: Path) -> None:
+def test_unlocked_segments_are_leftovers(tmp_path: Path) -> None:
     for name in ("fastrtps_dead_el", "fastrtps_alive_el", "other"):
         (tmp_path / name).write_bytes(b"")
     with (tmp_path / "fastrtps_alive_el").open("rb") as held:
         fcntl.flock(held, fcntl.LOCK_EX)
-        ((level, message),) = bad(list(look_at_network("OFF", shared_memory=tmp_path)))
+        ((level, message),) = problems(list(check_network("OFF", shared_memory=tmp_path)))
     assert level == "note"
     assert message.startswith("1 shared memory segment of")
 
 
-def test_rclpy_is_judged_by_its_version() -> None:
-    assert rclpy_finding(has_rclpy=True, found="7.1.6").level is Level.OK
-    assert rclpy_finding(has_rclpy=True, found=None).level is Level.OK
-    other = rclpy_finding(has_rclpy=True, found="3.3.11")
+def test_the_version_of_rclpy_is_checked() -> None:
+    assert check_rclpy(has_rclpy=True, found="7.1.6").level is Level.OK
+    assert check_rclpy(has_rclpy=True, found=None).level is Level.OK
+    other = check_rclpy(has_rclpy=True, found="3.3.11")
     assert (other.level, other.remedy is None) == (Level.WARNING, False)
-    missing = rclpy_finding(has_rclpy=False, found=None)
+    missing = check_rclpy(has_rclpy=False, found=None)
     assert missing.level is Level.ERROR
     assert "ros2-composer[ros]" in (missing.remedy or "")
 
 
-def test_interface_packages_that_are_not_built_are_told(tmp_path: Path) -> None:
+def test_interface_packages_that_are_not_built_are_reported(tmp_path: Path) -> None:
     package = tmp_path / "arm_interfaces"
     (package / "msg").mkdir(parents=True)
     (package / "package.xml").write_text("<package><name>arm_interfaces</name></package>")
     (package / "msg" / "Grip.msg").write_text("float64 force\n")
     sources = Interfaces.load([tmp_path])
-    (finding,) = look_at_interfaces(["arm_interfaces"], sources, Interfaces.load())
-    assert (finding.level, finding.area) == (Level.ERROR, "interfaces")
-    assert "'arm_interfaces' is not built" in finding.message
-    assert "colcon build --packages-select arm_interfaces" in (finding.remedy or "")
+    (result,) = check_interfaces(["arm_interfaces"], sources, Interfaces.load())
+    assert (result.level, result.area) == (Level.ERROR, "interfaces")
+    assert "'arm_interfaces' is not built" in result.message
+    assert "colcon build --packages-select arm_interfaces" in (result.remedy or "")
 
 
-def test_interface_packages_built_from_other_definitions_are_told(tmp_path: Path) -> None:
-    # A package that can be imported anywhere stands for one that is built.
+def test_outdated_interface_packages_are_reported(tmp_path: Path) -> None:
+    # A package of the standard library stands in for one that is built.
     for folder, field in (("new", "float64 force"), ("old", "float32 force")):
         package = tmp_path / folder / "json"
         (package / "msg").mkdir(parents=True)
         (package / "package.xml").write_text("<package><name>json</name></package>")
         (package / "msg" / "Grip.msg").write_text(field + "\n")
     new, old = (Interfaces.load([tmp_path / name]) for name in ("new", "old"))
-    (finding,) = look_at_interfaces(["json"], new, old)
-    assert finding.message.endswith("built from other definitions of json/msg/Grip")
-    (finding,) = look_at_interfaces(["json"], new, new)
-    assert finding == Finding("interfaces", Level.OK, "built: json")
+    (result,) = check_interfaces(["json"], new, old)
+    assert result.message.endswith("built from different definitions of json/msg/Grip")
+    (result,) = check_interfaces(["json"], new, new)
+    assert result == CheckResult("interfaces", Level.OK, "built: json")

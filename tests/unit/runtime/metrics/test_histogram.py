@@ -10,8 +10,13 @@ from typing import Any
 
 import pytest
 
-from composer.cli.support.callback_table import callback_table
-from composer.cli.support.top_table import Sorting, as_json, sorted_rates, table
+from composer.cli.support.callback_tables import (
+    SortKey,
+    sorted_rates,
+    summary_table,
+    top_data,
+    top_table,
+)
 from composer.runtime.metrics.figures import CallbackFigures, figures, rates
 from composer.runtime.metrics.histogram import BOUNDS_S, TOGETHER, Durations
 from composer.runtime.metrics.statistics import CallbackStatistics, Statistics
@@ -146,24 +151,24 @@ def two_reports() -> tuple[Any, Any]:
 @pytest.mark.parametrize(
     ("sorting", "first"),
     [
-        (Sorting.BUSY, "/b"),
-        (Sorting.CALLS, "/a"),
-        (Sorting.MEAN, "/b"),
-        (Sorting.P99, "/a"),
-        (Sorting.MAX, "/b"),
-        (Sorting.LATE, "/a"),
-        (Sorting.DROPPED, "/b"),
-        (Sorting.NODE, "/a"),
+        (SortKey.BUSY, "/b"),
+        (SortKey.CALLS, "/a"),
+        (SortKey.MEAN, "/b"),
+        (SortKey.P99, "/a"),
+        (SortKey.MAX, "/b"),
+        (SortKey.LATE, "/a"),
+        (SortKey.DROPPED, "/b"),
+        (SortKey.NODE, "/a"),
     ],
 )
-def test_top_puts_first_what_is_asked_for(sorting: Sorting, first: str) -> None:
+def test_top_puts_first_what_is_asked_for(sorting: SortKey, first: str) -> None:
     assert sorted_rates(*two_reports(), sorting)[0].figures.node == first
 
 
 def test_top_shows_a_line_a_callback_and_no_more_than_there_is_room_for() -> None:
     before, now = two_reports()
-    found = sorted_rates(before, now, Sorting.NODE)
-    assert table(now, found) == (
+    found = sorted_rates(before, now, SortKey.NODE)
+    assert top_table(now, found) == (
         "/robot: running, 2 of 2 nodes active (host robot1, process 12), callbacks 30.0 % busy\n"
         "node  callback             calls/s  busy %  mean ms  p99 ms  max ms  late ms  over  "
         "dropped\n"
@@ -171,12 +176,12 @@ def test_top_shows_a_line_a_callback_and_no_more_than_there_is_room_for() -> Non
         "/b    subscription 'scan'     10.0   20.00   20.000   2.000  30.000                 "
         "      8"
     )
-    assert table(now, found, 3).splitlines()[2:] == ["2 more"]
-    assert as_json(now, found)["callbacks"][0]["calls_hz"] == 50.0
+    assert top_table(now, found, 3).splitlines()[2:] == ["2 more"]
+    assert top_data(now, found)["callbacks"][0]["calls_hz"] == 50.0
 
 
 def test_the_summary_shows_what_took_most_time() -> None:
     _, now = two_reports()
-    lines = callback_table(now.callbacks, 1).splitlines()
+    lines = summary_table(now.callbacks, 1).splitlines()
     assert lines[1].split()[0] == "/b"
     assert lines[2] == "1 more callbacks took less time"

@@ -1,25 +1,26 @@
-"""What a command raises when it cannot do what it was asked to."""
+"""Errors that end a command with a message and an exit code."""
 
 from __future__ import annotations
 
-FINDINGS = 1
+#: Exit codes; 0 is success and 3 an internal error.
+FAILED = 1
 USAGE = 2
 
 
-class Failure(Exception):
-    """An end that the person at the terminal can do something about.
+class CommandError(Exception):
+    """An error that the user can fix.
 
-    ``hint`` says what to do, in the imperative; ``exit_code`` is 1 or 2 (see the package).
+    ``hint`` says how, in the imperative; ``exit_code`` is FAILED or USAGE.
     """
 
-    def __init__(self, message: str, *, hint: str | None = None, exit_code: int = FINDINGS) -> None:
+    def __init__(self, message: str, *, hint: str | None = None, exit_code: int = FAILED) -> None:
         super().__init__(message)
         self.message = message
         self.hint = hint
         self.exit_code = exit_code
 
     def text(self) -> str:
-        """Return the lines for stderr, with nothing in them that could steer the terminal."""
+        """Return the lines for stderr, without control characters."""
         from composer.report.display import visible
 
         lines = [f"compose: {self.message}"]
@@ -28,7 +29,7 @@ class Failure(Exception):
         return "\n".join(map(visible, lines))
 
 
-class UsageFailure(Failure):
+class UsageError(CommandError):
     """The command line itself is wrong."""
 
     def __init__(self, message: str, *, hint: str | None = None) -> None:

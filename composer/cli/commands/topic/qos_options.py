@@ -1,4 +1,4 @@
-"""The ``--qos-*`` options of topic commands, as ros2 has them."""
+"""The ``--qos-*`` options of topic commands, named as in ros2."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Annotated, Any
 
 import typer
 
-from composer.cli.support.finite import finite
-from composer.cli.support.option_groups import option_group
+from composer.cli.commands.topic.option_groups import option_group
+from composer.cli.support.options import finite
 from composer.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
 
 
 class Preset(StrEnum):
-    """The presets of the language."""
+    """The QoS presets of the language."""
 
     SENSOR_DATA = "sensor_data"
     COMMAND = "command"
@@ -25,16 +25,16 @@ class Preset(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class QosWish:
-    """What the options say of a profile; None where they say nothing.
+class QosOptions:
+    """The QoS policies given as options, None where not given.
 
     Each field is the option ``--qos-<field>``.
     """
 
-    profile: Annotated[Preset | None, typer.Option(help="A preset.")] = None
+    profile: Annotated[Preset | None, typer.Option(help="QoS preset.")] = None
     history: Annotated[History | None, typer.Option()] = None
     depth: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="How many messages are kept.")
+        int | None, typer.Option(min=1, metavar="N", help="Queue size with keep_last.")
     ] = None
     reliability: Annotated[Reliability | None, typer.Option()] = None
     durability: Annotated[Durability | None, typer.Option()] = None
@@ -44,7 +44,7 @@ class QosWish:
     ] = None
 
     def applied_to(self, start: QosProfile) -> QosProfile:
-        """Return ``start``, or the preset, with the policies that are given."""
+        """Return ``start``, or the preset, with the given policies."""
         lease_s = self.liveliness_lease_duration_seconds
         policies = {
             "history": self.history,
@@ -60,5 +60,5 @@ class QosWish:
         return replace(start if self.profile is None else PRESETS[self.profile.value], **given)
 
 
-#: For commands with a parameter ``qos``, which is a QosWish.
-takes_qos_options = option_group("qos", QosWish, prefix="qos_")
+#: For commands with a parameter ``qos``, which is a QosOptions.
+qos_options = option_group("qos", QosOptions, prefix="qos_")

@@ -1,4 +1,4 @@
-"""Options that several commands share, said once: each a field of a dataclass."""
+"""Groups of options that several commands share, each declared as a dataclass."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ Command = Callable[..., None]
 
 
 def option_group(parameter: str, group: type, prefix: str = "") -> Callable[[Command], Command]:
-    """Give a command the options of ``group`` in place of its ``parameter``, which is a group.
+    """Return a decorator that replaces ``parameter`` of a command by the options of ``group``.
 
-    Each field of the dataclass is an option, with its annotation and its default; ``prefix`` comes
-    before the names of all.
+    Each field of the dataclass is an option, with its annotation and its default; ``prefix`` is put
+    before all names. The command receives an instance of ``group``.
     """
     names = [field.name for field in fields(group)]
 
-    def take(command: Command) -> Command:
+    def decorate(command: Command) -> Command:
         @wraps(command)
         def with_options(**given: Any) -> None:
-            found = group(**{name: given.pop(prefix + name) for name in names})
-            command(**given, **{parameter: found})
+            instance = group(**{name: given.pop(prefix + name) for name in names})
+            command(**given, **{parameter: instance})
 
         signature = inspect.signature(command, eval_str=True)
         parameters: list[inspect.Parameter] = []
         for known in signature.parameters.values():
             parameters += _options(group, prefix) if known.name == parameter else [known]
-        # It is from here that typer learns the options.
-        shown = signature.replace(parameters=parameters)
-        with_options.__signature__ = shown  # type: ignore[attr-defined]
+        # typer reads the options from the signature.
+        expanded = signature.replace(parameters=parameters)
+        with_options.__signature__ = expanded  # type: ignore[attr-defined]
         return with_options
 
-    return take
+    return decorate
 
 
 def _options(group: type, prefix: str) -> list[inspect.Parameter]:

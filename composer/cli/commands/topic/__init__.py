@@ -1,4 +1,4 @@
-"""``compose topic``: what goes over topics of the ROS graph, whoever publishes it."""
+"""``compose topic``: the topics of the ROS graph."""
 
 from __future__ import annotations
 
@@ -6,21 +6,29 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from composer.cli.commands.topic_echo import echo
-from composer.cli.commands.topic_pub import pub
-from composer.cli.commands.topic_rates import bw, delay, hz
-from composer.cli.support.help import examples
-from composer.cli.support.listing import Count, Hidden, Json, ShowTypes, print_names
-from composer.cli.support.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.commands.topic.echo import echo
+from composer.cli.commands.topic.pub import pub
+from composer.cli.commands.topic.rates import bw, delay, hz
+from composer.cli.commands.topic.receiving import Topic
+from composer.cli.support.options import (
+    DEFAULT_TIMEOUT_S,
+    Count,
+    Hidden,
+    Json,
+    ShowTypes,
+    Timeout,
+    examples,
+)
+from composer.cli.support.output import as_json, print_names
+from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import write
-from composer.cli.support.values import as_json
 
 if TYPE_CHECKING:
     from composer.qos import QosProfile
     from composer.runtime.ros.endpoints import End, TopicInfo
 
 app = typer.Typer(
-    help="See what goes over topics, measure it, and publish.",
+    help="List, inspect, measure and publish topics.",
     epilog=examples(
         "compose topic list -t",
         "compose topic echo /sensor_data --once",
@@ -41,27 +49,28 @@ def list_topics(
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """List the topics."""
+    """List topics."""
     with ros_session("compose topic", timeout) as (session, deadline):
-        from composer.remote.graph_names import Names
+        from composer.remote.graph_names import GraphNames
 
-        topics = Names(session, deadline).topics(hidden=hidden)
+        topics = GraphNames(session, deadline).topics(hidden=hidden)
     print_names("topic", topics, types=types, count=count, json=json)
 
 
 @app.command("info", epilog=examples("compose topic info -v /sensor_data"))
 def info(
-    topic: Annotated[str, typer.Argument(metavar="TOPIC")],
+    topic: Topic,
     *,
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Each end with its node and QoS.")
+        bool,
+        typer.Option("--verbose", "-v", help="Print the node and QoS profile of each endpoint."),
     ] = False,
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Print the type of a topic and who is at its ends.
+    """Print the type and the endpoints of a topic.
 
-    The depth of a queue is not told to other processes, so it is not shown.
+    Queue depths are not shown because DDS does not announce them to other processes.
     """
     with ros_session("compose topic", timeout) as (session, deadline):
         from composer.remote.topics import Topics
@@ -72,20 +81,23 @@ def info(
 
 def _as_text(found: TopicInfo, verbose: bool) -> str:
     lines = [f"Type: {', '.join(found.types)}"]
-    for title, ends in (("Publisher", found.publishers), ("Subscription", found.subscriptions)):
-        lines.append(f"{title} count: {len(ends)}")
+    for title, endpoints in (
+        ("Publisher", found.publishers),
+        ("Subscription", found.subscriptions),
+    ):
+        lines.append(f"{title} count: {len(endpoints)}")
         if verbose:
-            lines += [f"  {line}" for end in ends for line in _end_lines(end)]
+            lines += [f"  {line}" for item in endpoints for line in _endpoint_lines(item)]
     return "\n".join(lines)
 
 
-def _end_lines(end: End) -> list[str]:
-    policies = ", ".join(f"{name}: {value}" for name, value in _policies(end.qos).items())
-    return [f"{end.node}  {end.type}", f"  {policies}"]
+def _endpoint_lines(endpoint: End) -> list[str]:
+    policies = ", ".join(f"{name}: {value}" for name, value in _policies(endpoint.qos).items())
+    return [f"{endpoint.node}  {endpoint.type}", f"  {policies}"]
 
 
 def _policies(profile: QosProfile) -> dict[str, Any]:
-    """Return the policies that other processes are told of, where they say something."""
+    """Return the policies that are announced to other processes, without unset durations."""
     policies: dict[str, Any] = {
         "reliability": profile.reliability.value,
         "durability": profile.durability.value,
@@ -103,8 +115,11 @@ def _as_data(found: TopicInfo) -> dict[str, Any]:
         "name": found.name,
         "types": list(found.types),
         **{
-            key: [{"node": end.node, "type": end.type, "qos": _policies(end.qos)} for end in ends]
-            for key, ends in (
+            key: [
+                {"node": item.node, "type": item.type, "qos": _policies(item.qos)}
+                for item in endpoints
+            ]
+            for key, endpoints in (
                 ("publishers", found.publishers),
                 ("subscriptions", found.subscriptions),
             )

@@ -1,4 +1,4 @@
-"""``compose topic pub``: publish from the command line."""
+"""``compose topic pub``: publish messages."""
 
 from __future__ import annotations
 
@@ -6,32 +6,38 @@ from typing import Annotated
 
 import typer
 
-from composer.cli.support.finite import finite
-from composer.cli.support.listing import Json
-from composer.cli.support.qos_options import QosWish, takes_qos_options
-from composer.cli.support.ros import DEFAULT_TIMEOUT_S, Timeout, ros_session
+from composer.cli.commands.topic.qos_options import QosOptions, qos_options
+from composer.cli.commands.topic.receiving import Topic
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, finite
+from composer.cli.support.output import as_json
+from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import say, write
-from composer.cli.support.values import as_json
 
 
-@takes_qos_options
+@qos_options
 def pub(
-    topic: Annotated[str, typer.Argument(metavar="TOPIC")],
-    type_name: Annotated[str, typer.Argument(metavar="TYPE", help="std_msgs/msg/String")],
+    topic: Topic,
+    type_name: Annotated[
+        str, typer.Argument(metavar="TYPE", help="The message type, such as std_msgs/msg/String.")
+    ],
     content: Annotated[
         str,
         typer.Argument(
             metavar="[VALUES]",
-            help="The fields as YAML; {expressions} may use count and now.",
+            help="The fields as YAML; {expressions} can use count and now.",
             show_default=False,
         ),
     ] = "{}",
     *,
     rate: Annotated[
         float,
-        typer.Option("--rate", "-r", min=0.001, callback=finite, metavar="HZ", help="How often."),
+        typer.Option(
+            "--rate", "-r", min=0.001, callback=finite, metavar="HZ", help="Messages per second."
+        ),
     ] = 1.0,
-    once: Annotated[bool, typer.Option("--once", "-1", help="Publish once and end.")] = False,
+    once: Annotated[
+        bool, typer.Option("--once", "-1", help="Publish one message and exit.")
+    ] = False,
     times: Annotated[
         int | None,
         typer.Option(
@@ -39,7 +45,7 @@ def pub(
             "-t",
             min=1,
             metavar="N",
-            help="Publish N times and end.",
+            help="Publish N messages and exit.",
             show_default="until Ctrl-C",
         ),
     ] = None,
@@ -50,32 +56,31 @@ def pub(
             "-w",
             min=0,
             metavar="N",
-            help="Wait for N subscriptions first.",
-            show_default="1 with --once or --times",
+            help="Wait for N subscriptions before publishing.",
+            show_default="1 with --once or --times, else 0",
         ),
     ] = None,
     every: Annotated[
-        int, typer.Option("--print", "-p", min=1, metavar="N", help="Tell of every Nth message.")
+        int, typer.Option("--print", "-p", min=1, metavar="N", help="Print every Nth message.")
     ] = 1,
     json: Json = False,
-    qos: QosWish,
+    qos: QosOptions,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Publish messages on a topic.
+    """Publish messages to a topic.
 
-    The time limit is for the subscriptions that are waited for. A warning says at the end if a
-    reliable one has not acknowledged within a second what was published. With --json each message
-    is printed, as it was published, as one JSON object a line.
+    --timeout limits the wait for subscriptions. At the end, a warning is printed if a reliable
+    subscription has not acknowledged all messages within one second.
     """
     from composer.qos import PRESETS
 
     limit = 1 if once else times
     with ros_session("compose topic", timeout, carries_messages=True) as (session, deadline):
         from composer.remote.name_matching import full_name
-        from composer.remote.publishing import NotAcknowledged, Publishing, publish
+        from composer.remote.topics import NotAcknowledgedError, Publication, publish
         from composer.remote.values import class_of, compile_content, to_plain
 
-        publishing = Publishing(
+        publication = Publication(
             topic=full_name("topic", topic),
             type_name=type_name,
             build=compile_content(content, class_of(type_name), "the message"),
@@ -85,12 +90,12 @@ def pub(
             wait_for=wait_for if wait_for is not None else int(limit is not None),
         )
         try:
-            for number, message in enumerate(publish(session, deadline, publishing), 1):
+            for number, message in enumerate(publish(session, deadline, publication), 1):
                 if number % every:
                     continue
                 if json:
                     write(as_json(to_plain(message)))
                 else:
                     say(f"published #{number}: {message}")
-        except NotAcknowledged as error:  # it is published, and may have arrived
+        except NotAcknowledgedError as error:  # published, and possibly received
             say(f"warning: {error}\n  {error.hint}")

@@ -1,0 +1,48 @@
+"""Results of commands on stdout: YAML for people, JSON for programs, and lists of names."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from composer.cli.support.terminal import columns, say, write
+
+
+def as_yaml(value: Any, *, one_line: bool = False) -> str:
+    """Return plain data as YAML, keys in their order."""
+    import yaml
+
+    text: str = yaml.safe_dump(
+        value,
+        sort_keys=False,
+        allow_unicode=True,
+        width=float("inf") if one_line else 120,
+        default_flow_style=one_line,
+    )
+    return text.removesuffix("\n...\n").rstrip("\n")  # the dots end a document of one scalar
+
+
+def as_json(value: Any, *, indent: int | None = None) -> str:
+    """Return plain data as JSON; one line unless ``indent`` is given."""
+    return json.dumps(value, ensure_ascii=False, indent=indent)
+
+
+def print_names(
+    kind: str, named: Sequence[tuple[str, tuple[str, ...]]], *, types: bool, count: bool, json: bool
+) -> None:
+    """Print names, optionally with their types, or the number of names."""
+    if count:
+        write(str(len(named)))
+    elif json:
+        write(as_json([{"name": name, "types": list(found)} for name, found in named], indent=2))
+    elif named:
+        rows = [(name, ", ".join(found)) if types else (name,) for name, found in named]
+        write(columns(rows))
+    else:
+        say_none_found(kind)
+
+
+def say_none_found(kind: str) -> None:
+    """Explain an empty list on stderr."""
+    say(f"no {kind} found: check that the system is running and that ROS_DOMAIN_ID is the same")

@@ -1,0 +1,110 @@
+"""The process of ``compose run``: started in the background, and ended even if it hangs."""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import NoReturn, TextIO
+
+from composer.cli.support.errors import CommandError
+
+#: Holds the file descriptor on which a background process reports that the system is up.
+READY_VARIABLE = "COMPOSE_READY_FD"
+_LOG_TAIL_LINES = 20
+_MIN_DELAY_S = 0.001
+_LAST_RESORT_S = 1.0
+
+
+def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> str:
+    """Start ``compose run`` with ``arguments``; return its report once the system is up.
+
+    Its output goes to a file in the ROS log folder. Raises CommandError with the last lines of that
+    file if the process ends first. After ``limit_s`` seconds without a report the process is
+    killed.
+    """
+    log = _log_path(system)
+    log.parent.mkdir(parents=True, exist_ok=True)
+    reading, writing = os.pipe()
+    with os.fdopen(reading, encoding="utf-8") as pipe, log.open("wb") as output:
+        try:
+            process = subprocess.Popen(  # noqa: S603 - this very program
+                [sys.executable, "-m", "composer", "run", *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                env={**os.environ, READY_VARIABLE: str(writing)},
+                pass_fds=(writing,),
+                start_new_session=True,  # survive Ctrl-C and the end of the terminal
+            )
+        finally:
+            os.close(writing)
+        try:
+            report = _read_within(pipe, limit_s)
+        except KeyboardInterrupt:
+            process.terminate()
+            process.wait()
+            raise
+    if report is None:
+        os.killpg(process.pid, signal.SIGKILL)  # its own time limits did not work
+        process.wait()
+        raise _start_error(f"the system did not come up within {limit_s:g} s and was killed:", log)
+    if not report:
+        process.wait()
+        raise _start_error(f"the system did not come up (exit code {process.returncode}):", log)
+    return f"{report} (process {process.pid}, log {log})"
+
+
+def report_ready(text: str) -> None:
+    """Report to the command that started this process in the background that the system is up."""
+    descriptor = os.environ.pop(READY_VARIABLE, None)
+    if descriptor is not None:
+        with os.fdopen(int(descriptor), "w", encoding="utf-8") as pipe:
+            pipe.write(text)
+
+
+def end_within(limit_s: float | None) -> None:
+    """End this process after ``limit_s`` seconds with exit code 1; None cancels that.
+
+    The Python stacks of all threads are printed first. None of this needs the interpreter: code in
+    C that hangs may hold the GIL, and then no Python signal handler runs. SIGALRM ends the process
+    if the interpreter has already shut down.
+    """
+    faulthandler.cancel_dump_traceback_later()
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    if limit_s is not None:
+        faulthandler.dump_traceback_later(max(limit_s, _MIN_DELAY_S), exit=True)
+        signal.setitimer(signal.ITIMER_REAL, limit_s + _LAST_RESORT_S)
+
+
+def end_now(exit_code: int) -> NoReturn:
+    """End this process without waiting for its threads."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(exit_code)
+
+
+def _read_within(pipe: TextIO, limit_s: float) -> str | None:
+    """Return what is written to a pipe until it is closed; None after ``limit_s`` seconds."""
+    ready, _, _ = select.select([pipe], [], [], limit_s)
+    return pipe.read() if ready else None
+
+
+def _start_error(message: str, log: Path) -> CommandError:
+    tail = log.read_text(encoding="utf-8", errors="replace").splitlines()[-_LOG_TAIL_LINES:]
+    return CommandError(message, hint="\n".join([*tail, f"full log: {log}"]))
+
+
+def _log_path(system: str) -> Path:
+    """Return a new file name in the ROS log folder."""
+    from composer.runtime.process.environment import log_folder
+
+    folder = log_folder(os.environ) or Path.home() / ".ros" / "log"
+    now = datetime.now().astimezone().strftime("%Y-%m-%d-%H-%M-%S")
+    return folder / f"{system}-{now}-{os.getpid()}.log"

@@ -1,0 +1,175 @@
+"""The SYSTEM argument of commands: a file, the name of an example system, or a running system."""
+
+from __future__ import annotations
+
+import glob
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.terminal import say, use_color
+
+if TYPE_CHECKING:
+    from composer.loading import LoadResult
+
+#: Suffixes of folders and files that are suggested for a mistyped path.
+_SUFFIXES = ("", ".yaml", ".yml")
+
+
+def complete_system(incomplete: str) -> list[str]:
+    """Complete the names of example systems, and paths."""
+    names = [name for name in example_systems() if name.startswith(incomplete)]
+    return [*names, *_matching_paths(incomplete)]
+
+
+SystemName = Annotated[
+    str,
+    typer.Argument(
+        metavar="SYSTEM",
+        help="A system file, or the name of an example system.",
+        show_default=False,
+        autocompletion=complete_system,
+    ),
+]
+RunningSystem = Annotated[
+    str,
+    typer.Argument(
+        metavar="SYSTEM",
+        help="The name of a running system (pipeline, /robot1/pipeline), or its file.",
+        show_default=False,
+    ),
+]
+#: The default is every running system, or the only one.
+AnyRunningSystem = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[SYSTEM]", help="The name of a running system, or its file.", show_default=False
+    ),
+]
+
+
+def system_file(text: str) -> Path:
+    """Return the path ``text``, or the file of the example system with that name.
+
+    Raises UsageError.
+    """
+    path = Path(text)
+    if _is_folder(path):
+        raise UsageError(f"'{text}' is a folder, not a system file")
+    if path_exists(path):
+        return path  # the loader reports what is wrong with it
+    examples = example_systems()
+    if text in examples:
+        return examples[text]
+    from composer.diagnostics import nearest
+
+    close = nearest_path(path) or nearest(text, examples)
+    listed = "example systems: " + ", ".join(sorted(examples))
+    raise UsageError(
+        f"there is no file '{text}' and no example system of that name",
+        hint=listed if close is None else f"did you mean '{close}'?\n{listed}",
+    )
+
+
+def example_systems() -> dict[str, Path]:
+    """Return the bundled example systems, by name."""
+    from composer.resources import systems_folder
+
+    return {path.stem: path for path in sorted(systems_folder().glob("*.yaml"))}
+
+
+def path_exists(path: Path) -> bool:
+    """Say whether ``path`` exists; True where that cannot be determined."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return True
+
+
+def nearest_path(path: Path) -> Path | None:
+    """Return the existing path most similar to ``path``, which does not exist, or None."""
+    from composer.diagnostics import nearest
+
+    folder: Path | None = path.parent
+    if path.parent != path and not _is_folder(path.parent):
+        folder = nearest_path(path.parent)
+    if folder is None:
+        return None
+    try:
+        entries = [item for item in folder.iterdir() if item.suffix in _SUFFIXES and item != path]
+    except OSError:
+        return None
+    by_stem = {entry.stem: entry for entry in entries}
+    close = nearest(path.stem, by_stem)
+    return None if close is None else by_stem[close]
+
+
+def load_system(
+    path: Path,
+    *,
+    shown: str | None = None,
+    settings: Iterable[str] = (),
+    namespace: str | None = None,
+    use_sim_time: bool = False,
+) -> LoadResult:
+    """Read and check the system in ``path``; print errors and warnings to stderr.
+
+    Only ``compose validate`` reports diagnostics of severity info.
+    """
+    from composer.diagnostics import Severity
+    from composer.loading import load
+    from composer.report.text import render
+    from composer.resolve import OverrideOptions
+
+    loading = load(
+        path,
+        shown=str(path) if shown is None or not path_exists(Path(shown)) else shown,
+        overrides=OverrideOptions(tuple(settings), namespace, use_sim_time),
+    )
+    reported = [item for item in loading.diagnostics if item.severity is not Severity.INFO]
+    if reported:
+        say(render(reported, color=use_color(sys.stderr)))
+    return loading
+
+
+def running_system_name(text: str) -> str:
+    """Return the name of a running system; for a file, the name of the system in it.
+
+    Raises CommandError if the file cannot be read or is not a system.
+    """
+    if not text.endswith((".yaml", ".yml")):
+        return text
+    from composer.document import read_document
+    from composer.tree import Scalar
+
+    tree, _, diagnostics = read_document(Path(text))
+    name = tree.get("system") if tree is not None else None
+    if isinstance(name, Scalar) and isinstance(name.value, str):
+        return name.value
+    reason = diagnostics[0].message if diagnostics else "it has no key 'system'"
+    hint = diagnostics[0].hint if diagnostics else None
+    raise CommandError(f"'{text}' is not a system: {reason}", hint=hint)
+
+
+def _matching_paths(incomplete: str) -> Iterable[str]:
+    """Yield the folders and YAML files that start with ``incomplete``, written the same way."""
+    typed, _, last = incomplete.rpartition("/")
+    prefix = f"{typed}/" if "/" in incomplete else ""
+    for path in sorted(Path(prefix or ".").glob(f"{glob.escape(last)}*")):
+        if path.name.startswith("."):
+            continue
+        if path.is_dir():
+            yield f"{prefix}{path.name}/"
+        elif path.suffix in (".yaml", ".yml"):
+            yield f"{prefix}{path.name}"
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
