@@ -35,7 +35,8 @@ from composer.model.dependencies import dependency_edges, in_dependency_order
 from composer.names import join
 from composer.plan import Fault, Plan
 from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
-from composer.runtime.node.node import NodeListener, ProcessContext, RunningNode
+from composer.runtime.node.node import NodeListener, RunningNode
+from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import StartRefused
 from composer.runtime.process.dds_profiles import use_large_system_profile
 from composer.runtime.process.environment import prepare_environment

@@ -37,7 +37,8 @@ from composer.runtime.manager.proxy_services import ProxyServices
 from composer.runtime.manager.status_messages import status_message
 from composer.runtime.metrics.diagnostics import Figures, to_message
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
-from composer.runtime.node.node import ProcessContext, RunningNode
+from composer.runtime.node.node import RunningNode
+from composer.runtime.node.options import ProcessContext
 from composer.runtime.ros.manager_protocol import (
     CALLBACKS_QOS,
     CALLBACKS_TOPIC,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from time import monotonic
 from typing import Any, Protocol, TypeVar
 
@@ -17,20 +17,16 @@ from rclpy.node import Node as RosNode
 
 from composer.behavior import TransitionFailed
 from composer.model import BehaviorReference, Event, LogLevel, Node, PeriodError
-from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log, describe
 from composer.runtime.callbacks.mutation_check import MutationCheck, SeenMessages
 from composer.runtime.clock.clock import Clock
-from composer.runtime.clock.sim_time import SimulatedTime
-from composer.runtime.executors.event_counts import AnnouncedEvents
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.strand import InlineStrand, SerialStrand
 from composer.runtime.executors.tasks import Future
 from composer.runtime.executors.user_code import calls_user_code
 from composer.runtime.intra_process.lifecycle_gate import Gate
 from composer.runtime.intra_process.pending import Pending
-from composer.runtime.intra_process.router import Delivery
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import (
     Named,
@@ -41,6 +37,7 @@ from composer.runtime.node.behavior_loader import (
 )
 from composer.runtime.node.entities import NodeEntities
 from composer.runtime.node.lifecycle import FINALIZED, Lifecycle, TransitionResult
+from composer.runtime.node.options import NodeOptions
 from composer.runtime.node.parameters import NodeParameters
 from composer.runtime.node.ros_node import make_ros_node
 from composer.runtime.ports.port import RunningPort
@@ -57,34 +54,6 @@ _EVENTS = {
 
 class WrongReturn(Exception):
     """A lifecycle handler returned something other than None, True or False."""
-
-
-@dataclass(frozen=True, slots=True)
-class ProcessContext:
-    """What all nodes of the process share, on the loop of the manager node."""
-
-    simulated_time: SimulatedTime
-    events: AnnouncedEvents
-
-
-@dataclass(frozen=True, slots=True)
-class NodeOptions:
-    """How a node is run.
-
-    ``delivery`` connects its ports with those of the other nodes of the process; ``chains`` are
-    those of the system; ``seen_messages`` is set if messages are checked for changes by callbacks;
-    ``parallel`` is true if its loop has several threads; ``system_is_up`` is false during the
-    bring-up, when errors do not count as faults: some nodes wait for others.
-    """
-
-    delivery: Delivery
-    chains: Chains
-    process: ProcessContext
-    seen_messages: SeenMessages | None = None
-    parallel: bool = False
-    log_level: LogLevel = LogLevel.INFO
-    transition_timeout_s: float = 10.0
-    system_is_up: bool = False
 
 
 class NodeListener(Protocol):
@@ -251,8 +220,9 @@ class RunningNode:
         """Open or close the gates for the new state, and report it."""
         state = result.state
         if state == "active":
-            self._resume_error_limit(restart=result.transition == "activate")
-            self.activations += result.transition == "activate"
+            is_activation = result.transition == "activate"
+            self.activations += is_activation
+            self._resume_error_limit(restart=is_activation)
         _settle(self._context.gate, state, state == "active", self._entities.gated)
         is_configured = state in ("inactive", "active")
         _settle(self._always_on_context.gate, state, is_configured, self._entities.always_on)

@@ -28,7 +28,8 @@ from composer.runtime.intra_process.router import Delivery
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, chain_figures, figures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import FINALIZED
-from composer.runtime.node.node import NodeListener, NodeOptions, ProcessContext, RunningNode
+from composer.runtime.node.node import NodeListener, RunningNode
+from composer.runtime.node.options import NodeOptions, ProcessContext
 from composer.runtime.node.parameters import ParameterError
 from composer.source import Located
 

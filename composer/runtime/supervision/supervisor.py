@@ -109,13 +109,13 @@ class Supervisor:
 
     def reconcile(self, cause: str) -> tuple[StepFailed, ...]:
         """Take every node to its desired state; failures on the way become faults."""
-        return self._reach(self._desired, self._node_set.states(), cause)
+        return self._reconcile(self._desired, self._node_set.states(), cause)
 
     def _reconcile_settled(self, cause: str = "") -> tuple[StepFailed, ...]:
         """Reconcile, but without nodes that have an event in the queue: that is handled first."""
-        return self._reach(self._desired, self._node_set.settled(), cause)
+        return self._reconcile(self._desired, self._node_set.settled(), cause)
 
-    def _reach(
+    def _reconcile(
         self, desired: DesiredState, states: Mapping[str, PrimaryState], cause: str
     ) -> tuple[StepFailed, ...]:
         plan = reconcile(self._system, desired, states, cause)
@@ -222,7 +222,7 @@ class Supervisor:
         self._desired = self._desired.release(name).with_goals({name: state})
         moved = dependents(self._system, name)
         unmoved = {other: at for other, at in states.items() if other not in moved}
-        self._reach(self._desired.with_goals(unmoved), states, f"external transition of {name}")
+        self._reconcile(self._desired.with_goals(unmoved), states, f"external transition of {name}")
 
     def _on_callback_hanging(self, hanging: CallbackHanging) -> None:
         """Report a callback that takes too long; the health monitor interrupts it."""

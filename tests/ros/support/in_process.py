@@ -1,4 +1,4 @@
-"""What the tests of running systems share: a system in this process, and a hand-written peer."""
+"""A system that runs in this process, and a hand-written peer, for tests."""
 
 from __future__ import annotations
 
@@ -54,41 +54,39 @@ E = TypeVar("E", bound=Event)
 
 
 def wait_until(condition: Callable[[], object], what: str = "") -> None:
-    """Wait until ``condition()`` is true. Fails when it does not come true."""
+    """Wait until ``condition()`` is true; fail after ``PATIENCE_S``."""
     until_s = time.monotonic() + PATIENCE_S
     while not condition():
-        assert time.monotonic() < until_s, f"did not come true: {what or condition}"
+        assert time.monotonic() < until_s, f"timed out: {what or condition}"
         time.sleep(0.002)
 
 
 def end_limit_s() -> float:
-    """Return how long the end of a system may take: 2 s with a core for each who wants to run.
-
-    Where more want to, everything takes so much longer.
-    """
+    """Return how long the end of a system may take: 2 s, or more if the machine is overloaded."""
     return 2.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
 def system_of(text: str, folder: Path, **modules: str) -> System:
-    """Return the system that ``text`` declares; ``modules`` become Python files beside it.
+    """Return the system that ``text`` declares; ``modules`` become Python files next to it.
 
-    Nothing is checked: what must not end the process includes what the checks would refuse.
+    No rule is checked: the runtime must also withstand systems that the rules would refuse.
     """
     for name, content in modules.items():
         folder.joinpath(f"{name}.py").write_text(dedent(content), encoding="utf-8")
-    tree, source, found = parse_bytes(dedent(text).encode(), "system.yaml")
-    assert tree is not None, found
-    expanded, findings = expand(tree, {})
+    tree, source, diagnostics = parse_bytes(dedent(text).encode(), "system.yaml")
+    assert tree is not None, diagnostics
+    expanded, more = expand(tree, {})
+    diagnostics += more
     node_types = NodeTypes.for_file(folder / "system.yaml")
     system, more = resolve(expanded, source, node_types, folders={source.path: folder})
-    findings = [*found, *findings, *more]
-    assert system is not None, findings
-    assert not has_errors(findings), findings
+    diagnostics += more
+    assert system is not None, diagnostics
+    assert not has_errors(diagnostics), diagnostics
     return system
 
 
 class RunningSystem:
-    """A host on a thread of this process, and what it told."""
+    """A host on a thread of this process, and the events that it reported."""
 
     def __init__(
         self, system: System, options: HostOptions, autostart: PrimaryState | None
@@ -110,32 +108,34 @@ class RunningSystem:
         return [event for event in tuple(self.events) if isinstance(event, kind)]
 
     def states(self, node: str | None = None) -> list[str]:
-        """Where nodes came to rest, in order: ``/talker active``."""
+        """Return the state changes, in order: ``/talker active``."""
         changes = [str(event) for event in self.reported(StateChanged)]
         return changes if node is None else [text for text in changes if text.startswith(node)]
 
     def node(self, name: str) -> RunningNode:
-        """Return the node of that name in the system, whatever state it is in."""
+        """Return a node of the system by its key."""
         return self.host._node_set.nodes[name]
 
     def behavior(self, name: str) -> Any:
-        """Return the object of user code that the node has: it lives from configure to cleanup."""
+        """Return the behavior of a node, which exists from configure to cleanup."""
         return self.node(name)._behavior
 
     def change(self, node: str, *transitions: str) -> None:
-        """Let a node go through transitions, one after the other."""
+        """Run transitions of a node, one after the other."""
         running_node = self.node(node)
         for transition in transitions:
-            # Told when all is done: the state is there before entities are given back.
-            made = running_node.loop.run_task(running_node.lifecycle.change(transition))
+            # The state changes before entities are destroyed; the future is done after that.
+            future = running_node.loop.run_task(running_node.lifecycle.change(transition))
             goal = _GOALS[transition]
-            wait_until(made.done, f"{node} {goal}")
+            wait_until(future.done, f"{node} {goal}")
             assert running_node.state == goal
 
     def wait_for_listener(self, node: str, publisher: str) -> None:
-        """Wait until a publisher knows who listens outside: what it sends before is lost."""
+        """Wait until a publisher has an external subscription; earlier messages are lost."""
         port: Any = self.node(node)._entities.publishers[publisher]
-        wait_until(port._publisher.get_subscription_count, f"a listener to {publisher} of {node}")
+        wait_until(
+            port._publisher.get_subscription_count, f"a subscription of {publisher}"
+        )
 
     def log(self) -> list[str]:
         return [event.message for event in self.reported(Logged)]
@@ -148,18 +148,18 @@ class RunningSystem:
         return next(line for line in self.log() if part in line)
 
     def stop(self) -> Outcome:
-        """Stop, if it runs, and return how it ended."""
+        """Stop the system, if it runs, and return the outcome."""
         self.host.stop("the test is over")
         return self.end()
 
     def end(self) -> Outcome:
-        """Wait for the end and return how it was. Raises what the host raised."""
+        """Wait for the end and return the outcome. Raises what the host raised."""
         self._thread.join(PATIENCE_S)
-        assert not self._thread.is_alive(), "the host did not come to an end"
+        assert not self._thread.is_alive(), "the host did not end"
         return self._outcome.result()
 
     def summary(self, node: str) -> NodeSummary:
-        """Stop and return what ``node`` did."""
+        """Stop and return the summary of ``node``."""
         return next(entry for entry in self.stop().nodes if entry.node == node)
 
 
@@ -172,10 +172,10 @@ def running(
     autostart: PrimaryState | None = None,
     **modules: str,
 ) -> Iterator[RunningSystem]:
-    """Run a system for the length of the block, which begins when it is up.
+    """Run a system for the length of the block, which starts when it is up.
 
-    By default it gets more time for its end than people give it: what is not given back in time
-    stays in this process, and the next test would ask it instead of a node of its own.
+    By default, its tear-down has more time than usual: nodes that are not destroyed in time remain
+    in this process and would answer requests of the next test.
     """
     options = options or HostOptions(stop_within_s=_ENDS_WITHIN_S)
     system = RunningSystem(system_of(text, folder, **modules), options, autostart)
@@ -187,7 +187,7 @@ def running(
 
 
 class Peer:
-    """A node as anybody would write it, in a participant of its own."""
+    """A hand-written node in a participant of its own."""
 
     def __init__(self) -> None:
         remove_incomplete_ports()
@@ -212,18 +212,18 @@ class Peer:
         return node
 
     def run(self, function: Callable[[], Any]) -> Any:
-        """Call it on the thread that serves the node; rclpy's action clients want that."""
+        """Call ``function`` on the thread of the executor, as rclpy's action clients require."""
         return finished(self._executor.create_task(function))
 
     def listen(self, kind: Any, topic: str, qos: QoSProfile | int = 10) -> list[Any]:
-        """Return the list that messages will be in, once a publisher has been found."""
-        heard: list[Any] = []
-        self.node.create_subscription(kind, topic, heard.append, qos)
+        """Subscribe, wait for a publisher, and return the list that receives the messages."""
+        messages: list[Any] = []
+        self.node.create_subscription(kind, topic, messages.append, qos)
         wait_until(lambda: self.node.count_publishers(topic) > 0, f"a publisher of {topic}")
-        return heard
+        return messages
 
     def publisher(self, kind: Any, topic: str, qos: QoSProfile | int = 10) -> Any:
-        """Return a publisher that a subscription has been matched with."""
+        """Return a publisher with a matched subscription."""
         publisher = self.node.create_publisher(kind, topic, qos)
         wait_until(lambda: publisher.get_subscription_count() > 0, f"a subscription of {topic}")
         return publisher
@@ -234,32 +234,31 @@ class Peer:
         return client
 
     def servers(self, name: str) -> set[bytes]:
-        """Return whose requests to a service go to, as far as the peer knows by now.
+        """Return the ids of the servers of a service that the peer has discovered.
 
-        Who asks a node that is being made anew must wait for the new one: what is sent to the old
-        one is lost.
+        Requests to a node that is being created again are lost until the new server is discovered.
         """
-        ends = self.node.get_subscriptions_info_by_topic(f"rq{name}Request", no_mangle=True)
-        return {bytes(end.endpoint_gid) for end in ends}
+        endpoints = self.node.get_subscriptions_info_by_topic(f"rq{name}Request", no_mangle=True)
+        return {bytes(endpoint.endpoint_gid) for endpoint in endpoints}
 
     def call(self, kind: Any, name: str, request: Any = None) -> Any:
         return finished(self.client(kind, name).call_async(request or kind.Request()))
 
     def change(self, node: str, transition: str | int) -> bool:
-        """Ask for a transition by its label or its id; return the answer."""
-        wanted = (
+        """Request a transition by its label or its id; return its success."""
+        requested = (
             Transition(label=transition)
             if isinstance(transition, str)
             else Transition(id=transition)
         )
-        request = ChangeState.Request(transition=wanted)
+        request = ChangeState.Request(transition=requested)
         return bool(self.call(ChangeState, f"{node}/change_state", request).success)
 
     def state(self, node: str) -> str:
         return str(self.call(GetState, f"{node}/get_state").current_state.label)
 
     def set_parameter(self, node: str, name: str, value: Any) -> str:
-        """Return why the new value was refused; empty when it was taken."""
+        """Return why the new value was refused; empty if it was accepted."""
         message: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
         request = SetParameters.Request(parameters=[message])
         result = self.call(SetParameters, f"{node}/set_parameters", request).results[0]
@@ -273,5 +272,5 @@ class Peer:
 
 def finished(future: Any) -> Any:
     """Wait for an rclpy future that an executor completes."""
-    wait_until(future.done, "an answer")
+    wait_until(future.done, "a response")
     return future.result()
