@@ -133,9 +133,7 @@ class RunningSystem:
     def wait_for_listener(self, node: str, publisher: str) -> None:
         """Wait until a publisher has an external subscription; earlier messages are lost."""
         port: Any = self.node(node)._entities.publishers[publisher]
-        wait_until(
-            port._publisher.get_subscription_count, f"a subscription of {publisher}"
-        )
+        wait_until(port._publisher.get_subscription_count, f"a subscription of {publisher}")
 
     def log(self) -> list[str]:
         return [event.message for event in self.reported(Logged)]

@@ -1,4 +1,4 @@
-"""A system run as people run it, in a process of its own, and somebody outside who looks at it."""
+"""A system in a process of its own, and an external node that observes it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PATIENCE_S = 20.0
 
 
 class RunningSystem:
-    """``compose run`` in a process of its own; what it prints is read as it comes."""
+    """``compose run`` in a process of its own, whose output is read as it arrives."""
 
     def __init__(self, system: str, *options: str, program: Sequence[str] = COMPOSE) -> None:
         command = [*program, "run", system, *options]
@@ -43,7 +43,7 @@ class RunningSystem:
         )
         self.lines: list[str] = []
         self._has_ended = False
-        self._news = threading.Condition()
+        self._changed = threading.Condition()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -67,20 +67,20 @@ class RunningSystem:
         return "\n".join(self.lines)
 
     def wait_for(self, pattern: str, timeout_s: float = PATIENCE_S) -> str:
-        """Wait for a printed line that matches and return it. Fails when none is to come."""
+        """Wait for a printed line that matches, and return it; fail if the process ends."""
         searched = re.compile(pattern)
         end_s = time.monotonic() + timeout_s
-        with self._news:
+        with self._changed:
             while True:
                 for line in self.lines:
                     if searched.search(line):
                         return line
                 assert not self._has_ended, f"no line like {pattern!r}, it ended: {self._code()}"
-                if not self._news.wait(end_s - time.monotonic()):
+                if not self._changed.wait(end_s - time.monotonic()):
                     raise AssertionError(f"no line like {pattern!r} within {timeout_s:g} s")
 
     def stop(self, number: signal.Signals = signal.SIGINT) -> tuple[int, float]:
-        """Send a signal; return the exit code and the seconds it took to end."""
+        """Send a signal; return the exit code and the time to the end in seconds."""
         sent_s = time.monotonic()
         self.process.send_signal(number)
         code = self.process.wait(timeout=PATIENCE_S)
@@ -89,7 +89,7 @@ class RunningSystem:
         return code, took_s
 
     def _end(self) -> None:
-        """Leave nothing running; what is killed would haunt the ROS graph until its lease ends."""
+        """End the process in order: a killed one stays in the ROS graph until its lease ends."""
         self.process.send_signal(signal.SIGINT)
         try:
             self.process.wait(timeout=PATIENCE_S)
@@ -100,22 +100,22 @@ class RunningSystem:
     def _read(self) -> None:
         assert self.process.stdout is not None
         for line in self.process.stdout:
-            with self._news:
+            with self._changed:
                 self.lines.append(line.rstrip("\n"))
-                self._news.notify_all()
-        with self._news:
+                self._changed.notify_all()
+        with self._changed:
             self._has_ended = True
-            self._news.notify_all()
+            self._changed.notify_all()
 
     def _code(self) -> int:
         return self.process.wait(timeout=PATIENCE_S)
 
 
-class Outsider:
+class ExternalNode:
     """An ordinary rclpy node in another process than the system."""
 
     def __init__(self, context: Context) -> None:
-        self.node = Node("outsider", context=context)
+        self.node = Node("external_node", context=context)
         self.executor = SingleThreadedExecutor(context=context)
         self.executor.add_node(self.node)
 
@@ -133,16 +133,16 @@ class Outsider:
             self.executor.spin_once(timeout_sec=0.05)
 
     def spin_for(self, seconds: float) -> None:
-        """Serve callbacks for so long: for what must *not* come."""
+        """Serve callbacks for ``seconds``, to check that something does *not* happen."""
         end_s = time.monotonic() + seconds
         while (left_s := end_s - time.monotonic()) > 0:
             self.executor.spin_once(timeout_sec=min(left_s, 0.05))
 
     def listen(self, message_type: Any, topic: str, qos: QoSProfile | int = 10) -> list[Any]:
         """Return a list that fills with the messages of the topic."""
-        heard: list[Any] = []
-        self.node.create_subscription(message_type, topic, heard.append, qos)
-        return heard
+        messages: list[Any] = []
+        self.node.create_subscription(message_type, topic, messages.append, qos)
+        return messages
 
     def result(self, future: Any, timeout_s: float = PATIENCE_S) -> Any:
         """Wait for an rclpy future and return its result."""
@@ -164,11 +164,11 @@ class Outsider:
         return str(response.current_state.label)
 
     def wait_for_state(self, node: str, state: str) -> None:
-        """Wait until the node is there and in the state."""
+        """Wait until the node exists and is in the state."""
         self.spin_until(lambda: self.state(node) == state)
 
     def change_state(self, node: str, label: str) -> bool:
-        """Ask for a transition by its label."""
+        """Request a transition by its label; return its success."""
         request = ChangeState.Request()
         request.transition.label = label
         return bool(self.call(ChangeState, f"{node}/change_state", request).success)

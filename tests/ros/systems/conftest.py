@@ -1,4 +1,4 @@
-"""Somebody outside, for the tests that look at a running system."""
+"""An external node, for tests of running systems."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import pytest
 import rclpy
 from rclpy.context import Context
 
-from tests.ros.support.system_process import Outsider
+from tests.ros.support.system_process import ExternalNode
 
 
 @pytest.fixture(scope="module")
-def outside(shared_domain_id: int) -> Iterator[Context]:
+def external_context(shared_domain_id: int) -> Iterator[Context]:
     """One DDS participant for many tests: Fast DDS has crashed on deleting many in a row."""
     context = Context()
     rclpy.init(context=context)
@@ -21,8 +21,8 @@ def outside(shared_domain_id: int) -> Iterator[Context]:
 
 
 @pytest.fixture
-def outsider(outside: Context) -> Iterator[Outsider]:
+def external(external_context: Context) -> Iterator[ExternalNode]:
     """A node of an ordinary rclpy process."""
-    node = Outsider(outside)
+    node = ExternalNode(external_context)
     yield node
     node.close()

@@ -5,14 +5,14 @@ from __future__ import annotations
 from nav_msgs.msg import Odometry
 from rclpy.qos import QoSPresetProfiles
 
-from tests.ros.support.system_process import Outsider, RunningSystem
+from tests.ros.support.system_process import ExternalNode, RunningSystem
 
 SENSOR_DATA = QoSPresetProfiles.SENSOR_DATA.value
 
 
-def test_each_robot_is_a_part_of_its_own(outsider: Outsider) -> None:
+def test_each_robot_is_a_part_of_its_own(external: ExternalNode) -> None:
     odometry = {
-        robot: outsider.listen(Odometry, f"/{robot}/odometry", SENSOR_DATA)
+        robot: external.listen(Odometry, f"/{robot}/odometry", SENSOR_DATA)
         for robot in ("alpha", "beta")
     }
     # Straight ahead, each on its own line: where it is says who it is, whenever it is heard first.
@@ -22,7 +22,7 @@ def test_each_robot_is_a_part_of_its_own(outsider: Outsider) -> None:
         system.wait_for(r"9 of 9 nodes active")
         system.wait_for(r"alpha_controller.*driving to")
         system.wait_for(r"beta_controller.*driving to")
-        outsider.spin_until(lambda: all(odometry.values()))
+        external.spin_until(lambda: all(odometry.values()))
         code, _ = system.stop()
     assert code == 0
     for robot, line in (("alpha", 0.0), ("beta", 5.0)):

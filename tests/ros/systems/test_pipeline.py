@@ -16,7 +16,7 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.action import ActionClient
 from rclpy.qos import QoSPresetProfiles
 
-from tests.ros.support.system_process import Outsider, RunningSystem
+from tests.ros.support.system_process import ExternalNode, RunningSystem
 
 NODES = ("/perception/sensor_simulator", "/planning/planner", "/control/motor_controller")
 MAX_VELOCITY = 1.0  # the motor controller's default, in m/s
@@ -31,10 +31,10 @@ def _distance(first: Point, second: Point) -> float:
     return math.dist((first.x, first.y, first.z), (second.x, second.y, second.z))
 
 
-def test_nodes_become_active_in_order_and_end_in_reverse(outsider: Outsider) -> None:
+def test_nodes_become_active_in_order_and_end_in_reverse(external: ExternalNode) -> None:
     with RunningSystem("systems/pipeline.yaml") as system:
         for node in NODES:
-            outsider.wait_for_state(node, "active")
+            external.wait_for_state(node, "active")
         code, took_s = system.stop(signal.SIGINT)
     activated = _order(system, r"active$|active\b")
     assert code == 0
@@ -54,19 +54,19 @@ def _order(system: RunningSystem, pattern: str) -> list[str]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_every_signal_ends_it_cleanly(outsider: Outsider, number: signal.Signals) -> None:
+def test_every_signal_ends_it_cleanly(external: ExternalNode, number: signal.Signals) -> None:
     with RunningSystem("systems/pipeline.yaml") as system:
-        outsider.wait_for_state(NODES[-1], "active")
+        external.wait_for_state(NODES[-1], "active")
         code, took_s = system.stop(number)
     assert (code, took_s < 2.0) == (0, True)
 
 
-def test_the_robot_follows_the_planned_path(outsider: Outsider) -> None:
-    commands = outsider.listen(Twist, "/motor_commands")
-    odometry = outsider.listen(Odometry, "/sensor_data", QoSPresetProfiles.SENSOR_DATA.value)
+def test_the_robot_follows_the_planned_path(external: ExternalNode) -> None:
+    commands = external.listen(Twist, "/motor_commands")
+    odometry = external.listen(Odometry, "/sensor_data", QoSPresetProfiles.SENSOR_DATA.value)
     # straight ahead, and long enough for a slow discovery
     with RunningSystem("systems/pipeline.yaml", "--set", "motor_controller.waypoints=[6.0, 0.0]"):
-        outsider.spin_until(lambda: bool(odometry) and odometry[-1].pose.pose.position.x > 5.9)
+        external.spin_until(lambda: bool(odometry) and odometry[-1].pose.pose.position.x > 5.9)
     speeds = [math.hypot(message.linear.x, message.linear.y) for message in commands]
     assert len(speeds) > 50
     assert 0.7 < max(speeds) <= MAX_VELOCITY + ROUNDING
@@ -78,12 +78,12 @@ def test_the_robot_follows_the_planned_path(outsider: Outsider) -> None:
         assert math.hypot(twist.x, twist.y) <= MAX_VELOCITY + ROUNDING
 
 
-def test_the_planner_answers_another_process(outsider: Outsider) -> None:
+def test_the_planner_answers_another_process(external: ExternalNode) -> None:
     start, goal = Point(x=1.0, y=1.0), Point(x=4.0, y=5.0)
     request = PlanTrajectory.Request(start=start, goal=goal, max_velocity=0.5)
     with RunningSystem("systems/pipeline.yaml"):
-        response = _wait_for_plan(outsider, request)
-        refused = outsider.call(PlanTrajectory, "/plan_trajectory", PlanTrajectory.Request())
+        response = _wait_for_plan(external, request)
+        refused = external.call(PlanTrajectory, "/plan_trajectory", PlanTrajectory.Request())
     assert response.success
     positions = [pose.pose.position for pose in response.path.poses]
     times_s = _seconds(response.path)
@@ -98,56 +98,58 @@ def test_the_planner_answers_another_process(outsider: Outsider) -> None:
     assert "max_velocity" in refused.message
 
 
-def _wait_for_plan(outsider: Outsider, request: PlanTrajectory.Request) -> PlanTrajectory.Response:
+def _wait_for_plan(
+    external: ExternalNode, request: PlanTrajectory.Request
+) -> PlanTrajectory.Response:
     """Ask until the planner, which has to hear odometry first, answers with a path."""
     responses: list[PlanTrajectory.Response] = []
 
     def answered() -> bool:
-        responses.append(outsider.call(PlanTrajectory, "/plan_trajectory", request))
+        responses.append(external.call(PlanTrajectory, "/plan_trajectory", request))
         return bool(responses[-1].success)
 
-    outsider.spin_until(answered)
+    external.spin_until(answered)
     return responses[-1]
 
 
-def test_another_process_navigates_and_cancels(outsider: Outsider) -> None:
+def test_another_process_navigates_and_cancels(external: ExternalNode) -> None:
     # without waypoints it stands still until somebody sends a goal
     with RunningSystem("systems/pipeline.yaml", "--set", "motor_controller.waypoints=[]"):
-        outsider.wait_for_state(NODES[-1], "active")
-        client = ActionClient(outsider.node, Navigate, "/navigate")
-        outsider.spin_until(client.server_is_ready)
+        external.wait_for_state(NODES[-1], "active")
+        client = ActionClient(external.node, Navigate, "/navigate")
+        external.spin_until(client.server_is_ready)
         goal = Navigate.Goal(target=Point(x=0.0, y=1.0), max_velocity=1.0)
-        outcome = outsider.result(outsider.result(client.send_goal_async(goal)).get_result_async())
+        outcome = external.result(external.result(client.send_goal_async(goal)).get_result_async())
         assert outcome.status == GoalStatus.STATUS_SUCCEEDED
         # A robot whose controller gets no processor for a moment drives on, and then comes back.
         assert 0.9 < outcome.result.distance_traveled < 1.5
         feedback: list[float] = []
-        handle = outsider.result(
+        handle = external.result(
             client.send_goal_async(
                 Navigate.Goal(target=Point(x=50.0, y=50.0), max_velocity=0.5),
                 feedback_callback=lambda m: feedback.append(m.feedback.progress_percent),
             )
         )
-        outsider.spin_until(lambda: bool(feedback) and feedback[-1] > feedback[0])
-        busy = outsider.result(client.send_goal_async(goal))
+        external.spin_until(lambda: bool(feedback) and feedback[-1] > feedback[0])
+        busy = external.result(client.send_goal_async(goal))
         assert not busy.accepted
-        outsider.result(handle.cancel_goal_async())
-        outcome = outsider.result(handle.get_result_async())
+        external.result(handle.cancel_goal_async())
+        outcome = external.result(handle.get_result_async())
         client.destroy()
     assert outcome.status == GoalStatus.STATUS_CANCELED
     assert outcome.result.message == "canceled on the way"
 
 
-def test_a_deactivated_planner_says_so_and_nothing_else(outsider: Outsider) -> None:
+def test_a_deactivated_planner_says_so_and_nothing_else(external: ExternalNode) -> None:
     request = PlanTrajectory.Request(goal=Point(x=1.0), max_velocity=0.5)
     with RunningSystem("systems/pipeline.yaml"):
-        outsider.wait_for_state(NODES[-1], "active")
-        _wait_for_plan(outsider, request)
-        assert outsider.change_state("/planning/planner", "deactivate")
-        refusal = outsider.call(PlanTrajectory, "/plan_trajectory", request)
+        external.wait_for_state(NODES[-1], "active")
+        _wait_for_plan(external, request)
+        assert external.change_state("/planning/planner", "deactivate")
+        refusal = external.call(PlanTrajectory, "/plan_trajectory", request)
         assert not refusal.success
         assert "/planning/planner" in refusal.message
         assert "inactive" in refusal.message
-        assert outsider.state("/control/motor_controller") == "active"
-        assert outsider.change_state("/planning/planner", "activate")
-        _wait_for_plan(outsider, request)
+        assert external.state("/control/motor_controller") == "active"
+        assert external.change_state("/planning/planner", "activate")
+        _wait_for_plan(external, request)

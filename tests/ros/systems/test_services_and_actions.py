@@ -11,42 +11,42 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
-from tests.ros.support.system_process import Outsider, RunningSystem
+from tests.ros.support.system_process import ExternalNode, RunningSystem
 
 SUCCEEDED = 4
 STATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def test_a_client_gets_paths_refusals_and_silence(outsider: Outsider) -> None:
+def test_a_client_gets_paths_refusals_and_silence(external: ExternalNode) -> None:
     with RunningSystem("systems/trajectory_service.yaml") as system:
         system.wait_for(r"client.*True: 51 points")
         system.wait_for(r"client.*False: max_velocity must be above 0 m/s, not 0.0")
         system.wait_for(r"client.*no response: ")
-        assert outsider.state("/client") == "active"
+        assert external.state("/client") == "active"
 
 
-def test_goals_succeed_are_canceled_and_are_rejected(outsider: Outsider) -> None:
+def test_goals_succeed_are_canceled_and_are_rejected(external: ExternalNode) -> None:
     topics = ("/clients/outcome", "/clients/hasty_outcome", "/clients/dreamer_outcome")
-    outcomes = [outsider.listen(String, topic, STATE) for topic in topics]
+    outcomes = [external.listen(String, topic, STATE) for topic in topics]
     with RunningSystem("systems/navigation.yaml") as system:
-        outsider.spin_until(lambda: all(outcomes))
+        external.spin_until(lambda: all(outcomes))
         system.wait_for(r"patient.*100 % of the way")
         steps = [line for line in system.lines if "patient" in line and "% of the way" in line]
     assert [heard[0].data for heard in outcomes] == ["succeeded", "canceled", "rejected"]
     assert len(steps) == 10
 
 
-def test_the_generic_nodes_do_what_they_say(outsider: Outsider) -> None:
-    slow = outsider.listen(Float64, "/reading/slow")
-    large = outsider.listen(Float64, "/reading/large")
-    degrees = outsider.listen(String, "/reading/degrees")
-    relayed = outsider.listen(Float64, "/reading/relayed")
+def test_the_generic_nodes_do_what_they_say(external: ExternalNode) -> None:
+    slow = external.listen(Float64, "/reading/slow")
+    large = external.listen(Float64, "/reading/large")
+    degrees = external.listen(String, "/reading/degrees")
+    relayed = external.listen(Float64, "/reading/relayed")
     with RunningSystem("systems/toolbox.yaml"):
         # Enough of each: who begins to hear one a moment before the other hears a little more.
-        outsider.spin_until(lambda: len(large) >= 5 and len(slow) >= 20)
-        assert outsider.call(Trigger, "/trigger", Trigger.Request()).message == "request 0"
-        assert outsider.call(Trigger, "/trigger", Trigger.Request()).message == "request 1"
-        feedback, result = _navigate(outsider, Point(x=1.0))
+        external.spin_until(lambda: len(large) >= 5 and len(slow) >= 20)
+        assert external.call(Trigger, "/trigger", Trigger.Request()).message == "request 0"
+        assert external.call(Trigger, "/trigger", Trigger.Request()).message == "request 1"
+        feedback, result = _navigate(external, Point(x=1.0))
     assert all(message.data > 1.0 for message in large)
     assert 2.0 < len(relayed) / len(slow) < 6.0  # 20 Hz in, 5 Hz out
     assert all(message.data.endswith(" degrees") for message in degrees)
@@ -54,30 +54,32 @@ def test_the_generic_nodes_do_what_they_say(outsider: Outsider) -> None:
     assert (result.status, result.result.message) == (SUCCEEDED, "arrived")
 
 
-def _navigate(outsider: Outsider, target: Point) -> tuple[list[float], Any]:
-    client = ActionClient(outsider.node, Navigate, "/navigate")
-    outsider.spin_until(client.server_is_ready)
+def _navigate(external: ExternalNode, target: Point) -> tuple[list[float], Any]:
+    client = ActionClient(external.node, Navigate, "/navigate")
+    external.spin_until(client.server_is_ready)
     # What is told before the server has met who listens is lost, and the client cannot wait for
     # that. Once something is heard, they have met.
     feedback: list[float] = []
 
     def have_met() -> bool:
-        outsider.result(_sent(outsider, client, target, feedback).get_result_async())
+        external.result(_sent(external, client, target, feedback).get_result_async())
         return bool(feedback)
 
-    outsider.spin_until(have_met)
+    external.spin_until(have_met)
     feedback = []
-    goal = _sent(outsider, client, target, feedback)
+    goal = _sent(external, client, target, feedback)
     # Only then: with the result rclpy drops what feedback is still to be taken.
-    outsider.spin_until(lambda: len(feedback) == 10)
-    result = outsider.result(goal.get_result_async())
+    external.spin_until(lambda: len(feedback) == 10)
+    result = external.result(goal.get_result_async())
     client.destroy()
     return feedback, result
 
 
-def _sent(outsider: Outsider, client: ActionClient, target: Point, feedback: list[float]) -> Any:
+def _sent(
+    external: ExternalNode, client: ActionClient, target: Point, feedback: list[float]
+) -> Any:
     """Send a goal and return it once it is accepted."""
-    goal = outsider.result(
+    goal = external.result(
         client.send_goal_async(
             Navigate.Goal(target=target, max_velocity=1.0),
             feedback_callback=lambda message: feedback.append(message.feedback.progress_percent),

@@ -6,7 +6,7 @@ import re
 
 from std_srvs.srv import Trigger
 
-from tests.ros.support.system_process import Outsider, RunningSystem
+from tests.ros.support.system_process import ExternalNode, RunningSystem
 
 #: The planner uses every tenth scan and comes up after the sensor, so it may miss the first scans.
 IN_ORDER = (
@@ -22,15 +22,15 @@ IN_ORDER = (
 )
 
 
-def test_a_silent_sensor_is_restarted_and_the_planner_waits(outsider: Outsider) -> None:
+def test_a_silent_sensor_is_restarted_and_the_planner_waits(external: ExternalNode) -> None:
     with RunningSystem("systems/supervised.yaml") as system:
         up_again = system.lines.index(system.wait_for("/sensor is up again after restart 1$"))
-        outsider.spin_until(
+        external.spin_until(
             lambda: any(re.search(IN_ORDER[-1], line) for line in system.lines[up_again:])
         )
         # Four seconds later the sensor is silent once more, and up again after another second.
         answers: list[Trigger.Response] = []
-        outsider.spin_until(lambda: is_active(outsider, answers))
+        external.spin_until(lambda: is_active(external, answers))
         assert answers[-1].message == "3 of 3 nodes active"
         code, took_s = system.stop()
     assert (code, took_s < 2.0) == (0, True)
@@ -41,7 +41,7 @@ def test_a_silent_sensor_is_restarted_and_the_planner_waits(outsider: Outsider) 
     assert len(camera) == 2, "once during bring-up, once during tear-down"
 
 
-def is_active(outsider: Outsider, answers: list[Trigger.Response]) -> bool:
+def is_active(external: ExternalNode, answers: list[Trigger.Response]) -> bool:
     name = "/supervised/manager/is_active"
-    answers.append(outsider.call(Trigger, name, Trigger.Request()))
+    answers.append(external.call(Trigger, name, Trigger.Request()))
     return bool(answers[-1].success)

@@ -8,21 +8,21 @@ from pathlib import Path
 from rclpy.qos import DurabilityPolicy, QoSPresetProfiles, QoSProfile
 from std_msgs.msg import String
 
-from tests.ros.support.system_process import REPOSITORY, Outsider, RunningSystem
+from tests.ros.support.system_process import REPOSITORY, ExternalNode, RunningSystem
 
 
-def test_a_minimal_node_says_that_it_has_started(outsider: Outsider) -> None:
+def test_a_minimal_node_says_that_it_has_started(external: ExternalNode) -> None:
     with RunningSystem("systems/minimal.yaml") as system:
         system.wait_for(r"minimal_node.*started")
-        outsider.wait_for_state("/minimal_node", "active")
+        external.wait_for_state("/minimal_node", "active")
         code, _ = system.stop()
     assert code == 0
 
 
-def test_the_talker_is_heard_inside_and_outside(outsider: Outsider) -> None:
-    heard = outsider.listen(String, "/chatter")
+def test_the_talker_is_heard_inside_and_outside(external: ExternalNode) -> None:
+    heard = external.listen(String, "/chatter")
     with RunningSystem("systems/talker_listener.yaml") as system:
-        outsider.spin_until(lambda: len(heard) >= 3)
+        external.spin_until(lambda: len(heard) >= 3)
         # Inside nothing is lost, from the first one on that the listener was up for.
         first = int(system.wait_for(r"listener.*Received: Sensor reading \d+$").rpartition(" ")[2])
         for number in range(first, first + 3):
@@ -38,14 +38,16 @@ def test_talker_and_listener_are_short_and_without_python() -> None:
     assert "behavior" not in text
 
 
-def test_a_late_joiner_gets_the_state_but_not_the_stream_it_missed(outsider: Outsider) -> None:
+def test_a_late_joiner_gets_the_state_but_not_the_stream_it_missed(
+    external: ExternalNode,
+) -> None:
     with RunningSystem("systems/qos_patterns.yaml") as system:
-        outsider.wait_for_state("/robot", "active")
+        external.wait_for_state("/robot", "active")
         system.wait_for(r"early_listener.*mode is ready")
         system.wait_for(r"early_listener.*order 1$")
-        assert outsider.state("/late_joiner") == "unconfigured"
-        assert outsider.change_state("/late_joiner", "configure")
-        assert outsider.change_state("/late_joiner", "activate")
+        assert external.state("/late_joiner") == "unconfigured"
+        assert external.change_state("/late_joiner", "configure")
+        assert external.change_state("/late_joiner", "activate")
         system.wait_for(r"late_joiner.*mode is ready")
         first = system.wait_for(r"late_joiner.*scan \d+")
         # best effort asks for less than the reliable publisher offers: they do meet
@@ -53,20 +55,22 @@ def test_a_late_joiner_gets_the_state_but_not_the_stream_it_missed(outsider: Out
     assert int(re.findall(r"scan (\d+)", first)[0]) > 5
 
 
-def test_a_late_joiner_from_outside_gets_the_state(outsider: Outsider) -> None:
+def test_a_late_joiner_from_outside_gets_the_state(external: ExternalNode) -> None:
     with RunningSystem("systems/qos_patterns.yaml") as system:
         system.wait_for(r"early_listener.*order 1$")
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        heard = outsider.listen(String, "/mode", latched)
-        outsider.spin_until(lambda: len(heard) == 1)
+        heard = external.listen(String, "/mode", latched)
+        external.spin_until(lambda: len(heard) == 1)
         assert heard[0].data == "ready"
 
 
-def test_control_stays_on_one_thread_and_perception_uses_several(outsider: Outsider) -> None:
-    cycles = outsider.listen(String, "/control/cycles")
-    frames = outsider.listen(String, "/perception/processed", QoSPresetProfiles.SENSOR_DATA.value)
+def test_control_stays_on_one_thread_and_perception_uses_several(
+    external: ExternalNode,
+) -> None:
+    cycles = external.listen(String, "/control/cycles")
+    frames = external.listen(String, "/perception/processed", QoSPresetProfiles.SENSOR_DATA.value)
     with RunningSystem("systems/executors.yaml"):
-        outsider.spin_until(
+        external.spin_until(
             lambda: (
                 len(cycles) > 100
                 and len({message.data.partition(":")[0] for message in frames}) > 1
