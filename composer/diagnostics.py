@@ -23,7 +23,7 @@ _CODE_OR_BAND = re.compile(r"RC\d{1,3}")
 _YAML_WORDS = {None: "null", True: "true", False: "false"}
 
 #: Maximum length of a value from a file in a message, in characters.
-LONGEST_ECHO = 80
+MAXIMUM_VALUE_LENGTH = 80
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
     return any(diagnostic.severity is Severity.ERROR for diagnostic in diagnostics)
 
 
-def shown(value: object, *, limit: int = LONGEST_ECHO) -> str:
+def shown(value: object, *, limit: int = MAXIMUM_VALUE_LENGTH) -> str:
     """Return ``value`` as text for messages, at most ``limit`` characters long.
 
     Characters that are invisible or control a terminal are escaped as in Python.

@@ -7,10 +7,10 @@ import unicodedata
 from collections.abc import Sequence
 from dataclasses import replace
 
-from composer.diagnostics import LONGEST_ECHO, Diagnostic, shown
+from composer.diagnostics import MAXIMUM_VALUE_LENGTH, Diagnostic, shown
 from composer.model import PortKind, PortOfNode
 
-_LONG_VALUE = re.compile(rf"'([^']{{{LONGEST_ECHO + 1},}})'")
+_LONG_VALUE = re.compile(rf"'([^']{{{MAXIMUM_VALUE_LENGTH + 1},}})'")
 
 
 def a(kind: PortKind) -> str:
@@ -45,7 +45,7 @@ def with_short_values(diagnostic: Diagnostic) -> Diagnostic:
         diagnostic.hint or "",
         *(label.message for label in diagnostic.related),
     ]
-    if all(len(text) <= LONGEST_ECHO for text in texts):
+    if all(len(text) <= MAXIMUM_VALUE_LENGTH for text in texts):
         return diagnostic
     return replace(
         diagnostic,

@@ -1,1 +1,1 @@
-"""Findings as text for people and as JSON, SARIF and annotations for programs."""
+"""Output formats for diagnostics: text, JSON, SARIF and GitHub annotations."""

@@ -1,4 +1,4 @@
-"""How text looks in a terminal: which characters are safe to echo, and how wide they are."""
+"""Text in a terminal: escaping of unsafe characters, and display width."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ import unicodedata
 
 TAB = "    "
 
-#: Controls, formats (bidi overrides among them), surrogates, private use, line separators; and
-#: spaces that look like the one that YAML knows, and are not.
+#: Control and format characters (such as bidi overrides), surrogates, private use, line separators,
+#: and spaces that look like the one that YAML accepts.
 _UNSAFE_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp", "Zs"})
 _ZERO_WIDTH_CATEGORIES = frozenset({"Mn", "Me"})
 
 
 def visible(text: str) -> str:
-    """Return ``text`` with tabs as spaces and everything that could steer a terminal escaped."""
+    """Return ``text`` with tabs as spaces and control characters escaped."""
     if text.isascii() and text.isprintable():
         return text
     return "".join(_visible_character(character) for character in text)
 
 
 def width(text: str) -> int:
-    """Return how many terminal cells ``visible(text)`` fills.
+    """Return the width of ``visible(text)`` in terminal cells.
 
-    Wide characters fill two (UAX #11), combining ones none.
+    Wide characters take two cells (UAX #11), combining ones none.
     """
     shown = visible(text)
     return len(shown) if shown.isascii() else sum(map(_cells, shown))

@@ -1,4 +1,4 @@
-"""What makes a finding the same finding after the file around it has changed."""
+"""Stable identities of diagnostics, independent of changes around them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from composer.diagnostics import Diagnostic
 
 
 def fingerprints(diagnostics: Iterable[Diagnostic]) -> list[str]:
-    """Return a stable hexadecimal fingerprint for each finding, in order.
+    """Return a stable hexadecimal fingerprint for each diagnostic, in order.
 
-    Made of rule, file, message and the text of the line without its indentation: not of line or
-    column, so that lines added above, or a deeper indentation, leave it as it is. Findings that
-    are alike in all of these are told apart by counting.
+    It is made from the rule, the file, the message and the line without its indentation, so added
+    lines and other indentation do not change it. Diagnostics that are equal in all of these are
+    numbered.
     """
     seen: Counter[tuple[str, ...]] = Counter()
     result = []

@@ -1,4 +1,4 @@
-"""Findings as workflow commands, which GitHub Actions shows beside the lines of a change."""
+"""Diagnostics as workflow commands, which GitHub Actions shows next to the changed lines."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _COMMANDS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO
 
 
 def render(diagnostics: Iterable[Diagnostic]) -> str:
-    """Return one workflow command a line (GitHub: Workflow commands for GitHub Actions)."""
+    """Return one workflow command per line."""
     return "".join(f"{_annotation(diagnostic)}\n" for diagnostic in diagnostics)
 
 

@@ -1,4 +1,4 @@
-"""Findings as JSON, in the form that ``schemas/report.schema.json`` describes."""
+"""Diagnostics as JSON, as described in ``schemas/report.schema.json``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from composer.report.fingerprint import fingerprints
 from composer.report.tool import NAME, tool_version
 from composer.source import Span
 
-#: Raised when a program that reads the old form could not read the new one.
+#: Incremented for every incompatible change of the format.
 FORMAT_VERSION = 1
 
 
@@ -24,15 +24,15 @@ def render(diagnostics: Sequence[Diagnostic]) -> str:
             f"{severity.value}s": sum(item.severity is severity for item in diagnostics)
             for severity in Severity
         },
-        "findings": [
-            _finding(diagnostic, fingerprint)
+        "diagnostics": [
+            _diagnostic(diagnostic, fingerprint)
             for diagnostic, fingerprint in zip(diagnostics, fingerprints(diagnostics), strict=True)
         ],
     }
     return json.dumps(report, indent=2) + "\n"
 
 
-def _finding(diagnostic: Diagnostic, fingerprint: str) -> dict[str, Any]:
+def _diagnostic(diagnostic: Diagnostic, fingerprint: str) -> dict[str, Any]:
     return {
         "code": diagnostic.rule.code,
         "rule": diagnostic.rule.name,

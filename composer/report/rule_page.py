@@ -1,7 +1,8 @@
-"""The catalogue of rules: all that can be wrong, why it matters, and how to do it instead."""
+"""The documentation of the rules: docs/rules.md, and text for ``compose rule``."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from itertools import groupby
 
@@ -11,15 +12,14 @@ import composer.resolve
 import composer.rules
 import composer.schema
 from composer.diagnostics import Rule, registered_rules
-from composer.report.samples import files_of
 
-#: What the first digit of a code stands for.
+#: The topic of each code band, by the first digit.
 BANDS = {
     "0": "Reading",
     "1": "Schema",
     "2": "Names and references",
     "3": "Types, QoS and wiring",
-    "4": "Lifecycle, timers, parameters and behaviours",
+    "4": "Lifecycle, timers, parameters and behaviors",
     "5": "Style",
     "9": "Internal",
 }
@@ -27,29 +27,28 @@ BANDS = {
 _INTRODUCTION = """\
 # Rules
 
-What `compose validate` finds. Errors keep a system from running; warnings and infos do not.
-This page is made from the rules themselves by `python tools/write_rules.py`; a test runs each
-example.
+The rules of `compose validate`. A system with errors does not run; one with warnings or infos does.
+This page is generated from the rules by `python tools/write_rules.py`, and every example is tested.
 
-A comment on the line of a finding, or on a line of its own before it, silences a warning or an info
-there: `# compose: ignore[unheard-publisher]`. Errors are not silenced.
+To ignore a warning or an info, add a comment on the same line, or on a line of its own before it:
+`# compose: ignore[unheard-publisher]`. Errors cannot be ignored.
 """
 
 
 def all_rules() -> tuple[Rule, ...]:
-    """Return every rule of the pipeline, by code. Imports the modules that have them."""
+    """Return all rules, sorted by code. Imports every module that registers rules."""
     composer.rules.all_checks()
     return tuple(registered_rules())
 
 
 def find_rule(text: str, rules: Iterable[Rule]) -> Rule | None:
     """Return the rule with the code or name ``text``, or None."""
-    wanted = text.casefold()
-    return next((rule for rule in rules if wanted in {rule.code.casefold(), rule.name}), None)
+    name = text.casefold()
+    return next((rule for rule in rules if name in {rule.code.casefold(), rule.name}), None)
 
 
 def explain(rule: Rule) -> str:
-    """Return all that is known of a rule, for a terminal."""
+    """Return the documentation of a rule, for a terminal."""
     return "\n".join(
         [
             f"{rule.code} {rule.name} ({rule.severity.value})",
@@ -57,11 +56,11 @@ def explain(rule: Rule) -> str:
             rule.summary,
             rule.why,
             "",
-            "Instead of",
+            "Example:",
             "",
             _indented(rule.bad),
             "",
-            "write",
+            "Use instead:",
             "",
             _indented(rule.good),
             "",
@@ -87,7 +86,7 @@ def _table(rules: Iterable[Rule]) -> str:
         f"| {rule.name} | {rule.severity.value} | {rule.summary} |".replace("#RC", "#rc")
         for rule in rules
     ]
-    return "\n".join(["| code | name | severity | what |", "|---|---|---|---|", *rows, ""])
+    return "\n".join(["| code | name | severity | summary |", "|---|---|---|---|", *rows, ""])
 
 
 def _section(rule: Rule) -> str:
@@ -98,7 +97,7 @@ def _section(rule: Rule) -> str:
             f"*{rule.severity.value}* - {rule.summary} {rule.why}",
             "",
             _example(rule.bad),
-            "Instead:",
+            "Use instead:",
             "",
             _example(rule.good),
         ]
@@ -119,3 +118,37 @@ def _example(example: str) -> str:
 
 def _indented(text: str) -> str:
     return "\n".join(f"    {line}".rstrip() for line in text.rstrip().splitlines())
+
+
+_HEADER = re.compile(r"# file: (?P<name>[A-Za-z0-9_./-]+)")
+_MARKER = re.compile(r"(?P<kind>system|node): *(?P<name>\w+)")
+
+
+def files_of(example: str) -> dict[str, str]:
+    """Return the files of an example by name, starting with the one to validate.
+
+    An example has one file, or several with a line ``# file: name`` before each. Returns an empty
+    dict if the example is not a YAML file, such as a directory listing.
+    """
+    files: dict[str, list[str]] = {}
+    current: list[str] | None = None
+    for line in example.splitlines(keepends=True):
+        header = _HEADER.fullmatch(line.strip())
+        if header is not None:
+            current = files.setdefault(header["name"], [])
+        elif current is None:
+            name = _name(line)
+            if name is None:
+                return {}
+            current = files.setdefault(name, [line])
+        else:
+            current.append(line)
+    return {name: "".join(lines) for name, lines in files.items()}
+
+
+def _name(first_line: str) -> str | None:
+    """Return a name for a file that starts with ``first_line``, or None."""
+    marker = _MARKER.match(first_line)
+    if marker is None:
+        return None
+    return f"{marker['name']}.yaml" if marker["kind"] == "node" else "system.yaml"

@@ -1,4 +1,4 @@
-"""Findings as SARIF 2.1.0 (OASIS), which code-scanning services read."""
+"""Diagnostics as SARIF 2.1.0 (OASIS), for code-scanning services."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from composer.source import Span
 SCHEMA = (
     "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 )
-#: The part behind the slash is raised when fingerprints are made in another way.
-FINGERPRINT = "composerFinding/v1"
+#: The version after the slash changes with the algorithm of the fingerprints.
+FINGERPRINT = "composerDiagnostic/v1"
 
 _LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "note"}
 
 
 def render(diagnostics: Sequence[Diagnostic]) -> str:
-    """Return a SARIF log of one run; it describes every rule that has a finding."""
+    """Return a SARIF log with one run; it describes every rule that has a diagnostic."""
     rules = sorted({item.rule for item in diagnostics}, key=lambda rule: rule.code)
     places = {rule.code: index for index, rule in enumerate(rules)}
     prints = fingerprints(diagnostics)
@@ -87,7 +87,7 @@ def _location(span: Span) -> dict[str, Any]:
 
 
 def _uri(path: str) -> str:
-    """Return the path as a URI reference; a relative one stays relative to the checkout."""
+    """Return the path as a URI reference; a relative path stays relative to the checkout."""
     quoted = quote(path.encode("utf-8", "surrogateescape"), safe="/")
     if PurePosixPath(path).is_absolute():
         return f"file://{quoted}"

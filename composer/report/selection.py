@@ -1,4 +1,4 @@
-"""Which findings are asked for: rules by code, by band or by name."""
+"""Selects diagnostics by the code, code prefix or name of their rule."""
 
 from __future__ import annotations
 
@@ -8,36 +8,36 @@ from composer.diagnostics import Diagnostic, Rule, nearest
 
 
 class UnknownRule(Exception):
-    """No rule has that code or name, and none is in that band; ``hint`` says what is close."""
+    """No rule has that code, code prefix or name; ``hint`` suggests a similar one."""
 
     def __init__(self, text: str, hint: str | None) -> None:
-        super().__init__(f"no rule is called '{text}'")
+        super().__init__(f"no rule is named '{text}'")
         self.hint = hint
 
 
-def chosen(
+def select_diagnostics(
     diagnostics: Iterable[Diagnostic],
     rules: Collection[Rule],
     select: Iterable[str],
     ignore: Iterable[str],
 ) -> list[Diagnostic]:
-    """Return the findings of the selected rules (all, where none is) but for the ignored ones.
+    """Return the diagnostics of the selected rules, without those of the ignored rules.
 
-    A text is a code (``RC301``), the beginning of codes (``RC3``) or a name. Raises UnknownRule
-    when it is none of one of ``rules``.
+    A rule is given by its code (``RC301``), a code prefix (``RC3``) or its name. If ``select`` is
+    empty, all rules are selected. Raises UnknownRule if a text matches none of ``rules``.
     """
-    wanted, unwanted = list(select), list(ignore)
-    for text in [*wanted, *unwanted]:
+    selected, ignored = list(select), list(ignore)
+    for text in [*selected, *ignored]:
         if not any(rule.matches(text) for rule in rules):
-            raise UnknownRule(text, _close(text, rules))
+            raise UnknownRule(text, _hint(text, rules))
     return [
         diagnostic
         for diagnostic in diagnostics
-        if (not wanted or any(diagnostic.rule.matches(text) for text in wanted))
-        and not any(diagnostic.rule.matches(text) for text in unwanted)
+        if (not selected or any(diagnostic.rule.matches(text) for text in selected))
+        and not any(diagnostic.rule.matches(text) for text in ignored)
     ]
 
 
-def _close(text: str, rules: Iterable[Rule]) -> str | None:
+def _hint(text: str, rules: Iterable[Rule]) -> str | None:
     close = nearest(text, [name for rule in rules for name in (rule.code, rule.name)])
     return None if close is None else f"did you mean '{close}'?"

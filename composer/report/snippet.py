@@ -1,4 +1,4 @@
-"""A line of a file with marks under the parts that are meant."""
+"""Source lines with marked spans, for the text format."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from composer.report.display import visible, width
 from composer.source import Span
 
-#: Longer lines are shown as a piece around the mark, in characters.
+#: Of longer lines, in characters, only the part around the mark is shown.
 LONGEST_LINE = 120
 _BEFORE_MARK = 60
 
@@ -17,13 +17,13 @@ BOLD = "1"
 
 
 @dataclass(frozen=True, slots=True)
-class Pen:
-    """Writes with ANSI colours, or without."""
+class Style:
+    """Formats text with or without ANSI colors."""
 
     color: bool
 
     def write(self, text: str, *codes: str) -> str:
-        """Return ``text`` in the SGR ``codes``."""
+        """Return ``text`` with the SGR ``codes``."""
         return f"\x1b[{';'.join(codes)}m{text}\x1b[0m" if self.color else text
 
     def bold(self, text: str, *codes: str) -> str:
@@ -31,23 +31,23 @@ class Pen:
         return self.write(text, BOLD, *codes)
 
     def frame(self, text: str) -> str:
-        """Return ``text`` as part of the frame around a line."""
+        """Return ``text`` in the color of the frame."""
         return self.write(text, FRAME)
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
-    """A place to mark, what with, and the words behind that. ``codes`` are SGR codes."""
+class Annotation:
+    """A span to mark, the marker character, SGR codes, and a message."""
 
     span: Span
-    sign: str
+    marker: str
     codes: tuple[str, ...]
     message: str = ""
 
 
-def snippets(marks: Iterable[Mark]) -> list[list[Mark]]:
-    """Return the marks in groups that are shown under one line, in the order of their first."""
-    groups: dict[tuple[str, int, int], list[Mark]] = {}
+def snippets(marks: Iterable[Annotation]) -> list[list[Annotation]]:
+    """Group the marks that are shown under the same line, in the order of the first ones."""
+    groups: dict[tuple[str, int, int], list[Annotation]] = {}
     for mark in marks:
         span = mark.span
         is_long = len(span.file.line(span.line)) > LONGEST_LINE
@@ -56,31 +56,31 @@ def snippets(marks: Iterable[Mark]) -> list[list[Mark]]:
     return list(groups.values())
 
 
-def draw(marks: list[Mark], arrow: str, pen: Pen, margin: int) -> list[str]:
-    """Return a line with all marks on it; ``margin`` is the width of the widest line number."""
+def draw(marks: list[Annotation], arrow: str, style: Style, margin: int) -> list[str]:
+    """Return a source line with its marks; ``margin`` is the width of the line numbers."""
     span = marks[0].span
     space = " " * margin
-    bar = pen.frame("|")
-    number = pen.frame(str(span.line).rjust(margin))
+    bar = style.frame("|")
+    number = style.frame(str(span.line).rjust(margin))
     shown, _, _ = _window(span)
     return [
-        f"{space}{pen.frame(arrow)} {visible(str(span))}",
+        f"{space}{style.frame(arrow)} {visible(str(span))}",
         f"{space} {bar}",
         f"{number} {bar} {visible(shown)}".rstrip(),
-        *(f"{space} {bar} {_under(mark, pen)}" for mark in marks),
+        *(f"{space} {bar} {_under(mark, style)}" for mark in marks),
     ]
 
 
-def _under(mark: Mark, pen: Pen) -> str:
+def _under(mark: Annotation, style: Style) -> str:
     shown, column, length = _window(mark.span)
     before = width(shown[:column])
     cells = max(width(shown[column : column + length]), 1)
     note = f" {visible(mark.message)}" if mark.message else ""
-    return f"{' ' * before}{pen.write(mark.sign * cells, *mark.codes)}{note}"
+    return f"{' ' * before}{style.write(mark.marker * cells, *mark.codes)}{note}"
 
 
 def _window(span: Span) -> tuple[str, int, int]:
-    """Return the piece of the line to show, where in it the span begins, and how long it is."""
+    """Return the part of the line to show, and the start and length of the span in it."""
     line = span.file.line(span.line)
     column = min(max(span.column - 1, 0), len(line))
     length = min(span.length, len(line) - column)

@@ -1,4 +1,4 @@
-"""What the reports say about who made them."""
+"""The name and version of this tool."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ NAME = "ros2-composer"
 
 
 def tool_version() -> str:
-    """Return the version of the installed distribution; ``0+source`` in a mere checkout."""
+    """Return the version of the installed distribution; ``0+source`` in a checkout without it."""
     try:
         return version(NAME)
     except PackageNotFoundError:

@@ -12,7 +12,7 @@ def test_a_rule_is_found_by_code_or_name(name: str) -> None:
     done = compose("rule", name)
     assert done.code == 0
     assert done.out.startswith("RC202 unknown-node (error)\n")
-    assert "Instead of" in done.out
+    assert "Use instead" in done.out
 
 
 def test_all_rules_are_listed() -> None:

@@ -71,7 +71,7 @@ def test_problems_of_a_shared_node_type_are_reported_once(folder: Path) -> None:
     for name in ("first", "second"):
         Path(f"{name}.yaml").write_text(f"system: {name}\nnodes: {{one: {{type: odd}}}}\n")
     done = compose("validate", "--format", "json", ".")
-    places = [finding["location"]["file"] for finding in json.loads(done.out)["findings"]]
+    places = [finding["location"]["file"] for finding in json.loads(done.out)["diagnostics"]]
     assert places.count("nodes/odd.yaml") == 1
 
 
@@ -117,7 +117,7 @@ def test_wrong_settings_are_reported_once(folder: Path) -> None:
     done = compose("validate", "fine.yaml", "other.yaml", "--format", "json")
     found = [
         (item["rule"], item["location"]["file"], item["location"]["line"], item["hint"])
-        for item in json.loads(done.out)["findings"]
+        for item in json.loads(done.out)["diagnostics"]
     ]
     assert found == [
         ("bad-setting", "composer.yaml", 1, "did you mean 'qos-implicit'?"),
@@ -190,7 +190,7 @@ def test_strict_treats_warnings_as_errors(folder: Path) -> None:
     text = "system: deep\nnodes:\n  one: {namespace: a/b/c/d/e}\n"
     Path("deep.yaml").write_text(text)
     relaxed = compose("validate", "deep.yaml", "--format", "json")
-    assert [item["severity"] for item in json.loads(relaxed.out)["findings"]] == ["warning"]
+    assert [item["severity"] for item in json.loads(relaxed.out)["diagnostics"]] == ["warning"]
     assert relaxed.code == 0
     assert compose("validate", "deep.yaml", "--strict").code == 1
 
@@ -198,7 +198,9 @@ def test_strict_treats_warnings_as_errors(folder: Path) -> None:
 @pytest.mark.parametrize("rule", ["RC301", "RC3", "qos-incompatible"])
 def test_rules_can_be_selected_and_ignored(folder: Path, rule: str) -> None:
     Path("twisted.yaml").write_text(TWISTED)
-    (found,) = json.loads(compose("validate", "twisted.yaml", "--format", "json").out)["findings"]
+    (found,) = json.loads(compose("validate", "twisted.yaml", "--format", "json").out)[
+        "diagnostics"
+    ]
     rule = {"RC301": found["code"], "RC3": found["code"][:3]}.get(rule, found["rule"])
     assert compose("validate", "twisted.yaml", "--select", rule).code == 1
     assert compose("validate", "twisted.yaml", "--ignore", rule).code == 0
@@ -208,7 +210,7 @@ def test_rules_can_be_selected_and_ignored(folder: Path, rule: str) -> None:
 def test_an_unknown_rule_is_a_usage_error_with_a_suggestion(folder: Path) -> None:
     done = compose("validate", "fine.yaml", "--ignore", "unknown-nod")
     assert done.code == 2
-    assert done.err == "compose: no rule is called 'unknown-nod'\n  did you mean 'unknown-node'?\n"
+    assert done.err == "compose: no rule is named 'unknown-nod'\n  did you mean 'unknown-node'?\n"
 
 
 def test_github_actions_selects_github_annotations(

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from composer.diagnostics import LONGEST_ECHO
+from composer.diagnostics import MAXIMUM_VALUE_LENGTH
 from composer.document import parse_bytes, parse_document
 from composer.document.limits import MAX_INTEGER, MIN_INTEGER
 from composer.source import SourceFile
@@ -42,7 +42,7 @@ def test_any_bytes(data: bytes) -> None:
         assert 1 <= diagnostic.primary.line <= len(source.lines)
         assert 1 <= diagnostic.primary.column <= len(source.line(diagnostic.primary.line)) + 1
         assert diagnostic.message.isprintable()
-        assert len(diagnostic.message) < 2 * LONGEST_ECHO + 100
+        assert len(diagnostic.message) < 2 * MAXIMUM_VALUE_LENGTH + 100
 
 
 @examples(500)

@@ -117,7 +117,7 @@ def test_reports_match_their_schema(ajv: Ajv) -> None:
     tree, _, diagnostics = read_document(Path("/no/such/file"))
     assert tree is None
     assert ajv([(REPORT, json.loads(report.render(diagnostics)))]) == [[]]
-    assert ajv([(REPORT, {"version": 1, "findings": []})]) != [[]]
+    assert ajv([(REPORT, {"version": 1, "diagnostics": []})]) != [[]]
 
 
 @pytest.mark.parametrize("text", INVALID)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.diagnostics import LONGEST_ECHO, Diagnostic, Rule, Severity, in_order, shown
+from composer.diagnostics import MAXIMUM_VALUE_LENGTH, Diagnostic, Rule, Severity, in_order, shown
 from composer.source import SourceFile, Span
 
 RULE = Rule("RC999", "example", Severity.ERROR, "", "", "", "")
@@ -31,8 +31,8 @@ def test_shown(value: object, text: str) -> None:
 
 
 def test_shown_is_cut() -> None:
-    assert shown("x" * LONGEST_ECHO) == "x" * LONGEST_ECHO
-    assert shown("x" * 1_000_000) == "x" * (LONGEST_ECHO - 3) + "..."
+    assert shown("x" * MAXIMUM_VALUE_LENGTH) == "x" * MAXIMUM_VALUE_LENGTH
+    assert shown("x" * 1_000_000) == "x" * (MAXIMUM_VALUE_LENGTH - 3) + "..."
     assert shown("abcdef", limit=5) == "ab..."
 
 

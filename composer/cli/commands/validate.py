@@ -162,10 +162,10 @@ def _selected(
     if not select and not ignore:
         return diagnostics
     from composer.report.rule_page import all_rules
-    from composer.report.selection import UnknownRule, chosen
+    from composer.report.selection import UnknownRule, select_diagnostics
 
     try:
-        return chosen(diagnostics, all_rules(), select, ignore)
+        return select_diagnostics(diagnostics, all_rules(), select, ignore)
     except UnknownRule as error:
         raise UsageError(str(error), hint=error.hint) from error
 

@@ -38,7 +38,7 @@ def test_json_is_what_its_schema_says() -> None:
 def test_json_says_all_there_is_to_say() -> None:
     report = json.loads(json_report.render(example()))
     assert report["summary"] == {"errors": 2, "warnings": 0, "infos": 1}
-    assert report["findings"][0] == {
+    assert report["diagnostics"][0] == {
         "code": "RC999",
         "rule": "made-up",
         "severity": "error",
@@ -48,7 +48,7 @@ def test_json_says_all_there_is_to_say() -> None:
         "related": [],
         "fingerprint": fingerprints(example())[0],
     }
-    assert [label["message"] for label in report["findings"][2]["related"]] == ["this one"]
+    assert [label["message"] for label in report["diagnostics"][2]["related"]] == ["this one"]
 
 
 #: The properties that SARIF 2.1.0 knows for the objects that are used: OASIS, section 3.

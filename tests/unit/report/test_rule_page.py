@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.diagnostics import Rule
-from composer.report.rule_page import BANDS, all_rules, explain, find_rule, page
-from composer.report.samples import files_of
+from composer.report.rule_page import BANDS, all_rules, explain, files_of, find_rule, page
 
 PAGE = Path(__file__).parents[3] / "docs" / "rules.md"
 

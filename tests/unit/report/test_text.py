@@ -120,7 +120,7 @@ def test_without_colour_there_is_no_escape_and_with_it_the_same_words() -> None:
 @pytest.mark.parametrize(
     ("severities", "line"),
     [
-        ([], "no findings"),
+        ([], "no diagnostics"),
         ([Severity.ERROR], "found 1 error"),
         ([Severity.WARNING, Severity.ERROR] * 2, "found 2 errors, 2 warnings"),
         ([Severity.INFO], "found 1 info"),

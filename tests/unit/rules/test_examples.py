@@ -8,8 +8,7 @@ import pytest
 
 from composer.diagnostics import Diagnostic, Rule
 from composer.loading import load
-from composer.report.rule_page import all_rules
-from composer.report.samples import files_of
+from composer.report.rule_page import all_rules, files_of
 from composer.rules import all_checks
 
 # Examples of rules about what is not YAML of ours - a command line, bytes - are not run here.
