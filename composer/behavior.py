@@ -1,22 +1,22 @@
-"""What Python behaviours are written against. Nothing here needs ROS.
+"""The API for Python behaviors. It does not need ROS.
 
-A behaviour is a plain class beside its node type. Handlers bind by name::
+A behavior is a plain class beside its node type. Handlers are bound by name::
 
     class Planner(Behavior):
         def on_sensor_data(self, message): ...              # subscription `sensor_data`
         def on_tick(self): ...                               # timer `tick`
         def on_plan_trajectory(self, request, response): ... # service; returns the response
         async def on_navigate(self, goal): ...               # action server; returns the result
-        def accept_navigate(self, request) -> bool: ...      # optional: which goals are taken
+        def accept_navigate(self, request) -> bool: ...      # optional: which goals to accept
         def on_parameters(self, changes): ...                # optional: after a run-time change
         def on_configure(self): ...                          # and on_activate, on_deactivate,
                                                              # on_cleanup, on_shutdown, on_error
 
-What a handler receives is shared with others and is not to be changed, nor is what was published.
+Messages that a handler receives or has published are shared: do not change them.
 
-Every handler may be ``async def``. Lifecycle handlers return nothing; raising makes the
-transition fail: :class:`TransitionFailed` refuses it (the node stays where it was), any other
-exception is an error (the node's ``on_error`` runs with it, and the node is unconfigured after).
+Every handler may be ``async def``. Lifecycle handlers return nothing. An exception makes the
+transition fail: :class:`TransitionFailed` refuses it, and the node keeps its state; any other
+exception is an error, which calls the node's ``on_error`` and leaves the node unconfigured.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from typing import Any, Protocol
 
 
 class BehaviorError(Exception):
-    """Base of everything a behaviour may catch from the composer."""
+    """Base class of the exceptions for behaviors."""
 
 
 class TransitionFailed(BehaviorError):
@@ -34,30 +34,30 @@ class TransitionFailed(BehaviorError):
 
 
 class CallError(BehaviorError):
-    """A service call or an action goal that came to nothing."""
+    """A service call or an action goal failed."""
 
 
 class ServerUnavailable(CallError):
-    """No server was there within the timeout."""
+    """No server was available within the timeout."""
 
 
 class CallTimeout(CallError):
-    """The server did not answer within the timeout."""
+    """The server did not respond within the timeout."""
 
 
 class CallCancelled(CallError):
-    """The node that called left the active state before the answer came."""
+    """The calling node left the active state before the response arrived."""
 
 
 class GoalRejected(CallError):
-    """The action server did not take the goal."""
+    """The action server rejected the goal."""
 
 
 class Publisher(Protocol):
-    """A publisher port. What is published while the node is not active is dropped and counted."""
+    """A publisher port. Messages published while the node is inactive are dropped and counted."""
 
     def publish(self, message: Any) -> None:
-        """Send ``message``. It must not be changed afterwards: receivers get this very object."""
+        """Publish ``message``. Do not change it afterwards: receivers share the object."""
 
     @property
     def message_type(self) -> Any:
@@ -68,32 +68,32 @@ class Client(Protocol):
     """A service client port."""
 
     def call(self, request: Any, *, timeout_ms: float | None = None) -> Awaitable[Any]:
-        """Wait for the server and its answer, both within the timeout (the port's unless given).
+        """Call the service; wait for server and response up to the timeout (default: the port's).
 
         Raises ServerUnavailable, CallTimeout, CallCancelled.
         """
 
     @property
     def service_type(self) -> Any:
-        """The service class; ``service_type.Request`` is what to send."""
+        """The service class; ``service_type.Request`` is the request class."""
 
 
 class SentGoal(Protocol):
-    """A goal that an action server took."""
+    """A goal that an action server accepted."""
 
     def result(self, *, timeout_ms: float | None = None) -> Awaitable[GoalResult]:
-        """Wait for the end of the goal. Raises CallTimeout, CallCancelled."""
+        """Wait for the result of the goal. Raises CallTimeout, CallCancelled."""
 
     def cancel(self) -> Awaitable[bool]:
-        """Ask the server to cancel; true when it agreed."""
+        """Request to cancel the goal; true if the server accepts."""
 
 
 class GoalResult(Protocol):
-    """How a goal ended: ``status`` is ``succeeded``, ``canceled`` or ``aborted``."""
+    """The result of a goal; ``status`` is ``succeeded``, ``canceled`` or ``aborted``."""
 
     @property
     def status(self) -> str:
-        """The end state, as action_msgs/msg/GoalStatus spells it, in lower case."""
+        """The final status, as in action_msgs/msg/GoalStatus but in lower case."""
 
     @property
     def result(self) -> Any:
@@ -110,21 +110,21 @@ class ActionClient(Protocol):
         on_feedback: Callable[[Any], None] | None = None,
         timeout_ms: float | None = None,
     ) -> Awaitable[SentGoal]:
-        """Wait for the server and its word on the goal.
+        """Send a goal, and wait until the server accepts or rejects it.
 
         Raises ServerUnavailable, CallTimeout, CallCancelled, GoalRejected.
         """
 
     @property
     def action_type(self) -> Any:
-        """The action class; ``action_type.Goal`` is what to send."""
+        """The action class; ``action_type.Goal`` is the goal class."""
 
 
 class Goal(Protocol):
-    """A goal being worked on, as an action server's handler gets it.
+    """A goal that an action server's handler executes.
 
-    A handler that returns without naming the end has succeeded, or is canceled when that was asked
-    for; one that raises has aborted.
+    If the handler returns without a final status, the goal succeeds, or is canceled if that was
+    requested. If it raises, the goal is aborted.
     """
 
     @property
@@ -133,10 +133,10 @@ class Goal(Protocol):
 
     @property
     def is_cancel_requested(self) -> bool:
-        """True once the client asked for the end, or the node is leaving the active state."""
+        """True if the client requested to cancel, or the node is leaving the active state."""
 
     def publish_feedback(self, feedback: Any) -> None:
-        """Send feedback to the client."""
+        """Publish feedback to the client."""
 
     def succeed(self) -> None:
         """End the goal as succeeded."""
@@ -149,22 +149,22 @@ class Goal(Protocol):
 
 
 class Logger(Protocol):
-    """The node's logger: to the terminal and to /rosout."""
+    """The node's logger, for the terminal and /rosout."""
 
     def debug(self, message: str) -> None:
-        """Log for whoever looks for a fault."""
+        """Log a debug message."""
 
     def info(self, message: str) -> None:
-        """Log what a person running the system wants to see."""
+        """Log an informational message."""
 
     def warn(self, message: str) -> None:
-        """Log what may be wrong."""
+        """Log a warning."""
 
     def error(self, message: str) -> None:
-        """Log what is wrong."""
+        """Log an error."""
 
     def fatal(self, message: str) -> None:
-        """Log what ends the node."""
+        """Log a fatal error."""
 
 
 class Clock(Protocol):
@@ -177,16 +177,16 @@ class Clock(Protocol):
         """Return the time as a builtin_interfaces/msg/Time, for message headers."""
 
     def sleep(self, seconds: float) -> Awaitable[None]:
-        """Let other callbacks run for so long. Raises CallCancelled when the node leaves active."""
+        """Sleep without blocking. Raises CallCancelled if the node leaves the active state."""
 
 
 class Behavior:
-    """Base of behaviours: names what the composer sets before ``on_configure``.
+    """Base class of behaviors: the attributes that the composer sets before ``on_configure``.
 
-    In a test without ROS, set the attributes a handler uses to whatever stands in for them.
+    In a test without ROS, set the attributes that a handler uses to test doubles.
     """
 
-    # Slots are in the object, where a message finds them at once. Whatever else may be set as well.
+    # Slots are faster to access than the dict, which subclasses use for their own attributes.
     __slots__ = (
         "__dict__",
         "__weakref__",
@@ -200,7 +200,7 @@ class Behavior:
     )
 
     name: str
-    parameters: Any  # self.parameters.max_velocity: the value now
+    parameters: Any  # self.parameters.max_velocity: the current value
     publishers: Any  # self.publishers.motor_commands: a Publisher
     clients: Any  # self.clients.plan_trajectory: a Client
     action_clients: Any  # self.action_clients.navigate: an ActionClient

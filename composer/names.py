@@ -1,19 +1,19 @@
-"""ROS names: which are valid, and what they become in a node.
+"""Validate and expand ROS names.
 
 The rules are those of design.ros2.org "Topic and Service name mapping" as rcl and rmw check them
 (``rcl_validate_topic_name``, ``rmw_validate_namespace``, ``rmw_validate_node_name``). Functions
-that end in ``_problem`` return None for a valid name, else what is wrong with it, to be read
-after the name ("contains a space").
+that end in ``_problem`` return None for a valid name, else what is wrong with it, worded to follow
+the name ("contains a space").
 
-In two things this keeps to the design page where rcl is lax: no ``__`` in topic names and
-namespaces, and nothing but a ``/`` behind ``~``.
+This follows the design page where rcl is less strict: no ``__`` in topic names and namespaces, and
+only a ``/`` after ``~``.
 """
 
 from __future__ import annotations
 
 import re
 
-#: rmw's limits in characters: what DDS leaves of its 255 after the prefixes ROS adds.
+#: rmw's limits in characters: the 255 of DDS minus the prefixes that ROS adds.
 MAXIMUM_NODE_NAME_LENGTH = 255
 MAXIMUM_NAMESPACE_LENGTH = 245
 MAXIMUM_TOPIC_NAME_LENGTH = 247
@@ -22,7 +22,7 @@ _FOREIGN_CHARACTER = re.compile(r"[^A-Za-z0-9_]")
 
 
 def node_name_problem(name: str) -> str | None:
-    """Return what keeps ``name`` from being a node's base name, or None."""
+    """Return why ``name`` is not a valid node name, or None."""
     return (
         _empty_problem(name)
         or _character_problem(name)
@@ -32,7 +32,7 @@ def node_name_problem(name: str) -> str | None:
 
 
 def namespace_problem(name: str) -> str | None:
-    """Return what keeps ``name`` from being a namespace, absolute or relative, or None."""
+    """Return why ``name`` is not a valid absolute or relative namespace, or None."""
     if name == "/":
         return None
     return (
@@ -44,7 +44,7 @@ def namespace_problem(name: str) -> str | None:
 
 
 def topic_name_problem(name: str) -> str | None:
-    """Return what keeps ``name`` from naming a topic, service or action, or None.
+    """Return why ``name`` is not a valid name of a topic, service or action, or None.
 
     The name may be relative (``scan``), private (``~/scan``, ``~``) or absolute (``/scan``).
     """
@@ -52,17 +52,17 @@ def topic_name_problem(name: str) -> str | None:
         return None
     return (
         _empty_problem(name)
-        or ("has no '/' behind '~'" if re.match(r"~[^/]", name) else None)
+        or ("has no '/' after '~'" if re.match(r"~[^/]", name) else None)
         or _path_problem(name.removeprefix("~").removeprefix("/"))
         or _length_problem(name, MAXIMUM_TOPIC_NAME_LENGTH)
     )
 
 
 def parameter_name_problem(name: str) -> str | None:
-    """Return what keeps ``name`` from being a parameter's name, or None.
+    """Return why ``name`` is not a valid parameter name, or None.
 
-    rcl takes any text that is not empty; this asks for words joined by dots, since parameter
-    files and expressions cannot name anything else.
+    rcl accepts any text that is not empty. This requires words joined by dots, since parameter
+    files and expressions cannot use other names.
     """
     if not name:
         return "is empty"
@@ -73,7 +73,7 @@ def parameter_name_problem(name: str) -> str | None:
 
 
 def expand_name(name: str, node_name: str, namespace: str) -> str:
-    """Return the absolute name that ``name`` has in a node, as ``rcl_expand_topic_name`` does.
+    """Return the absolute name of ``name`` in a node, as ``rcl_expand_topic_name`` does.
 
     ``{node}``, ``{ns}`` and ``{namespace}`` are not substituted: braces are expressions here.
     """
@@ -93,12 +93,12 @@ def join(namespace: str, relative: str) -> str:
 
 
 def is_hidden(name: str) -> bool:
-    """Say whether ROS tools leave ``name`` out unless asked: a part begins with an underscore."""
+    """Return whether ROS tools hide ``name`` by default: a part begins with an underscore."""
     return any(token.startswith("_") for token in name.split("/"))
 
 
 def matches_wildcard(pattern: str, part: str) -> bool:
-    """Say whether ``part`` of a name fits ``pattern``, in which ``*`` is any text."""
+    """Return whether ``part`` of a name matches ``pattern``, in which ``*`` is any text."""
     pieces = pattern.split("*")
     if len(pieces) == 1:
         return pattern == part
@@ -130,7 +130,7 @@ def _character_problem(text: str) -> str | None:
 
 
 def _path_problem(path: str) -> str | None:
-    """Judge the parts between slashes."""
+    """Check the parts between slashes."""
     *_, last = tokens = path.split("/")
     if not last:
         return "ends with '/'"
@@ -140,7 +140,7 @@ def _path_problem(path: str) -> str | None:
 
 def _token_problem(token: str) -> str | None:
     if not token:
-        return "has nothing between two '/'"
+        return "has an empty part between slashes"
     return _character_problem(token) or (
         f"has a part that begins with a digit: '{token}'" if token[0].isdigit() else None
     )

@@ -12,28 +12,28 @@ from enum import StrEnum
 
 
 class History(StrEnum):
-    """How many samples an endpoint keeps."""
+    """How many samples to keep."""
 
     KEEP_LAST = "keep_last"
     KEEP_ALL = "keep_all"
 
 
 class Reliability(StrEnum):
-    """Whether a lost sample is sent again."""
+    """Whether lost samples are sent again."""
 
     RELIABLE = "reliable"
     BEST_EFFORT = "best_effort"
 
 
 class Durability(StrEnum):
-    """Whether a late joiner gets what was published before it came."""
+    """Whether late joiners get earlier samples."""
 
     VOLATILE = "volatile"
     TRANSIENT_LOCAL = "transient_local"
 
 
 class Liveliness(StrEnum):
-    """Who asserts that a publisher is alive."""
+    """How a publisher asserts that it is alive."""
 
     AUTOMATIC = "automatic"
     MANUAL_BY_TOPIC = "manual_by_topic"
@@ -54,18 +54,18 @@ class QosProfile:
 
     @property
     def queue_depth(self) -> int | None:
-        """How many messages may wait; None where the history keeps all."""
+        """Maximum number of queued messages; None if the history keeps all."""
         return None if self.history is History.KEEP_ALL else max(self.depth, 1)
 
 
-#: The profiles that can be named without being declared.
+#: The predefined profiles.
 #:
 #: ``sensor_data``, ``services_default`` and ``parameters`` are those of rmw/qos_profiles.h.
-#: ``command`` and ``state`` are the other two patterns of ROS 2 practice: orders that must arrive,
-#: and a latest value that late joiners get. ``system_default`` leaves the choice to the middleware
-#: in ROS, and Fast DDS chooses differently for each end (publishers reliable and transient local,
-#: subscriptions best effort and volatile); a declared system says what it means, so here it is
-#: what rclpy takes for a topic unless told otherwise.
+#: ``command`` and ``state`` are two common patterns: commands that must arrive, and a latest value
+#: that late joiners get. In ROS, ``system_default`` leaves the choice to the middleware, and Fast
+#: DDS
+#: chooses differently for publishers (reliable, transient local) and subscriptions (best effort,
+#: volatile). A declared system is explicit, so here it is rclpy's default for topics.
 PRESETS: Mapping[str, QosProfile] = {
     "sensor_data": QosProfile(depth=5, reliability=Reliability.BEST_EFFORT),
     "command": QosProfile(),
@@ -78,7 +78,7 @@ PRESETS: Mapping[str, QosProfile] = {
 
 @dataclass(frozen=True, slots=True)
 class Incompatibility:
-    """A policy in which an offer is weaker than a request, so that the two ends never match."""
+    """A policy in which an offer is weaker than the request, so that endpoints never match."""
 
     policy: str
     offered: str
@@ -87,7 +87,7 @@ class Incompatibility:
 
 
 def incompatibilities(offered: QosProfile, requested: QosProfile) -> tuple[Incompatibility, ...]:
-    """Return every policy that keeps two ends apart; none when they match.
+    """Return all policies that prevent two endpoints from matching.
 
     A publisher or server offers, a subscription or client requests, and the offer must be at least
     as strong. The rule is that of DDS (OMG DDS 1.4, 2.2.3) as ``rmw_qos_profile_check_compatible``
@@ -107,16 +107,16 @@ def _incompatibilities(offered: QosProfile, requested: QosProfile) -> Iterator[I
         Durability.VOLATILE,
         Durability.TRANSIENT_LOCAL,
     ):
-        reason = "the publisher keeps nothing for late joiners"
+        reason = "the publisher does not keep messages for late joiners"
         yield _incompatibility("durability", offered.durability, requested.durability, reason)
     if _is_longer(offered.deadline_ms, requested.deadline_ms):
-        reason = "the publisher promises messages less often than the subscription asks for"
+        reason = "the publisher offers a longer deadline than the subscription requests"
         yield _incompatibility("deadline_ms", offered.deadline_ms, requested.deadline_ms, reason)
     if (offered.liveliness, requested.liveliness) == (
         Liveliness.AUTOMATIC,
         Liveliness.MANUAL_BY_TOPIC,
     ):
-        reason = "the publisher does not assert its liveliness by hand"
+        reason = "the publisher does not assert its liveliness manually"
         yield _incompatibility("liveliness", offered.liveliness, requested.liveliness, reason)
     if _is_longer(offered.liveliness_lease_duration_ms, requested.liveliness_lease_duration_ms):
         reason = "the publisher may be silent for longer than the subscription allows"

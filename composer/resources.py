@@ -1,7 +1,7 @@
-"""Where the files that are not Python are: JSON Schemas, node types, systems, interfaces.
+"""Folders of data files: JSON Schemas, node types, systems, interfaces.
 
-A wheel carries them in ``composer/share/`` (pyproject.toml puts them there); in a checkout, and in
-an editable install of one, they stand beside the package.
+A wheel has them in ``composer/share/`` (see pyproject.toml). In a checkout or an editable install,
+they are beside the package.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ _PACKAGE = Path(__file__).resolve().parent
 
 def _folder(name: str) -> Path:
     share = _PACKAGE / "share"
-    # The wheel first: beside an installed package, `nodes` would be some other distribution's.
+    # The wheel first: `nodes` beside an installed package would belong to another distribution.
     return (share if share.is_dir() else _PACKAGE.parent) / name
 
 

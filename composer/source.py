@@ -1,4 +1,4 @@
-"""Where a value was written: the file it stands in and the stretch of text it covers."""
+"""Locations of values: source files and spans of text."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ U = TypeVar("U")
 
 @dataclass(frozen=True, slots=True)
 class SourceFile:
-    """A text that was read once and is kept, so that diagnostics can quote it.
+    """The text of a file, kept so that diagnostics can quote it.
 
-    ``path`` is the path as people know it (what they typed, or relative to it); two source
-    files are equal when their paths are.
+    ``path`` is the path as the user typed it, or relative to that. Source files with the same path
+    are equal.
     """
 
     path: str
@@ -24,18 +24,18 @@ class SourceFile:
     lines: tuple[str, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        # str.splitlines also splits at form feeds and the like, which YAML does not.
+        # Unlike YAML, str.splitlines also splits at form feeds and other characters.
         normalized = self.text.replace("\r\n", "\n").replace("\r", "\n")
         object.__setattr__(self, "lines", tuple(normalized.split("\n")))
 
     def line(self, number: int) -> str:
-        """Return line ``number`` (counted from 1) without its end; empty when there is none."""
+        """Return line ``number``, counted from 1, without its line break; empty if out of range."""
         return self.lines[number - 1] if 1 <= number <= len(self.lines) else ""
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Span:
-    """A stretch of one line. Lines and columns count from 1, columns and length in characters."""
+    """A part of a line. Lines and columns count from 1, columns and length in characters."""
 
     file: SourceFile = field(compare=False)
     line: int
@@ -43,7 +43,7 @@ class Span:
     length: int = 1
 
     def part(self, start: int, length: int) -> Span:
-        """Return the span that begins ``start`` characters into this one."""
+        """Return the part that begins ``start`` characters into this span."""
         return Span(self.file, self.line, self.column + start, max(length, 1))
 
     def __str__(self) -> str:
@@ -52,13 +52,13 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Located(Generic[T]):
-    """A value together with the place it was written at. Equality ignores the place."""
+    """A value with its location. Equality ignores the location."""
 
     value: T
     span: Span = field(compare=False)
 
     def map(self, function: Callable[[T], U]) -> Located[U]:
-        """Return ``function`` of the value, at the same place."""
+        """Return ``function`` of the value, with the same location."""
         return Located(function(self.value), self.span)
 
     def __str__(self) -> str:
@@ -66,7 +66,7 @@ class Located(Generic[T]):
 
 
 def shown_path(path: Path) -> str:
-    """Return ``path`` as people know it: relative to the current folder where it is below it."""
+    """Return ``path`` for messages: relative to the current folder if it is below it."""
     try:
         return str((path.parent.resolve() / path.name).relative_to(Path.cwd()))
     except (OSError, RuntimeError, ValueError):

@@ -1,8 +1,10 @@
-"""The name that a misspelt one was most likely meant to be.
+"""Find the name that a misspelled one was most likely meant to be.
 
-Of a few names all are compared. Of many only those that stand beside it in alphabetical order, read
-forwards and backwards: a slip leaves the beginning or the end of a name as it was, and an answer
-takes no longer the more names there are.
+Few names are all compared. Of many names, only those next to it in alphabetical order are, read
+forwards and
+backwards: most typos leave the beginning or the end of a name unchanged, and the time hardly grows
+with
+the number of names.
 """
 
 from __future__ import annotations
@@ -12,17 +14,17 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from functools import lru_cache
 
-#: How alike two names must be, from 0 to 1 (difflib: ratio).
+#: Minimum similarity of two names, from 0 to 1 (difflib's ratio).
 LEAST_LIKENESS = 0.6
-#: Longer names are not looked for: comparing takes quadratic time, and ROS allows no more.
+#: Longer names are skipped: comparing takes quadratic time, and ROS allows no longer ones.
 LONGEST_NAME = 255
 
 _FEW = 60
-_BESIDE = 12  # of many, this many on either side
+_BESIDE = 12  # number of candidates on each side, of many names
 
 
 class Vocabulary:
-    """Names that may be meant, in the order in which they are looked through."""
+    """Candidates for misspelled names."""
 
     __slots__ = ("_backwards", "_by_folded", "_forwards", "names")
 
@@ -33,7 +35,7 @@ class Vocabulary:
         self._backwards = sorted(name[::-1] for name in self._by_folded)
 
     def close(self, name: str, count: int = 1) -> list[str]:
-        """Return up to ``count`` names that ``name`` may have been meant to be, likeliest first."""
+        """Return up to ``count`` names similar to ``name``, most similar first."""
         if len(name) > LONGEST_NAME:
             return []
         folded = name.casefold()
@@ -52,7 +54,7 @@ class Vocabulary:
 
 @lru_cache(maxsize=16)
 def vocabulary(names: tuple[str, ...]) -> Vocabulary:
-    """Return the vocabulary of ``names``, made once for the same names: slips come in rows."""
+    """Return the vocabulary of ``names``, cached, since typos often repeat."""
     return Vocabulary(names)
 
 

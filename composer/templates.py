@@ -1,9 +1,12 @@
-"""Values that are worked out at run time: constants, ``{expressions}``, text and maps of them.
+"""Templates: values evaluated at run time, with ``{expression}`` in their texts.
 
-In a text ``{expression}`` is replaced by its value and ``{expression:.2f}`` by its value in a
-format of Python's mini-language (flags, at most two digits of width and precision, one type
-letter); ``{{`` and ``}}`` are braces. A text that is nothing but one ``{expression}`` keeps the
-type of the value. A text with a ``${variable}`` that has no value yet is left alone.
+In a text, ``{expression}`` is replaced by its value, and ``{expression:.2f}`` by its formatted
+value
+(Python's format specification with at most two digits of width and precision). ``{{`` and ``}}``
+are
+braces. A text with a single ``{expression}`` and nothing else keeps the type of the value. A text
+with
+a ``${variable}`` without value is not changed.
 """
 
 from __future__ import annotations
@@ -37,7 +40,7 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Computed:
-    """A string that is one ``{expression}``: it keeps the type of the value."""
+    """A text that is one ``{expression}``, which keeps the type of its value."""
 
     expression: Expression
     span: Span = field(compare=False)
@@ -54,7 +57,7 @@ class Formatted:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A text with expressions in it."""
+    """A text that contains expressions."""
 
     parts: tuple[str | Formatted, ...]
     span: Span = field(compare=False)
@@ -62,7 +65,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A map of field names to templates: a message, or a part of one."""
+    """A map of field names to templates: a message or a part of it."""
 
     fields: tuple[tuple[Located[str], Template], ...]
     span: Span = field(compare=False)
@@ -81,7 +84,7 @@ Template: TypeAlias = "Constant | Computed | Text | Record | Items"
 
 @dataclass(frozen=True, slots=True)
 class TemplateProblem:
-    """What is wrong in a template as it is written."""
+    """An error in a template."""
 
     message: str
     span: Span
@@ -89,7 +92,7 @@ class TemplateProblem:
 
 
 def compile_template(value: Tree) -> tuple[Template | None, list[TemplateProblem]]:
-    """Return the template that ``value`` describes, or None and all that is wrong with it."""
+    """Return the template that ``value`` describes, or None with all problems."""
     problems: list[TemplateProblem] = []
     template = _compile(value, problems)
     return (None, problems) if problems else (template, [])
@@ -114,7 +117,7 @@ def evaluate(template: Template, scope: Mapping[str, Any]) -> Any:
 
 
 def expressions_in(template: Template) -> Iterator[tuple[Expression, Span]]:
-    """Yield every expression of the template with the place of its text (without braces)."""
+    """Yield every expression of the template with the span of its text, without braces."""
     match template:
         case Computed(expression=expression, span=span):
             yield expression, span
@@ -184,7 +187,7 @@ def _compile_text(scalar: tree.Scalar, text: str, problems: list[TemplateProblem
 
 
 def _pieces(text: str) -> Iterator[tuple[int, str]]:
-    """Yield offset and text of: plain stretches, ``{{``, ``}}``, ``{...}``, a lone brace."""
+    """Yield offset and text of the pieces: plain text, ``{{``, ``}}``, ``{...}``, a lone brace."""
     offset = 0
     while offset < len(text):
         end = _piece_end(text, offset)
@@ -203,7 +206,7 @@ def _piece_end(text: str, start: int) -> int:
 
 
 def _closing_brace(text: str, start: int) -> int:
-    """Return where the brace at ``start`` is closed, quotes respected; the end where it is not."""
+    """Return the index of the brace that closes the one at ``start``, or the end of the text."""
     quote = ""
     for at in range(start + 1, len(text)):
         character = text[at]
@@ -241,7 +244,7 @@ def _compile_braces(
 
 
 def _split_format(inside: str) -> tuple[str, str | None]:
-    """Return the expression and the format behind the first colon that is not in quotes."""
+    """Split at the first colon outside quotes into the expression and the format."""
     quote = ""
     for at, character in enumerate(inside):
         if quote:

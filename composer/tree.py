@@ -1,4 +1,4 @@
-"""The located tree: what a YAML text says, every key and value with the place it stands at."""
+"""The located tree: the content of a YAML file, with the location of every key and value."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from composer.source import Span
 
 #: A YAML 1.2 core-schema scalar.
 ScalarValue: TypeAlias = "bool | int | float | str | None"
-#: Plain Python data: what JSON could say.
+#: Plain Python data, as in JSON.
 Plain: TypeAlias = "ScalarValue | list[Plain] | dict[str, Plain]"
 
 
@@ -19,9 +19,9 @@ Plain: TypeAlias = "ScalarValue | list[Plain] | dict[str, Plain]"
 class Scalar:
     """A single value.
 
-    ``verbatim`` is true when the text in the file is the value, character by character (no
-    escapes, no folding), so that a part of the value has a place of its own. ``content_offset`` is
-    1 for quoted scalars: the span includes the quote.
+    ``verbatim`` is true if the text in the file equals the value, without escapes or folding, so
+    that parts of the value have spans. ``content_offset`` is 1 for quoted scalars: the span
+    includes the quotes.
     """
 
     value: ScalarValue
@@ -30,7 +30,7 @@ class Scalar:
     content_offset: int = field(default=0, compare=False)
 
     def part(self, start: int, length: int) -> Span:
-        """Return the place of a part of the value; of the whole where parts have none."""
+        """Return the span of a part of the value, or of the whole value if it is not verbatim."""
         return self.span.part(start + self.content_offset, length) if self.verbatim else self.span
 
 
@@ -51,20 +51,20 @@ class Entry:
 
     @property
     def name(self) -> str:
-        """The key as text; every key of a document is text."""
+        """The key as text."""
         return str(self.key.value)
 
 
 @dataclass(frozen=True, slots=True)
 class Mapping:
-    """A map with unique text keys, in the order they were written."""
+    """A map with unique text keys, in the order of the file."""
 
     entries: tuple[Entry, ...]
     span: Span = field(compare=False)
 
     def entry(self, name: str) -> Entry | None:
-        """Return the entry called ``name``, or None."""
-        for entry in self.entries:  # asked most of all: a generator would take twice as long
+        """Return the entry ``name``, or None."""
+        for entry in self.entries:  # called very often: a generator would take twice as long
             if entry.key.value == name:
                 return entry
         return None
@@ -82,7 +82,7 @@ Tree: TypeAlias = "Scalar | Sequence | Mapping"
 
 
 def plain(tree: Tree) -> Plain:
-    """Return the tree as plain Python data, without places."""
+    """Return the tree as plain Python data, without locations."""
     match tree:
         case Scalar():
             return tree.value

@@ -1,7 +1,7 @@
-"""The system model: what a YAML file declares, resolved as far as it can be, every value located.
+"""The system model: what a YAML file declares, resolved as far as possible, with locations.
 
-The model judges nothing. A reference to something that does not exist stays in it as it was
-written; the checks say what is wrong with it.
+The model does not check anything. A reference to a missing entity stays as written, and the rules
+report it.
 """
 
 from composer.model.introspection import DEFAULT_INTROSPECTION, Introspection

@@ -1,4 +1,4 @@
-"""Which node waits for which: declared, implied by services and actions, and what is a cycle."""
+"""Dependencies between nodes: declared, implied by services and actions, and cycles."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from composer.model.system import PrimaryState, System, channels
 class Edge:
     """``node`` waits until ``on`` is in ``state``. Both are keys of ``System.nodes``.
 
-    ``serves`` is the name of the service or action that ``on`` serves to ``node``; it is empty
-    where the system itself says ``depends_on``.
+    ``serves`` is the name of the service or action that ``on`` serves to ``node``; it is empty for
+    a declared dependency.
     """
 
     node: str
@@ -25,12 +25,12 @@ class Edge:
 
     @property
     def implied(self) -> bool:
-        """True when nobody wrote it down: servers start before their clients."""
+        """True unless declared with ``depends_on``: servers start before their clients."""
         return bool(self.serves)
 
 
 def declared_edges(system: System) -> Iterator[Edge]:
-    """Yield what ``depends_on`` says, in order. Names of no node of the system are left out."""
+    """Yield the declared dependencies in order, without those on unknown nodes."""
     for node in system.nodes:
         for dependency in node.depends_on:
             if system.node(dependency.node.value) is not None:
@@ -38,10 +38,10 @@ def declared_edges(system: System) -> Iterator[Edge]:
 
 
 def implied_edges(system: System) -> Iterator[Edge]:
-    """Yield an edge from every client of a service or action to the node that serves it.
+    """Yield an edge from every client of a service or action to its server.
 
-    That is the first one, if there are several: checks refuse a second. There are none where the
-    system does not want them.
+    Of several servers, which the rules refuse, the first is used. There are no edges if the system
+    disables implied dependencies.
     """
     if not system.implied_dependencies:
         return
@@ -55,10 +55,10 @@ def implied_edges(system: System) -> Iterator[Edge]:
 
 
 def dependency_edges(system: System) -> tuple[Edge, ...]:
-    """Return all declared edges, then the implied ones that are on no cycle.
+    """Return all declared edges, then the implied ones that are not on a cycle.
 
-    Two nodes that serve each other have no first; what the system says goes before what follows
-    from its wiring.
+    Nodes that serve each other have no order, and declared dependencies take precedence over
+    implied ones.
     """
     declared = tuple(declared_edges(system))
     implied = tuple(implied_edges(system))
@@ -71,10 +71,10 @@ def dependency_edges(system: System) -> tuple[Edge, ...]:
 
 
 def dependency_cycles(system: System) -> tuple[tuple[str, ...], ...]:
-    """Return one shortest cycle of ``depends_on`` for every set of nodes that wait for each other.
+    """Return a shortest cycle of ``depends_on`` for each set of nodes that wait for each other.
 
-    ``("a", "b")`` reads: a depends on b, which depends on a. Cycles start at the node declared
-    first and come in the order of their first nodes.
+    ``("a", "b")`` means that a depends on b, which depends on a. Each cycle starts at its first
+    declared node; cycles are ordered by these nodes.
     """
     graph = _graph(system, declared_edges(system))
     rank = {name: index for index, name in enumerate(graph)}
@@ -87,9 +87,9 @@ def dependency_cycles(system: System) -> tuple[tuple[str, ...], ...]:
 
 
 def in_dependency_order(system: System, edges: Sequence[Edge]) -> tuple[str, ...]:
-    """Return the names of all nodes, each behind those it waits for, else as declared.
+    """Return the names of all nodes in dependency order, else as declared.
 
-    A cycle is broken at the node declared first: checks refuse it, and this must end anyway.
+    A cycle, which the rules refuse, is broken at its first declared node.
     """
     graph = _graph(system, edges)
     names = list(graph)
@@ -118,7 +118,7 @@ Graph = Mapping[str, Mapping[str, None]]
 
 
 def _graph(system: System, edges: Sequence[Edge] | Iterator[Edge]) -> dict[str, dict[str, None]]:
-    """Return for every node, in order, the nodes it waits for, in order and each once."""
+    """Return the nodes that each node waits for, in order and without duplicates."""
     graph: dict[str, dict[str, None]] = {node.name.value: {} for node in system.nodes}
     for edge in edges:
         graph[edge.node][edge.on] = None
@@ -126,7 +126,7 @@ def _graph(system: System, edges: Sequence[Edge] | Iterator[Edge]) -> dict[str, 
 
 
 def _strong_groups(graph: Graph) -> Iterator[tuple[str, ...]]:
-    """Yield the strongly connected components (Tarjan), without recursion: chains may be long."""
+    """Yield the strongly connected components (Tarjan's algorithm), without recursion."""
     index: dict[str, int] = {}
     low: dict[str, int] = {}
     open_names: dict[str, None] = {}
@@ -155,7 +155,7 @@ def _strong_groups(graph: Graph) -> Iterator[tuple[str, ...]]:
 
 
 def _close(open_names: dict[str, None], name: str) -> tuple[str, ...]:
-    """Take ``name`` and everything opened after it out of ``open_names``."""
+    """Remove and return ``name`` and all names opened after it."""
     group = []
     while True:
         last, _ = open_names.popitem()
@@ -165,7 +165,7 @@ def _close(open_names: dict[str, None], name: str) -> tuple[str, ...]:
 
 
 def _shortest_cycle(graph: Graph, start: str, allowed: set[str]) -> tuple[str, ...]:
-    """Return the shortest way from ``start`` back to itself within a component."""
+    """Return the shortest path from ``start`` back to itself within a component."""
     came_from: dict[str, str] = {}
     frontier = [start]
     while frontier:
@@ -173,7 +173,7 @@ def _shortest_cycle(graph: Graph, start: str, allowed: set[str]) -> tuple[str, .
         for name in frontier:
             for other in graph[name]:
                 if other == start:
-                    return _way_back(came_from, start, name)
+                    return _path_back(came_from, start, name)
                 if other in allowed and other not in came_from:
                     came_from[other] = name
                     reached.append(other)
@@ -181,23 +181,23 @@ def _shortest_cycle(graph: Graph, start: str, allowed: set[str]) -> tuple[str, .
     return (start,)
 
 
-def _way_back(came_from: Mapping[str, str], start: str, last: str) -> tuple[str, ...]:
-    way = [last]
-    while way[-1] != start:
-        way.append(came_from[way[-1]])
-    return tuple(reversed(way))
+def _path_back(came_from: Mapping[str, str], start: str, last: str) -> tuple[str, ...]:
+    path = [last]
+    while path[-1] != start:
+        path.append(came_from[path[-1]])
+    return tuple(reversed(path))
 
 
 def dependents(system: System, node: str) -> frozenset[str]:
-    """Return the keys of the nodes that need ``node``, directly or through others."""
+    """Return the keys of the nodes that depend on ``node``, directly or indirectly."""
     needed_by: dict[str, list[str]] = {}
     for edge in dependency_edges(system):
         needed_by.setdefault(edge.on, []).append(edge.node)
     found: set[str] = set()
-    open_ends = [node]
-    while open_ends:
-        for name in needed_by.get(open_ends.pop(), ()):
+    pending = [node]
+    while pending:
+        for name in needed_by.get(pending.pop(), ()):
             if name not in found:
                 found.add(name)
-                open_ends.append(name)
+                pending.append(name)
     return frozenset(found - {node})

@@ -1,4 +1,4 @@
-"""What a node offers beside its own ports, for tools to look into it."""
+"""Which introspection endpoints a node offers to ROS tools."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Introspection:
-    """Which endpoints a node has for tools; those given up are never created.
+    """The endpoints of a node for ROS tools; disabled ones are never created.
 
     ``parameters``: the parameter services (rcl_interfaces); ``rosout``: the publisher of its log on
     /rosout; ``type_description``: the service of that name; ``lifecycle_services``: those of
-    lifecycle_msgs. The system's manager serves parameters and lifecycle of nodes without.
+    lifecycle_msgs. The manager node serves parameters and lifecycle for nodes without these
+    services.
     """
 
     parameters: bool = True
@@ -21,7 +22,7 @@ class Introspection:
 
     @property
     def left_to_manager(self) -> tuple[str, ...]:
-        """What the manager of the system answers for the node: "lifecycle", "parameters"."""
+        """The services that the manager node provides for the node: "lifecycle", "parameters"."""
         lifecycle = () if self.lifecycle_services else ("lifecycle",)
         return lifecycle if self.parameters else (*lifecycle, "parameters")
 

@@ -1,4 +1,4 @@
-"""What a node is made of: ports, timers, parameters, and what is done when something happens."""
+"""The parts of a node: ports, timers, parameters and reactions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from composer.tree import Plain
 
 
 class PortKind(StrEnum):
-    """The six kinds of port a node can have; the value is the word for one of them."""
+    """The kinds of ports; the value is the term for messages."""
 
     PUBLISHER = "publisher"
     SUBSCRIPTION = "subscription"
@@ -25,12 +25,12 @@ class PortKind(StrEnum):
 
     @property
     def section(self) -> str:
-        """The key of a node under which ports of this kind are declared."""
+        """The key of a node that declares ports of this kind."""
         return self.value.replace(" ", "_") + "s"
 
     @property
     def channel(self) -> ChannelKind:
-        """The kind of channel that such a port is an end of."""
+        """The kind of channel of such a port."""
         match self:
             case PortKind.PUBLISHER | PortKind.SUBSCRIPTION:
                 return ChannelKind.TOPIC
@@ -41,7 +41,7 @@ class PortKind(StrEnum):
 
 
 class ChannelKind(StrEnum):
-    """The three ways in which nodes talk to each other."""
+    """The kinds of channels between nodes."""
 
     TOPIC = "topic"
     SERVICE = "service"
@@ -49,26 +49,26 @@ class ChannelKind(StrEnum):
 
     @property
     def interface_folder(self) -> str:
-        """The middle of such a channel's type name: ``msg``, ``srv`` or ``action``."""
+        """The middle part of its interface names: ``msg``, ``srv`` or ``action``."""
         return {"topic": "msg", "service": "srv", "action": "action"}[self.value]
 
 
 class Delivery(StrEnum):
-    """How messages get from port to port within the process."""
+    """How messages are delivered between ports of the process."""
 
-    AUTO = "auto"  # straight, and by DDS as well to whoever is outside
-    DDS = "dds"  # by DDS alone
+    AUTO = "auto"  # directly in the process, and by DDS to external nodes
+    DDS = "dds"  # by DDS only
 
 
 class Isolation(StrEnum):
-    """Whether who publishes and who receives in one process hold the same object."""
+    """Whether subscriptions in the process share the published object or get a copy."""
 
     SHARE = "share"
     COPY = "copy"
 
 
 class Event(StrEnum):
-    """What a reaction reacts to."""
+    """The event that triggers a reaction."""
 
     MESSAGE = "message"  # subscription
     REQUEST = "request"  # service
@@ -85,7 +85,7 @@ class Event(StrEnum):
 
 
 class LogLevel(StrEnum):
-    """rcl's severities, as rclpy's loggers spell them."""
+    """The severities of rclpy's loggers."""
 
     DEBUG = "debug"
     INFO = "info"
@@ -96,7 +96,7 @@ class LogLevel(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """What goes out of a port: a message to publish, or a request or goal to send."""
+    """A message, request or goal to send through a port."""
 
     port: Located[str]
     content: Template
@@ -104,12 +104,11 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Reaction:
-    """What is done, in YAML, when something happens.
+    """A reaction to an event, declared in YAML.
 
-    Carried out in the order of the fields: nothing at all unless ``when`` is true; then the new
-    ``state`` (all values worked out from the old one), the log line, the messages, the calls and
-    goals, the response. ``when_span`` is the place of the expression's text, so that a diagnostic
-    can point into it.
+    If ``when`` is true, the fields take effect in this order: the new ``state`` (all values
+    computed from the old one), the log line, messages, calls and goals, the response. ``when_span``
+    is the span of the expression's text, so that a diagnostic can point into it.
     """
 
     span: Span = field(compare=False)
@@ -125,22 +124,22 @@ class Reaction:
 
 @dataclass(frozen=True, slots=True)
 class Qos:
-    """The profile a port uses, and the place that decided it: of the whole, and of each policy."""
+    """The QoS profile of a port, with the locations that set it and each of its policies."""
 
     profile: QosProfile
     span: Span = field(compare=False)
     explicit: bool = True
     policy_spans: tuple[tuple[str, Span], ...] = field(default=(), compare=False)
-    known: bool = True  # False: it builds on a name that is no profile, so the values are a guess
+    known: bool = True  # False: based on an unknown profile, so the values are a guess
 
     def policy_span(self, policy: str) -> Span:
-        """Return where ``policy`` was decided; where the whole profile was, if nowhere closer."""
+        """Return where ``policy`` was set, or the span of the whole profile."""
         return dict(self.policy_spans).get(policy, self.span)
 
 
 @dataclass(frozen=True, slots=True)
 class FeedbackSteps:
-    """A declared action: ``count`` feedback messages, one every ``period_ms``."""
+    """Declared feedback of an action: ``count`` messages, one every ``period_ms``."""
 
     count: Located[int]
     period_ms: Located[float]
@@ -150,59 +149,59 @@ class FeedbackSteps:
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """One end of a topic, service or action, as one node of one system has it."""
+    """An endpoint of a topic, service or action in a node of a system."""
 
     kind: PortKind
     name: Located[str]
     interface: Located[str]  # "std_msgs/msg/String"
-    ros_name: Located[str]  # as declared; the port's own name unless it says otherwise
-    full_name: str  # expanded, remapped and connected: what ROS will see
+    ros_name: Located[str]  # as declared; by default the name of the port
+    full_name: str  # expanded, remapped and connected: the name in ROS
     qos: Qos
     span: Span = field(compare=False)
     reactions: tuple[tuple[Event, Reaction], ...] = ()
-    timeout_ms: Located[float] | None = None  # clients: for the server and its (first) answer
-    result_timeout_ms: Located[float] | None = None  # action clients; None waits for ever
-    accept: Expression | None = None  # action servers: which goals are taken
+    timeout_ms: Located[float] | None = None  # clients: for the server and its (first) response
+    result_timeout_ms: Located[float] | None = None  # action clients; None waits forever
+    accept: Expression | None = None  # action servers: which goals are accepted
     accept_span: Span | None = field(default=None, compare=False)
     feedback: FeedbackSteps | None = None  # action servers
     result: Template | None = None  # action servers
-    budget_ms: Located[float] | None = None  # how long its callback may take
+    budget_ms: Located[float] | None = None  # maximum duration of its callback
     reentrant: bool = False
-    always_on: bool = False  # it lives while its node is inactive, too
-    external: bool = False  # the other end is outside this system
-    delivery: Delivery | None = None  # as its connection says; None: as the system does
+    always_on: bool = False  # also active while its node is inactive
+    external: bool = False  # connected to external nodes
+    delivery: Delivery | None = None  # set by its connection; None: the system's
     isolation: Isolation = Isolation.SHARE
-    required: bool | None = None  # whether an other end must be there; None: nobody said
+    required: bool | None = None  # whether another endpoint must exist; None: not set
     description: str = ""
 
     def reaction(self, event: Event) -> Reaction | None:
-        """Return what is declared for ``event``, or None."""
+        """Return the reaction to ``event``, or None."""
         return dict(self.reactions).get(event)
 
 
 class TimerClock(StrEnum):
-    """What a timer goes by."""
+    """The clock of a timer."""
 
-    ROS = "ros"  # the node's time: that of /clock with `use_sim_time`, else as STEADY
-    STEADY = "steady"  # real time, which nobody sets
+    ROS = "ros"  # the node's time: /clock with `use_sim_time`, else STEADY
+    STEADY = "steady"  # monotonic real time
 
 
 @dataclass(frozen=True, slots=True)
 class Timer:
-    """Something a node does again and again while it is active."""
+    """A timer of a node."""
 
     name: Located[str]
     period: Period
     span: Span = field(compare=False)
     reaction: Reaction | None = None
     clock: TimerClock = TimerClock.ROS
-    budget_ms: Located[float] | None = None  # how long its callback may take
+    budget_ms: Located[float] | None = None  # maximum duration of its callback
     reentrant: bool = False
-    always_on: bool = False  # it runs while its node is inactive, too
+    always_on: bool = False  # also runs while its node is inactive
     description: str = ""
 
 
-#: The parameter that every ROS node has: whether its time is that of /clock.
+#: The parameter of every ROS node that selects the time of /clock.
 USE_SIM_TIME = "use_sim_time"
 
 
@@ -222,13 +221,13 @@ class ParameterType(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A declared parameter and the value it starts with.
+    """A declared parameter and its initial value.
 
-    ``value`` is what the system gives; else it is the very ``default``; None without either.
+    ``value`` is the one set by the system, else the ``default`` object itself, else None.
     """
 
     name: Located[str]
-    type: Located[str]  # a ParameterType; other text is kept for the diagnostic
+    type: Located[str]  # a ParameterType; other text is kept for diagnostics
     value: Located[Plain] | None
     default: Located[Plain] | None
     span: Span = field(compare=False)

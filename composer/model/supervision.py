@@ -1,4 +1,4 @@
-"""What is done about a node that fails, and how it is told that one does."""
+"""Supervision of nodes: detection of failures, and how to handle them."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from enum import StrEnum
 
 from composer.source import Located, Span
 
-#: How long a transition may take, in milliseconds, unless the system says otherwise.
+#: Default timeout of a transition in milliseconds.
 DEFAULT_TIMEOUT_MS = 10_000.0
 
 
 class OnFailure(StrEnum):
-    """What is done about a node that has failed."""
+    """How to handle a failed node."""
 
     RESTART = "restart"
-    ISOLATE = "isolate"  # it is taken down, with all that depend on it, and the others go on
-    SHUTDOWN = "shutdown"  # of the whole system
+    ISOLATE = "isolate"  # take it and its dependents down, keep the others running
+    SHUTDOWN = "shutdown"  # shut down the whole system
 
 
 @dataclass(frozen=True, slots=True)
 class RestartBudget:
-    """How often a node is restarted, and how long is waited before.
+    """How often a node is restarted, and with which backoff.
 
-    The first restart within ``window_ms`` comes after ``backoff_ms``, each further one after twice
-    the time of the one before, at most ``backoff_max_ms``. A node that fails again after
-    ``max_attempts`` of them is given up, and the system with it. ``span`` is where it is declared.
+    The first restart within ``window_ms`` waits ``backoff_ms``, each further one twice as long as
+    the one before, at most ``backoff_max_ms``. If a node fails again after ``max_attempts``
+    restarts, the system shuts down. ``span`` is the location of the declaration.
     """
 
     max_attempts: int = 5
@@ -35,18 +35,18 @@ class RestartBudget:
     span: Span | None = field(default=None, compare=False)
 
     def backoff_s(self, attempts: int) -> float:
-        """Return how long to wait, in seconds, after ``attempts`` earlier restarts."""
-        doublings = min(attempts, 64)  # beyond any limit that a file can name
+        """Return the backoff in seconds after ``attempts`` earlier restarts."""
+        doublings = min(attempts, 64)  # beyond any limit in a file
         return min(self.backoff_ms * 2.0**doublings, self.backoff_max_ms) / 1000.0
 
 
 @dataclass(frozen=True, slots=True)
 class Watch:
-    """When an active node that raises nothing has failed all the same. None is never.
+    """When an active node counts as failed, apart from failed transitions. None disables a check.
 
-    ``silence_ms`` is how long it may publish nothing at all, ``topics`` how long nothing through
-    one publisher; ``callback_ms`` how long a callback may take; ``max_errors`` how many errors of
-    its callbacks may come within the window of its restarts.
+    ``silence_ms`` is the maximum time without any publication, ``topics`` that of single
+    publishers; ``callback_ms`` the maximum duration of a callback; ``max_errors`` the maximum
+    number of errors in callbacks within the restart window.
     """
 
     silence_ms: Located[float] | None = None
@@ -57,18 +57,18 @@ class Watch:
 
 @dataclass(frozen=True, slots=True)
 class Supervision:
-    """How a node is kept up. What a node does not say itself, its system says for all."""
+    """The supervision of a node. Settings that a node lacks come from its system."""
 
     timeout_ms: float = DEFAULT_TIMEOUT_MS  # of each transition
-    on_failure: Located[OnFailure] | None = None  # nobody said: isolate
+    on_failure: Located[OnFailure] | None = None  # not set: isolate
     restart: RestartBudget = RestartBudget()
     watch: Watch = Watch()
 
     @property
     def policy(self) -> OnFailure:
-        """What is done when the node has failed."""
+        """How to handle a failure of the node."""
         return OnFailure.ISOLATE if self.on_failure is None else self.on_failure.value
 
 
-#: What holds where neither a node nor its system says anything.
+#: The default if neither a node nor its system sets anything.
 DEFAULT_SUPERVISION = Supervision()

@@ -1,4 +1,4 @@
-"""A system: its nodes, how they are joined, and what runs them."""
+"""The system: nodes, connections, chains and executors."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ N = TypeVar("N", bound=_Named)
 
 
 def _by_name(items: Iterable[N]) -> dict[str, N]:
-    """Return the items by name; of two that share one, the first."""
+    """Return the items by name; the first of duplicates."""
     found: dict[str, N] = {}
     for item in items:
         found.setdefault(item.name.value, item)
@@ -45,14 +45,14 @@ def _by_name(items: Iterable[N]) -> dict[str, N]:
 
 @dataclass(frozen=True, slots=True)
 class Remapping:
-    """``from`` (a name as the node's type declares it) becomes ``to``."""
+    """A remapping of the declared name ``source`` to ``target``."""
 
     source: Located[str]
     target: Located[str]
 
 
 class PrimaryState(StrEnum):
-    """The lifecycle states a node may be asked to start in or to wait for."""
+    """The primary lifecycle states that a node can start in or wait for."""
 
     UNCONFIGURED = "unconfigured"
     INACTIVE = "inactive"
@@ -61,7 +61,7 @@ class PrimaryState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Dependency:
-    """Another node that must have reached ``state`` before this one goes there."""
+    """Another node that must be in ``state`` before this one enters it."""
 
     node: Located[str]
     state: PrimaryState = PrimaryState.ACTIVE
@@ -69,11 +69,11 @@ class Dependency:
 
 @dataclass(frozen=True, slots=True)
 class BehaviorReference:
-    """``module:Class``: Python beside the YAML file, of the project's node types, or installed."""
+    """``module:Class``: Python beside the YAML file, beside the node types, or installed."""
 
     text: Located[str]
-    folder: Path  # where the YAML file that names it lives; looked in first
-    node_folders: tuple[Path, ...] = ()  # where the project's node types are; looked in next
+    folder: Path  # the folder of the YAML file; searched first
+    node_folders: tuple[Path, ...] = ()  # the folders of node types; searched next
 
     @property
     def module(self) -> str:
@@ -82,13 +82,13 @@ class BehaviorReference:
 
     @property
     def class_name(self) -> str:
-        """The part behind the colon; empty when there is none."""
+        """The part after the colon, or an empty text."""
         return self.text.value.partition(":")[2]
 
 
 @dataclass(frozen=True, slots=True)
 class UnknownKey:
-    """A key of an instance that refines something its node type does not have."""
+    """A key of a node that its node type does not have."""
 
     section: str  # "parameters", "publishers", "timers", ...
     name: Located[str]
@@ -104,7 +104,7 @@ class Node:
     span: Span = field(compare=False)
     type_name: Located[str] | None = None
     type_found: bool = True
-    type_files: tuple[Path, ...] = field(default=(), compare=False)  # its own, and what it extends
+    type_files: tuple[Path, ...] = field(default=(), compare=False)  # its own and its base types'
     description: str = ""
     behavior: BehaviorReference | None = None
     parameters: tuple[Parameter, ...] = ()
@@ -119,7 +119,7 @@ class Node:
     supervision: Supervision = DEFAULT_SUPERVISION
     introspection: Introspection = DEFAULT_INTROSPECTION
     unknown: tuple[UnknownKey, ...] = ()
-    complete: bool = True  # False: its type is unknown or unreadable, so what it has is not known
+    complete: bool = True  # False: its type is unknown or invalid
     _ports: dict[str, Port] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -127,7 +127,7 @@ class Node:
 
     @property
     def full_name(self) -> str:
-        """The name ROS knows the node by."""
+        """The full name of the node in ROS."""
         return f"{self.namespace.value.rstrip('/')}/{self.name.value}"
 
     def port(self, name: str) -> Port | None:
@@ -140,7 +140,7 @@ class Node:
 
     @property
     def initial_parameters(self) -> dict[str, object]:
-        """The values that the parameters start with, by name; without those that have none."""
+        """The initial values of the parameters that have one, by name."""
         return {
             parameter.name.value: parameter.value.value
             for parameter in self.parameters
@@ -172,13 +172,13 @@ class Endpoint:
 
     @property
     def port(self) -> str:
-        """The part behind the last dot."""
+        """The part after the last dot."""
         return self.text.value.rpartition(".")[2]
 
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A topic, service or action and the ports joined to it.
+    """A declared topic, service or action with its ports.
 
     ``sources`` are publishers or servers, ``sinks`` subscriptions or clients.
     """
@@ -188,16 +188,16 @@ class Connection:
     sources: tuple[Endpoint, ...]
     sinks: tuple[Endpoint, ...]
     span: Span = field(compare=False)
-    qos: Located[str] | None = None  # the profile's name, where it is named
+    qos: Located[str] | None = None  # the profile's name, unless inline
     delivery: Located[Delivery] | None = None
     isolation: Located[Isolation] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """A way that data takes: publishers, each heard by the node of the next.
+    """A path of data: publishers, each with a subscription in the node of the next one.
 
-    ``latency_ms`` is the longest time from a message of the first to one of the last.
+    ``latency_ms`` is the maximum time from a message of the first to one of the last.
     """
 
     name: Located[str]
@@ -207,23 +207,23 @@ class Chain:
 
 
 class ExecutorKind(StrEnum):
-    """Who calls the callbacks."""
+    """The kind of an executor."""
 
     EVENTS = "events"
     SINGLE_THREADED = "single_threaded"
     MULTI_THREADED = "multi_threaded"
 
 
-#: The executor of nodes that name none; it need not be declared.
+#: The executor of nodes without one; it need not be declared.
 DEFAULT_EXECUTOR = "default"
 
 
 @dataclass(frozen=True, slots=True)
 class Executor:
-    """A group of nodes that share a loop. ``threads`` counts for multi_threaded only.
+    """An executor for a group of nodes. ``threads`` applies to multi_threaded only.
 
-    ``cpus`` are those that its threads may run on, as Linux counts them from 0; none means all.
-    ``priority`` is that of SCHED_FIFO (man 7 sched), 1 to 99; None is ordinary scheduling.
+    ``cpus`` are the CPUs that its threads may run on, numbered from 0 as in Linux; empty for all.
+    ``priority`` is a SCHED_FIFO priority from 1 to 99 (man 7 sched); None for normal scheduling.
     """
 
     name: Located[str]
@@ -236,7 +236,7 @@ class Executor:
 
 @dataclass(frozen=True, slots=True)
 class NamedQos:
-    """A profile of the system's own ``qos_profiles``."""
+    """A profile declared in ``qos_profiles``."""
 
     name: Located[str]
     qos: Qos
@@ -245,25 +245,25 @@ class NamedQos:
 
 @dataclass(frozen=True, slots=True)
 class QosReference:
-    """A use of a profile by name, known or not; for 'unknown profile' and 'unused profile'."""
+    """A reference to a profile by name, known or unknown."""
 
     name: Located[str]
 
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """Everything one file declares.
+    """Everything that a file declares.
 
-    A node type validated alone is a system of that one node, with ``node_type`` true: nothing
-    outside it is known then. ``supervision`` holds for nodes that say nothing else;
-    ``implied_dependencies`` is whether clients wait for their servers without being told to.
+    A node type that is validated alone is a system with that one node and ``node_type`` true:
+    nothing outside it is known. ``supervision`` is the default for nodes; ``implied_dependencies``
+    makes clients wait for their servers without ``depends_on``.
     """
 
     name: Located[str]
     source: SourceFile
     nodes: tuple[Node, ...]
     span: Span = field(compare=False)
-    namespace: str = "/"  # absolute; of every node that names none itself
+    namespace: str = "/"  # absolute; default for nodes
     description: str = ""
     connections: tuple[Connection, ...] = ()
     chains: tuple[Chain, ...] = ()
@@ -274,10 +274,10 @@ class System:
     supervision: Supervision = DEFAULT_SUPERVISION
     implied_dependencies: bool = True
     delivery: Delivery = Delivery.AUTO
-    use_sim_time: bool = False  # what is the system's own, and nodes that say nothing else
+    use_sim_time: bool = False  # for the manager node, and the default for nodes
     node_type: bool = False
-    unmatched_parameters: tuple[Located[str], ...] = ()  # nodes that only parameter files name
-    unknown: tuple[UnknownKey, ...] = ()  # what the command line names and the system lacks
+    unmatched_parameters: tuple[Located[str], ...] = ()  # unknown nodes in parameter files
+    unknown: tuple[UnknownKey, ...] = ()  # unknown names from the command line
     _nodes: dict[str, Node] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -288,14 +288,14 @@ class System:
         return self._nodes.get(name)
 
     def port(self, endpoint: Endpoint) -> Port | None:
-        """Return the port a connection's end names, or None."""
+        """Return the port of an endpoint, or None."""
         node = self.node(endpoint.node)
         return node.port(endpoint.port) if node is not None else None
 
 
 @dataclass(frozen=True, slots=True)
 class PortOfNode:
-    """A port together with the node that has it."""
+    """A port together with its node."""
 
     node: Node
     port: Port
@@ -303,7 +303,7 @@ class PortOfNode:
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """A topic, service or action with every port of the system that meets on it."""
+    """A topic, service or action with all ports of the system that use it."""
 
     kind: ChannelKind
     name: str
@@ -312,7 +312,7 @@ class Channel:
 
     @property
     def ends(self) -> tuple[PortOfNode, ...]:
-        """All ports on the channel, sources first."""
+        """All ports of the channel, sources first."""
         return self.sources + self.sinks
 
 
@@ -320,7 +320,7 @@ _SOURCES = (PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER)
 
 
 def channels(nodes: Iterable[Node]) -> tuple[Channel, ...]:
-    """Return every topic, service and action the nodes use, sorted by kind and name."""
+    """Return all topics, services and actions of the nodes, sorted by kind and name."""
     ends: dict[tuple[ChannelKind, str], list[PortOfNode]] = {}
     for node in nodes:
         for port in node.ports:

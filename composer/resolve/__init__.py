@@ -1,9 +1,8 @@
-"""From the expanded tree to the model.
+"""Resolve an expanded tree into the model.
 
-Resolving is total and lenient: it never raises on a tree that came out of ``document``, takes what
-has the right shape and leaves out the rest, so that one run can show every diagnostic. It judges
-nothing but expressions and templates: a name that refers to nothing stays in the model as it was
-written, and the checks say what is wrong with it.
+This never fails: it uses what has the right type and skips the rest, so that one run can show every
+diagnostic. It reports errors in expressions and templates only. Unknown names stay in the model as
+written, and the rules report them.
 """
 
 from __future__ import annotations
@@ -34,12 +33,11 @@ def resolve(
     folders: Map[str, Path] = MappingProxyType({}),
     overrides: Overrides | None = None,
 ) -> tuple[System | None, list[Diagnostic]]:
-    """Return the model of a file, and what is wrong with its expressions and its node types.
+    """Return the model of a file, with diagnostics of its expressions and its node types.
 
-    ``tree`` has its load-time variables filled in; ``folders`` are those of the files that it was
-    put together from, by what they are called (the folder of ``source.path`` unless given): there
-    behaviours are looked for first. A node type gives a system of that one
-    node; a file that is neither gives no system and a diagnostic.
+    ``tree`` has its load-time variables expanded. ``folders`` are the folders of its files by file
+    name (by default, the folder of ``source.path``), where behaviors are searched first. A node
+    type gives a system with one node; a file that is neither gives no system and a diagnostic.
     """
     home = folders.get(source.path, Path(source.path).parent)
     source_folders = SourceFolders(home, folders, node_types)

@@ -1,4 +1,4 @@
-"""Connections, and the name and profile they give to the ports they join."""
+"""Connections with the names and QoS profiles that they give to ports, and chains."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from composer.tree import Entry, Mapping, Sequence, Tree
 
 T = TypeVar("T")
 
-_ENDS = {
+_ENDPOINT_KEYS = {
     ChannelKind.TOPIC: ("from", "to"),
     ChannelKind.SERVICE: ("server", "clients"),
     ChannelKind.ACTION: ("server", "clients"),
@@ -23,7 +23,7 @@ _ENDS = {
 
 @dataclass(frozen=True, slots=True)
 class PortConnection:
-    """What a connection gives to a port: a full name and, where it says so, a profile."""
+    """The full name and, if set, the QoS profile and delivery that a connection gives to a port."""
 
     kind: ChannelKind
     full_name: str
@@ -38,7 +38,7 @@ PortConnections = dict[tuple[str, str], list[PortConnection]]
 def read_connections(
     tree: Tree | None, namespace: str, qos: QosTable
 ) -> tuple[tuple[Connection, ...], PortConnections]:
-    """Return what is declared under ``connections``, and by node and port what follows from it."""
+    """Return the declared ``connections``, and what they give to each port."""
     declared = []
     port_connections: PortConnections = {}
     for item in tree.items if isinstance(tree, Sequence) else ():
@@ -59,19 +59,19 @@ def read_connections(
 
 
 def full_name(name: str, namespace: str) -> str:
-    """Return the name a connection gives: absolute, or below the system's namespace."""
+    """Return the full name of a connection: absolute, or below the system's namespace."""
     return name if is_opaque(name) else join(namespace, name)
 
 
 def connection_of(port: Port, port_connections: Iterable[PortConnection]) -> PortConnection | None:
-    """Return the first connection of the port's kind, with what is first given to its name."""
-    fitting = [
+    """Return the first connection of the port's kind, merged with others of the same name."""
+    matching = [
         connection for connection in port_connections if connection.kind is port.kind.channel
     ]
-    if not fitting:
+    if not matching:
         return None
-    first = fitting[0]
-    same = [connection for connection in fitting if connection.full_name == first.full_name]
+    first = matching[0]
+    same = [connection for connection in matching if connection.full_name == first.full_name]
     return PortConnection(
         first.kind,
         first.full_name,
@@ -93,7 +93,7 @@ def _connection(tree: Tree) -> Connection | None:
     if entry is None or name is None:
         return None
     kind = ChannelKind(entry.name)
-    sources, sinks = (_ends(tree.get(end)) for end in _ENDS[kind])
+    sources, sinks = (_endpoints(tree.get(end)) for end in _ENDPOINT_KEYS[kind])
     return Connection(
         kind,
         name,
@@ -111,7 +111,7 @@ def _kind_entry(tree: Mapping) -> Entry | None:
     return next((entry for entry in tree if entry.name in kinds), None)
 
 
-def _ends(tree: Tree | None) -> tuple[Endpoint, ...]:
+def _endpoints(tree: Tree | None) -> tuple[Endpoint, ...]:
     return tuple(Endpoint(name) for name in texts(tree))
 
 
@@ -123,7 +123,7 @@ def _profile(tree: Tree, kind: ChannelKind, qos: QosTable) -> Qos | None:
 
 
 def read_chains(tree: Tree | None) -> tuple[Chain, ...]:
-    """Return what is declared under ``chains``; one without latency or way is left out."""
+    """Return the declared ``chains``, without those that lack a latency or ports."""
     found = (_chain(entry) for entry in entries(tree))
     return tuple(chain for chain in found if chain is not None)
 

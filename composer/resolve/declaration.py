@@ -1,4 +1,4 @@
-"""What a node is made of, as its type or its inline entry declares it, before it has a place."""
+"""Declarations of nodes by a node type or an inline entry, before they have a name."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from composer.tree import Entry, Mapping, Plain, Tree, plain
 
 @dataclass(frozen=True, slots=True)
 class Declaration:
-    """Everything that nodes of one type, made with the same variables, share."""
+    """What all nodes of one type with the same variables share."""
 
     description: str
     behavior: BehaviorReference | None
@@ -43,7 +43,7 @@ class Declaration:
 def declare(
     tree: Mapping, folders: SourceFolders, qos: QosTable, diagnostics: list[Diagnostic]
 ) -> Declaration:
-    """Read a node type or an inline node. ``folders`` are those of the files it is written in."""
+    """Read the declaration of a node type or an inline node."""
     behavior = text(tree.get("behavior"))
     return Declaration(
         description=plain_text(tree.get("description")),
@@ -69,7 +69,7 @@ _PERIOD_KEYS = frozenset(unit.value for unit in PeriodUnit)
 
 
 def refines(instance: Mapping) -> bool:
-    """Say whether a system's entry of a node changes anything of its type but parameter values."""
+    """Return whether a node of a system changes more of its type than parameter values."""
     return any(
         entry.name in _REFINED_SECTIONS or entry.name in _REPLACED_KEYS or entry.name == "state"
         for entry in instance
@@ -77,10 +77,10 @@ def refines(instance: Mapping) -> bool:
 
 
 def refined(declared: Mapping, instance: Mapping) -> Mapping:
-    """Return the node type's tree with what the instance says instead.
+    """Return the tree of a node type with the changes of an instance.
 
-    Of a port or a timer each key that the instance gives replaces the type's; ports and timers
-    that the type does not have are left out (see :func:`unknown_keys`).
+    Each key of a port or timer in the instance replaces that of the type. Ports and timers that the
+    type does not have are left out (see :func:`unknown_keys`).
     """
     changed = {entry.name: entry for entry in declared}
     for entry in instance:
@@ -95,7 +95,7 @@ def refined(declared: Mapping, instance: Mapping) -> Mapping:
 
 
 def unknown_keys(declared: Mapping, instance: Mapping) -> tuple[UnknownKey, ...]:
-    """Return the ports and timers that the instance refines and its type does not have."""
+    """Return the ports and timers of the instance that its type does not have."""
     unknown: list[UnknownKey] = []
     for section in _REFINED_SECTIONS:
         given = entries(instance.get(section))
@@ -111,7 +111,7 @@ def unknown_keys(declared: Mapping, instance: Mapping) -> tuple[UnknownKey, ...]
 
 
 def _refined_section(declared: Entry, given: Entry) -> Entry:
-    """Return a section of ports or timers, each overlaid with what the instance says of it."""
+    """Return a section of ports or timers, each overlaid with its entry in the instance."""
     changes = {entry.name: entry for entry in entries(given.value)}
     merged = tuple(
         _overlaid(entry, changes[entry.name]) if entry.name in changes else entry
@@ -126,6 +126,6 @@ def _overlaid(declared: Entry, given: Entry) -> Entry:
         return declared
     replaced = {entry.name for entry in given.value}
     if replaced & _PERIOD_KEYS:
-        replaced |= _PERIOD_KEYS  # one way to say how often takes the place of the other
+        replaced |= _PERIOD_KEYS  # period and rate replace each other
     kept = (entry for entry in entries(declared.value) if entry.name not in replaced)
     return Entry(given.key, Mapping((*kept, *given.value), given.value.span))

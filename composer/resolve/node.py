@@ -1,4 +1,4 @@
-"""A node of a system: its type or inline declaration, put in its place and given its values."""
+"""Resolve a node of a system: its declaration, names and parameter values."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 @dataclass(frozen=True, slots=True)
 class SystemContext:
-    """What all nodes of a system have context them."""
+    """What resolving any node of a system needs."""
 
     folders: SourceFolders
     namespace: Located[str]  # absolute
@@ -45,13 +45,13 @@ class SystemContext:
     supervision: Supervision
     introspection: Tree | None
     parameter_files: ParameterFiles
-    use_sim_time: tuple[Entry, ...]  # what is said of all nodes, if anything is
+    use_sim_time: tuple[Entry, ...]  # the system's entry, if it has one
     diagnostics: list[Diagnostic]
 
 
 @dataclass(frozen=True, slots=True)
 class _Declared:
-    """A declaration, and how much is known of it."""
+    """A declaration, and whether it is complete."""
 
     declaration: Declaration
     unknown: tuple[UnknownKey, ...] = ()
@@ -64,7 +64,7 @@ _NOTHING = Declaration("", None, (), (), (), (), ())
 
 
 def resolve_node(entry: Entry, context: SystemContext) -> Node:
-    """Return the node that an entry of a system's ``nodes`` declares."""
+    """Return the node of an entry in ``nodes``."""
     tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
     type_entry = tree.entry("type")
     made = _inline(tree, context) if type_entry is None else _typed(type_entry, tree, context)
@@ -112,7 +112,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
 
 
 def node_namespace(tree: Tree | None, system: Located[str]) -> Located[str]:
-    """Return a node's namespace, absolute: its own below the system's, unless it is absolute."""
+    """Return the absolute namespace of a node; a relative one is below the system's."""
     own = text(tree)
     if own is None:
         return system
@@ -126,9 +126,10 @@ def place_ports(
     remappings: Iterable[Remapping],
     port_connections: PortConnections,
 ) -> tuple[Port, ...]:
-    """Return the ports with the full names they have in a node, and the profiles of connections.
+    """Return the ports with their full names in a node, and the settings of connections.
 
-    A connection's name wins over remapping, and remapping over the declared name.
+    The name of a connection takes precedence over a remapping, which takes precedence over the
+    declared name.
     """
 
     def expanded(ros_name: str) -> str:
@@ -177,7 +178,7 @@ def _typed(type_entry: Entry, tree: Mapping, context: SystemContext) -> _Declare
     unknown = unknown_keys(made.tree, tree) if made.complete else ()
     declaration = made.declaration
     if refines(tree):
-        # Expressions of the type that are compiled again say nothing that was not said before.
+        # Compiling the type's expressions again only repeats diagnostics, which are deduplicated.
         merged = refined(made.tree, tree)
         declaration = declare(merged, made.folders, context.qos, context.diagnostics)
     return _Declared(declaration, unknown, complete=made.complete, type_files=made.files)
@@ -189,7 +190,7 @@ def _remappings(tree: Tree | None) -> tuple[Remapping, ...]:
 
 
 def _dependencies(tree: Tree | None) -> tuple[Dependency, ...]:
-    """Return the nodes depended on: a list of names, or a map of names to states."""
+    """Return the dependencies, from a list of names or a map of names to states."""
     if isinstance(tree, Mapping):
         return tuple(_dependency(entry) for entry in tree)
     names = (text(item) for item in (tree.items if isinstance(tree, Sequence) else ()))
@@ -202,7 +203,7 @@ def _dependency(entry: Entry) -> Dependency:
 
 
 def state(tree: Tree | None) -> Located[PrimaryState] | None:
-    """Return a lifecycle state with its place."""
+    """Return a lifecycle state with its location."""
     if isinstance(tree, Scalar) and tree.value in {item.value for item in PrimaryState}:
         return Located(PrimaryState(str(tree.value)), tree.span)
     return None

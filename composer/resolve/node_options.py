@@ -1,4 +1,4 @@
-"""How nodes are kept up: what a node says itself, over what its system says for all."""
+"""Supervision and introspection of nodes: their own settings over those of the system."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from composer.tree import Entry, Mapping, Tree
 
 
 def read_supervision(lifecycle: Tree | None, default: Supervision) -> Supervision:
-    """Return what the ``lifecycle`` of a node or a system says, and ``default`` for the rest."""
+    """Return the supervision under ``lifecycle`` of a node or a system, over ``default``."""
     if not isinstance(lifecycle, Mapping):
         return default
     timeout_ms = number(lifecycle.get("timeout_ms"))
@@ -36,9 +36,9 @@ def _restart(entry: Entry | None, default: RestartBudget) -> RestartBudget:
     tree = entry.value
     attempts = integer(tree.get("max_attempts"))
 
-    def milliseconds(name: str, otherwise: float) -> float:
+    def milliseconds(name: str, fallback: float) -> float:
         found = number(tree.get(name))
-        return otherwise if found is None else found.value
+        return fallback if found is None else found.value
 
     return RestartBudget(
         max_attempts=default.max_attempts if attempts is None else attempts.value,
@@ -59,19 +59,19 @@ def _watch(tree: Tree | None, default: Watch) -> Watch:
         for entry in entries(silence)
         if (limit := number(entry.value)) is not None
     )
-    said = silence is not None
+    is_set = silence is not None
     return Watch(
-        silence_ms=whole if said else default.silence_ms,
-        topics=topics if said else default.topics,
+        silence_ms=whole if is_set else default.silence_ms,
+        topics=topics if is_set else default.topics,
         callback_ms=number(tree.get("callback_ms")) or default.callback_ms,
         max_errors=integer(tree.get("max_errors")) or default.max_errors,
     )
 
 
 def read_introspection(*layers: Tree | None) -> Introspection:
-    """Return what the ``introspection`` keys say together; a later layer goes before an earlier."""
-    said = {
+    """Merge ``introspection`` settings; later layers override earlier ones."""
+    settings = {
         entry.name: flag(entry.value, default=True) for layer in layers for entry in entries(layer)
     }
     known = {field.name for field in fields(Introspection)}
-    return Introspection(**{name: value for name, value in said.items() if name in known})
+    return Introspection(**{name: value for name, value in settings.items() if name in known})

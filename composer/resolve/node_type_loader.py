@@ -1,4 +1,4 @@
-"""Node types: their files are read once, and made anew for the arguments of each instance."""
+"""Load node types: read each file once, and instantiate it with the variables of each node."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ RULE = register(
         code="RC287",
         name="missing-variable",
         severity=Severity.ERROR,
-        summary="A node is not given a variable that its type needs.",
-        why="A variable without default is one that the node type cannot be made without.",
+        summary="A node lacks a value for a variable of its type.",
+        why="A variable without default is required by the node type.",
         bad="""\
 system: demo
 nodes:
@@ -47,10 +47,10 @@ nodes:
 
 @dataclass(frozen=True, slots=True)
 class InstantiatedNodeType:
-    """A node type made with the variables of an instance.
+    """A node type with the variables of a node.
 
-    ``complete`` is false when its file has errors, so that what it declares may not be all.
-    ``files`` are its own and those of the types that it extends.
+    ``complete`` is false if its file has errors, so that declarations may be missing. ``files`` are
+    its own file and those of the types that it extends.
     """
 
     tree: Mapping
@@ -62,7 +62,7 @@ class InstantiatedNodeType:
 
 @dataclass(slots=True)
 class NodeTypeLoader:
-    """The node types a system uses. Diagnostics in their files are added to ``diagnostics``."""
+    """Loads the node types of a system, and adds diagnostics in their files."""
 
     folders: SourceFolders
     qos: QosTable
@@ -73,7 +73,7 @@ class NodeTypeLoader:
     _shapes: set[tuple[Path, str]] = field(default_factory=set)
 
     def find(self, name: Located[str]) -> Path | None:
-        """Return the file of the node type called ``name`` where that is written, or None."""
+        """Return the file of the node type ``name`` for the file that refers to it, or None."""
         known = (self.folders.folder(name.span), name.value)
         if known not in self._found:
             self._found[known] = self.folders.node_types_for(name.span).find(name.value)
@@ -82,10 +82,9 @@ class NodeTypeLoader:
     def instantiate(
         self, path: Path, variables: Tree | None, span: Span
     ) -> InstantiatedNodeType | None:
-        """Return the type in the file ``path`` made with ``variables``, or None.
+        """Return the type in the file ``path`` with ``variables``; None if it cannot be read.
 
-        None stands for a file that cannot be read as a node type; the diagnostics say why. ``span``
-        is where the type is asked for.
+        ``span`` is the reference to the type.
         """
         written = self._document(path)
         if written is None or written.tree is None:
@@ -94,7 +93,7 @@ class NodeTypeLoader:
         if variables is None or isinstance(variables, Mapping):
             self.diagnostics.extend(_missing(written.tree, given, span))
         if given:
-            # Not shared: what an argument stands for is place_ports where that argument is written.
+            # Not shared: values of arguments have the location of the argument.
             return self._instantiate(path, written, written.tree, given)
         if path not in self._without_variables:
             self._without_variables[path] = self._instantiate(path, written, written.tree, {})
@@ -114,7 +113,7 @@ class NodeTypeLoader:
     def _schema_diagnostics(
         self, path: Path, expanded: Mapping, given: dict[str, Tree]
     ) -> list[Diagnostic]:
-        """Hold a type against its schema, unless it passed with the very same values before."""
+        """Check a type against the schema, unless it passed with the same values before."""
         values: dict[str, Plain] = {name: plain(value) for name, value in given.items()}
         shape = (path, repr(values))
         if shape in self._shapes:

@@ -1,4 +1,4 @@
-"""What the command line says on top of a file: ``--set``, ``--namespace``, ``--use-sim-time``."""
+"""Overrides from the command line: ``--set``, ``--namespace``, ``--use-sim-time``."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ RULE = register(
 
 @dataclass(frozen=True, slots=True)
 class Override:
-    """A parameter's value from the command line, each part with its place there."""
+    """A parameter value from the command line, located there."""
 
     node: Located[str]
     parameter: Entry
@@ -37,7 +37,7 @@ class Override:
 
 @dataclass(frozen=True, slots=True)
 class Overrides:
-    """Everything the command line says on top of a file."""
+    """All overrides of a command line, parsed."""
 
     parameters: tuple[Override, ...] = ()
     namespace: Located[str] | None = None
@@ -53,7 +53,7 @@ class Overrides:
 
 @dataclass(frozen=True, slots=True)
 class OverrideOptions:
-    """What is said on a command line: ``--set`` texts, each ``node.parameter=value``, and so on."""
+    """Override options as given. Each of ``settings`` is ``node.parameter=value``."""
 
     settings: tuple[str, ...] = ()
     namespace: str | None = None
@@ -63,19 +63,18 @@ class OverrideOptions:
 NO_OVERRIDES = OverrideOptions()
 
 
-def read_overrides(said: OverrideOptions) -> tuple[Overrides, list[Diagnostic]]:
-    """Read what a command line says.
+def read_overrides(options: OverrideOptions) -> tuple[Overrides, list[Diagnostic]]:
+    """Parse the override options of a command line.
 
-    Values of settings are YAML, as they would stand in a file; of two for one parameter the last
-    counts.
+    Values of settings are YAML as in a file. The last one for a parameter takes effect.
     """
-    texts = [setting.replace("\r", " ").replace("\n", " ") for setting in said.settings]
+    texts = [setting.replace("\r", " ").replace("\n", " ") for setting in options.settings]
     source = SourceFile(SET, "\n".join(texts))
     diagnostics: list[Diagnostic] = []
     found = (_override(text, source, line, diagnostics) for line, text in enumerate(texts, start=1))
     parameters = tuple(item for item in found if item is not None)
-    clock = _use_sim_time() if said.use_sim_time else None
-    return Overrides(parameters, _namespace(said.namespace), clock), diagnostics
+    clock = _use_sim_time() if options.use_sim_time else None
+    return Overrides(parameters, _namespace(options.namespace), clock), diagnostics
 
 
 def _namespace(namespace: str | None) -> Located[str] | None:
@@ -111,8 +110,8 @@ def _override(
 def _value(
     text: str, start: int, source: SourceFile, line: int, diagnostics: list[Diagnostic]
 ) -> Tree | None:
-    """Read what is behind the equals sign."""
-    # As the value of a one-line document of the same width, so that its columns are right.
+    """Return the value after the equals sign."""
+    # Parse a one-line document of the same width, so that the columns are right.
     key = "v" * (start - 2)
     document = SourceFile(SET, f"{key}: {text[start:]}")
     tree, found = parse_document(document)

@@ -1,8 +1,8 @@
-"""ROS parameter files: values for the parameters of nodes, by the names the nodes have in ROS.
+"""ROS parameter files: parameter values by the full names of nodes.
 
-The form is that of ``rcl_yaml_param_parser``: a map of node names, each with ``ros__parameters``.
-``*`` in a name stands for one part, ``**`` for any number of parts. Namespaces may be nested maps,
-and so may parameters with dots in their names.
+The format is that of ``rcl_yaml_param_parser``: a map of node names, each with ``ros__parameters``.
+``*`` matches one part of a name, ``**`` any number of parts. Namespaces and parameters with dots in
+their names may be nested maps.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ RULE = register(
         code="RC043",
         name="parameter-file",
         severity=Severity.ERROR,
-        summary="A ROS parameter file is out of reach, or not of the form that ROS reads.",
+        summary="A ROS parameter file cannot be read, or does not have the ROS format.",
         why=(
             "A parameter file is a map of node names, each with 'ros__parameters'. It must be in "
-            "the project: what is outside is not there on another computer."
+            "the project: files outside it may not exist on another computer."
         ),
         bad="""\
 # file: system.yaml
@@ -54,13 +54,13 @@ nodes:
 )
 
 PARAMETERS = "ros__parameters"
-#: What every ROS node declares without being asked to, and nobody here follows.
+#: Parameters that every ROS node declares, and that the composer ignores.
 _EVERY_NODE = re.compile(r"start_type_description_service|qos_overrides\..*")
 
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """The values under one name, and the place of the section among all."""
+    """The values under one node name; ``number`` is the position among all sections."""
 
     name: Located[str]
     values: Map[str, Entry]
@@ -68,20 +68,20 @@ class Section:
 
     @property
     def is_pattern(self) -> bool:
-        """Whether the name stands for many."""
+        """Whether the name has wildcards."""
         return "*" in self.name.value
 
 
 @dataclass(slots=True)
 class ParameterFiles:
-    """The sections of all files. Of two values for a parameter the later one counts."""
+    """The sections of all files. The last value for a parameter takes effect."""
 
     _named: dict[str, list[Section]] = field(default_factory=dict)
     _patterns: list[Section] = field(default_factory=list)
     _count: int = 0
 
     def add(self, name: Located[str], values: Map[str, Entry]) -> None:
-        """Add a section behind the others."""
+        """Append a section."""
         section = Section(name, values, self._count)
         self._count += 1
         if section.is_pattern:
@@ -90,10 +90,10 @@ class ParameterFiles:
             self._named.setdefault(name.value, []).append(section)
 
     def given(self, full_name: str, declared: frozenset[str]) -> dict[str, Entry]:
-        """Return the values for the node that ROS calls ``full_name``, by parameter.
+        """Return the values for the node ``full_name``, by parameter.
 
-        Under a name with wildcards it finds what it declares, and ``use_sim_time``; the rest is for
-        other nodes. So is what else every ROS node has, unless this one tells of it.
+        Sections with wildcards give values for declared parameters and ``use_sim_time`` only, since
+        others are for other nodes. Parameters of every ROS node are ignored unless declared.
         """
         found = [*self._named.get(full_name, ()), *self._matching(full_name)]
         given: dict[str, Entry] = {}
@@ -108,7 +108,7 @@ class ParameterFiles:
         return given
 
     def unmatched(self, full_names: frozenset[str]) -> tuple[Located[str], ...]:
-        """Return the names of sections that are for none of the nodes."""
+        """Return the names of sections that match none of the nodes."""
         return tuple(
             section.name
             for name, sections in self._named.items()
@@ -144,7 +144,7 @@ def read_parameter_files(
 
 
 def read_parameter_file(path: Path, files: ParameterFiles) -> list[Diagnostic]:
-    """Add what is in the file at ``path``; return what is wrong with it."""
+    """Add the sections of the file at ``path``, and return its diagnostics."""
     content, _, diagnostics = read_document(path, shown_path(path))
     if content is not None:
         _read(content, "/", files, diagnostics)
@@ -172,7 +172,7 @@ def _read(
 
 
 def _flat(tree: Mapping, prefix: str) -> Iterator[Entry]:
-    """Yield the parameters of nested maps, with dots in their names."""
+    """Yield the parameters of nested maps, with dotted names."""
     for entry in tree:
         name = f"{prefix}{entry.name}"
         if isinstance(entry.value, Mapping):
@@ -186,8 +186,8 @@ def _parts(name: str) -> tuple[str, ...]:
 
 
 def _is_match(pattern: Sequence[str], parts: Sequence[str]) -> bool:
-    """Say whether the parts of a name are those of a pattern, in time that grows with both only."""
-    ends = {0}  # how many parts the pattern so far may have matched
+    """Return whether a name matches a pattern, both as parts. No exponential backtracking."""
+    ends = {0}  # the possible numbers of parts matched so far
     for piece in pattern:
         if piece == "**":
             ends = set(range(min(ends), len(parts) + 1)) if ends else set()

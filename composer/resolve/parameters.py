@@ -1,4 +1,4 @@
-"""Parameters: declarations, and the values that a system gives them."""
+"""Parameter declarations, and the values that a system sets."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from composer.resolve.tree_values import (
 from composer.source import Located
 from composer.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree, plain
 
-#: The type of a parameter whose bare value tells none, such as an empty list.
+#: The type of a parameter whose bare value has no clear type, such as an empty list.
 UNKNOWN_TYPE = ""
-_USE_SIM_TIME_DESCRIPTION = "Whether the time of the node is that of /clock."
+_USE_SIM_TIME_DESCRIPTION = "Whether the node uses the time of /clock."
 
 
 def read_parameters(tree: Tree | None) -> tuple[Parameter, ...]:
-    """Return what ``parameters`` of a node type or an inline node declares.
+    """Return the declared ``parameters`` of a node type or an inline node.
 
-    A bare value declares a parameter of its own type with that default.
+    A bare value declares a parameter of its type with that default.
     """
     return tuple(_declaration(entry) for entry in entries(tree))
 
@@ -36,7 +36,7 @@ def read_parameters(tree: Tree | None) -> tuple[Parameter, ...]:
 def with_use_sim_time(
     parameters: tuple[Parameter, ...], given: Map[str, Entry]
 ) -> tuple[Parameter, ...]:
-    """Return the parameters with ``use_sim_time``, which every node has, where a value is given."""
+    """Return the parameters, with ``use_sim_time`` added if a value is given for it."""
     entry = given.get(USE_SIM_TIME)
     if entry is None or any(item.name.value == USE_SIM_TIME for item in parameters):
         return parameters
@@ -50,9 +50,9 @@ def with_use_sim_time(
 def with_values(
     parameters: Iterable[Parameter], given: Map[str, Entry], *, complete: bool
 ) -> tuple[tuple[Parameter, ...], tuple[UnknownKey, ...]]:
-    """Return the parameters with the values given by name, and the names that none of them has.
+    """Return the parameters with the given values, and the unknown names.
 
-    Of a node that is not ``complete`` nothing is known well enough to call a name unknown.
+    If the node is not ``complete``, no name is reported as unknown.
     """
     declared = tuple(parameters)
     if not given:
@@ -72,7 +72,7 @@ def with_values(
 
 
 def inferred_type(value: Plain) -> str | None:
-    """Return the parameter type that ``value`` itself tells; None for null, maps and mixtures."""
+    """Return the parameter type of ``value``; None for null, maps and mixed lists."""
     if isinstance(value, list):
         kinds = {_SCALAR_TYPES.get(type(item)) for item in value}
         if kinds == {"integer", "double"}:
@@ -83,7 +83,7 @@ def inferred_type(value: Plain) -> str | None:
 
 
 def promoted(value: Plain, kind: str) -> Plain:
-    """Return ``value`` with whole numbers as doubles where ``kind`` asks for doubles."""
+    """Return ``value`` with integers converted to doubles if ``kind`` is a double type."""
     if kind == ParameterType.DOUBLE and _is_whole(value):
         return _as_double(value)
     if kind == ParameterType.DOUBLE_ARRAY and isinstance(value, list):
@@ -100,7 +100,7 @@ def _is_whole(value: Plain) -> bool:
 
 def _as_double(value: Plain) -> Plain:
     try:
-        return float(value)  # type: ignore[arg-type]  # only asked of whole numbers
+        return float(value)  # type: ignore[arg-type]  # only called with integers
     except OverflowError:
         return value
 
@@ -155,7 +155,7 @@ def _with_value(parameter: Parameter, tree: Tree) -> Parameter:
 
 
 def _value(tree: Tree | None, kind: str) -> Located[Plain] | None:
-    """Return a value; None for null, which no ROS parameter can be declared with, and for maps."""
+    """Return a value; None for null and maps, which ROS parameters cannot hold."""
     if tree is None or isinstance(tree, Mapping):
         return None
     if isinstance(tree, Scalar) and tree.value is None:

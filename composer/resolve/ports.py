@@ -1,4 +1,4 @@
-"""Ports and timers, as a node type or an inline node declares them."""
+"""Declarations of ports and timers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from composer.source import Located, Span
 from composer.templates import Computed, Text
 from composer.tree import Entry, Mapping, Scalar, Tree
 
-#: What clients wait for their server and its answer unless they say otherwise.
+#: Default timeout of clients for the server and its response.
 DEFAULT_TIMEOUT_MS = 5000.0
 
 _CLIENTS = frozenset({PortKind.CLIENT, PortKind.ACTION_CLIENT})
@@ -50,9 +50,9 @@ _NESTED_EVENTS = {
 
 
 def read_ports(node: Mapping, qos: QosTable, diagnostics: list[Diagnostic]) -> tuple[Port, ...]:
-    """Return the ports a node declares, with the names they declare for full names.
+    """Return the ports that a node declares.
 
-    What they are called in full is known once the node has a name and a namespace.
+    Their full names are the declared ones until the node has a name and a namespace.
     """
     return tuple(
         _port(kind, entry, qos, diagnostics)
@@ -62,7 +62,7 @@ def read_ports(node: Mapping, qos: QosTable, diagnostics: list[Diagnostic]) -> t
 
 
 def read_timers(node: Mapping, diagnostics: list[Diagnostic]) -> tuple[Timer, ...]:
-    """Return the timers a node declares."""
+    """Return the timers that a node declares."""
     return tuple(_timer(entry, diagnostics) for entry in entries(node.get("timers")))
 
 
@@ -148,10 +148,10 @@ def _timer(entry: Entry, diagnostics: list[Diagnostic]) -> Timer:
 
 
 def _period(tree: Mapping, span: Span, diagnostics: list[Diagnostic]) -> Period:
-    """Return how often a timer fires.
+    """Return the period of a timer.
 
-    Where that cannot be read there is a diagnostic already (or a load-time variable without value),
-    and a plain second keeps the timer in the model: nothing else is wrong with it.
+    If it is invalid (reported elsewhere) or has a load-time variable without value, return one
+    second to keep the timer in the model.
     """
     for unit in PeriodUnit:
         written = tree.get(unit.value)
@@ -168,6 +168,6 @@ def _written_period(tree: Tree, unit: PeriodUnit, diagnostics: list[Diagnostic])
     if isinstance(compiled, Computed):
         return Period(compiled.expression, unit, compiled.span)
     if isinstance(compiled, Text):
-        message = f"'{unit}' takes a number or one '{{expression}}', not text context it"
+        message = f"'{unit}' takes a number or one '{{expression}}', not text around it"
         diagnostics.append(Diagnostic(RULE, message, tree.span))
     return Period(1000.0, PeriodUnit.MILLISECONDS, tree.span)

@@ -1,4 +1,4 @@
-"""QoS profiles: by name, by preset, written out in place, and built on each other."""
+"""QoS profiles: named, presets, inline and extended ones."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from composer.tree import Entry, Mapping, Scalar, Tree
 
 @dataclass(slots=True)
 class QosTable:
-    """The profiles a system knows by name, and every use of a name that was met."""
+    """The named profiles of a system, and all references to names."""
 
     named: tuple[NamedQos, ...] = ()
     by_name: dict[str, Qos] = field(default_factory=dict)
     references: list[QosReference] = field(default_factory=list)
 
     def resolve(self, tree: Tree | None, default: Qos) -> Qos:
-        """Return the profile that ``tree`` names or writes out; ``default`` where it is absent.
+        """Return the profile that ``tree`` names or declares inline; ``default`` without one.
 
-        An unknown name stays among the references, for the checks; it gives ``default``'s values.
+        An unknown name gives the values of ``default``; the rules find it in the references.
         """
         if isinstance(tree, Mapping):
             base = self._base(tree, default)
@@ -44,7 +44,7 @@ class QosTable:
         return replace(found or _as_unknown(default), span=name.span, explicit=True)
 
     def use(self, name: Located[str]) -> Qos | None:
-        """Return the profile called ``name``, and remember that it was asked for."""
+        """Return the profile ``name``, and record the reference."""
         if is_opaque(name.value):
             return None
         self.references.append(QosReference(name))
@@ -53,15 +53,15 @@ class QosTable:
     def _base(self, tree: Mapping, default: Qos) -> Qos:
         extends = text(tree.get("extends"))
         if extends is None:
-            # What an inline profile leaves out is rclpy's, whatever the kind of port.
+            # Policies that an inline profile does not set are rclpy's defaults for any port.
             return replace(default, profile=QosProfile())
         return self.use(extends) or _as_unknown(default)
 
 
 def qos_table(tree: Tree | None) -> QosTable:
-    """Resolve a system's ``qos_profiles``, each on top of what it extends.
+    """Resolve ``qos_profiles``, each over the profile that it extends.
 
-    A profile on a cycle is built on rclpy's default; so is one that extends an unknown name.
+    A profile in a cycle, or one that extends an unknown name, is based on rclpy's default.
     """
     table = QosTable()
     written = {entry.name: entry for entry in entries(tree) if isinstance(entry.value, Mapping)}
@@ -79,7 +79,7 @@ def qos_table(tree: Tree | None) -> QosTable:
 
 
 def implicit_qos(kind: ChannelKind, span: Span) -> Qos:
-    """Return what a port gets that says nothing: rclpy's defaults for its kind."""
+    """Return the profile of a port without ``qos``: rclpy's default for its kind."""
     preset = "command" if kind is ChannelKind.TOPIC else "services_default"
     return Qos(PRESETS[preset], span, explicit=False)
 
@@ -87,7 +87,7 @@ def implicit_qos(kind: ChannelKind, span: Span) -> Qos:
 def _unresolved_chain(
     entry: Entry, written: Map[str, Entry], resolved: Map[str, Qos]
 ) -> list[Entry]:
-    """Return ``entry`` and what it extends, up to something known; chains may be long."""
+    """Return ``entry`` and the profiles it extends, up to a resolved one. Not recursive."""
     chain: dict[str, Entry] = {}
     link: Entry | None = entry
     while link is not None and link.name not in chain and link.name not in resolved:
@@ -115,12 +115,12 @@ def _preset(name: Located[str]) -> Qos | None:
 
 
 def _as_unknown(qos: Qos) -> Qos:
-    """Return the profile as what stands in for one that is not known."""
+    """Return the profile marked as a placeholder for an unknown one."""
     return replace(qos, known=False)
 
 
 def _overlaid(tree: Tree, base: Qos, span: Span) -> Qos:
-    """Return ``base`` with the policies that ``tree`` writes out."""
+    """Return ``base`` with the policies of ``tree``."""
     changes: dict[str, Any] = {}
     spans = dict(base.policy_spans)
     known = base.known

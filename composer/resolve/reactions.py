@@ -1,4 +1,4 @@
-"""Reactions, expressions and templates: the one thing that is judged while resolving."""
+"""Compile reactions, expressions and templates, and report their errors."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ RULE = register(
         code="RC440",
         name="invalid-expression",
         severity=Severity.ERROR,
-        summary="An expression or a text with {...} in it cannot be compiled.",
+        summary="An expression, or a text with {...}, cannot be compiled.",
         why=(
             "Expressions are a small, safe language: fields of messages, numbers, comparisons, "
-            "and, or, not, and a few functions. What is not in it is refused before anything "
-            "starts, not when a message arrives."
+            "and, or, not, and a few functions. Invalid ones are reported before anything starts, "
+            "not when a message arrives."
         ),
         bad="""\
 system: demo
@@ -34,7 +34,7 @@ nodes:
     )
 )
 
-#: The keys that make a port, a timer or a lifecycle hook react.
+#: The keys of a reaction of a port, a timer or a lifecycle transition.
 KEYS = ("when", "set", "log", "publish", "call", "respond")
 
 NODE_EVENTS = (
@@ -46,7 +46,7 @@ NODE_EVENTS = (
 
 
 def expression(tree: Tree | None, diagnostics: list[Diagnostic]) -> Located[Expression] | None:
-    """Compile a condition. Its place is that of the text, without quotes."""
+    """Compile a condition. Its span excludes quotes."""
     if not isinstance(tree, Scalar) or not isinstance(tree.value, str) or is_opaque(tree.value):
         return None
     try:
@@ -59,7 +59,7 @@ def expression(tree: Tree | None, diagnostics: list[Diagnostic]) -> Located[Expr
 
 
 def template(tree: Tree | None, diagnostics: list[Diagnostic]) -> Template | None:
-    """Compile a value with ``{...}`` in its texts."""
+    """Compile a value that may have ``{...}`` in its texts."""
     if tree is None:
         return None
     compiled, problems = compile_template(tree)
@@ -70,12 +70,12 @@ def template(tree: Tree | None, diagnostics: list[Diagnostic]) -> Template | Non
 
 
 def has_reaction(tree: Mapping) -> bool:
-    """Say whether any reaction key is there."""
+    """Return whether ``tree`` has any key of a reaction."""
     return any(entry.name in KEYS for entry in tree)
 
 
 def reaction(tree: Tree | None, span: Span, diagnostics: list[Diagnostic]) -> Reaction | None:
-    """Return what the reaction keys of ``tree`` declare; None when there are none."""
+    """Return the reaction that ``tree`` declares, or None."""
     if not isinstance(tree, Mapping) or not has_reaction(tree):
         return None
     when = expression(tree.get("when"), diagnostics)
@@ -94,7 +94,7 @@ def reaction(tree: Tree | None, span: Span, diagnostics: list[Diagnostic]) -> Re
 
 
 def nested(entry: Entry | None, event: Event, diagnostics: list[Diagnostic]) -> Events:
-    """Return the reaction that stands under a key of its own, such as ``on_response``."""
+    """Return the reaction under a separate key, such as ``on_response``."""
     found = reaction(entry.value, entry.key.span, diagnostics) if entry is not None else None
     return ((event, found),) if found is not None else ()
 
@@ -103,7 +103,7 @@ Events = tuple[tuple[Event, Reaction], ...]
 
 
 def node_reactions(tree: Mapping, diagnostics: list[Diagnostic]) -> Events:
-    """Return the reactions of a node to its own transitions."""
+    """Return the reactions of a node to its transitions."""
     return tuple(
         found
         for name, event in NODE_EVENTS

@@ -1,4 +1,4 @@
-"""Where the files are that a system was put together from, and what they may refer to there."""
+"""The folders of a system's files, and the node types that they may use."""
 
 from __future__ import annotations
 
@@ -13,10 +13,7 @@ from composer.source import Span
 
 @dataclass(frozen=True, slots=True)
 class SourceFolders:
-    """The folders of files, by what the files are called; ``home`` is that of the system's own.
-
-    ``node_types`` is what the system's own file may refer to.
-    """
+    """The folders of files by name; ``home`` and ``node_types`` belong to the system's file."""
 
     home: Path
     folders: Map[str, Path]
@@ -24,11 +21,11 @@ class SourceFolders:
     _node_types_of: dict[Path, NodeTypes] = field(default_factory=dict, repr=False, compare=False)
 
     def folder(self, span: Span) -> Path:
-        """Return the folder of the file that something is written in."""
+        """Return the folder of the file of ``span``."""
         return self.folders.get(span.file.path, self.home)
 
     def node_types_for(self, span: Span) -> NodeTypes:
-        """Return the node types that may be used where something is written."""
+        """Return the node types that the file of ``span`` may use."""
         folder = self.folder(span)
         if folder == self.home:
             return self.node_types

@@ -1,4 +1,4 @@
-"""A whole file: a system, or a node type alone."""
+"""Resolve a whole file: a system, or a single node type."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ DEFAULT_THREADS = 2
 def resolve_system(
     tree: Mapping, source: SourceFile, folders: SourceFolders, overrides: Overrides
 ) -> tuple[System, list[Diagnostic]]:
-    """Return the system that an expanded tree declares. See :func:`composer.resolve.resolve`."""
+    """Return the system of an expanded tree. See :func:`composer.resolve.resolve`."""
     diagnostics: list[Diagnostic] = []
     qos = qos_table(tree.get("qos_profiles"))
     namespace = _system_namespace(tree, overrides)
@@ -54,7 +54,7 @@ def resolve_system(
     types = NodeTypeLoader(folders, qos, diagnostics)
     written = tree.get("lifecycle")
     lifecycle = written if isinstance(written, Mapping) else Mapping((), tree.span)
-    supervision_default = read_supervision(lifecycle, DEFAULT_SUPERVISION)
+    system_supervision = read_supervision(lifecycle, DEFAULT_SUPERVISION)
     written = tree.get("parameter_files")
     files = read_parameter_files(written, folders.home, folders.node_types.project, diagnostics)
     clock = _use_sim_time(tree, overrides)
@@ -65,7 +65,7 @@ def resolve_system(
         qos,
         port_connections,
         overrides,
-        supervision_default,
+        system_supervision,
         tree.get("introspection"),
         files,
         clock,
@@ -87,7 +87,7 @@ def resolve_system(
         qos_references=tuple(qos.references),
         executors=tuple(_executor(entry) for entry in entries(tree.get("executors"))),
         autostart=autostart.value if autostart is not None else PrimaryState.ACTIVE,
-        supervision=supervision_default,
+        supervision=system_supervision,
         delivery=delivery.value if delivery is not None else Delivery.AUTO,
         use_sim_time=any(flag(entry.value, default=False) for entry in clock),
         implied_dependencies=flag(lifecycle.get("implied_dependencies"), default=True),
@@ -100,7 +100,7 @@ def resolve_system(
 def resolve_node_type(
     tree: Mapping, source: SourceFile, folders: SourceFolders, overrides: Overrides
 ) -> tuple[System, list[Diagnostic]]:
-    """Return a system of the one node that a node type declares, for validating it alone."""
+    """Return a system with a single node of a node type, to validate the type alone."""
     diagnostics: list[Diagnostic] = []
     qos = qos_table(None)
     declared = declare(tree, folders, qos, diagnostics)
@@ -147,7 +147,7 @@ def _name_span(tree: Mapping, kind: str) -> Span:
 
 
 def _system_namespace(tree: Mapping, overrides: Overrides) -> Located[str]:
-    """Return the namespace of everything in the system, absolute. The command line's wins."""
+    """Return the absolute namespace of the system. The command line overrides the file."""
     written = overrides.namespace or text(tree.get("namespace"))
     if written is None:
         return Located(ROOT, tree.span)
@@ -155,7 +155,7 @@ def _system_namespace(tree: Mapping, overrides: Overrides) -> Located[str]:
 
 
 def _use_sim_time(tree: Mapping, overrides: Overrides) -> tuple[Entry, ...]:
-    """Return what is said of the time of all nodes. The command line's wins."""
+    """Return the ``use_sim_time`` entry for all nodes. The command line overrides the file."""
     written = overrides.use_sim_time or tree.entry(USE_SIM_TIME)
     if written is None or not isinstance(written.value, Scalar):
         return ()

@@ -1,6 +1,6 @@
-"""Reading a located tree leniently: what has the right shape is taken, the rest is left out.
+"""Read typed values from a located tree, skipping values of the wrong type.
 
-The schema has already said what is wrong with the rest.
+The schema has already reported those.
 """
 
 from __future__ import annotations
@@ -13,48 +13,48 @@ from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 E = TypeVar("E", bound=StrEnum)
 
-#: Stands for a text that must be there and is not. Like every text with a load-time variable left
-#: in it, it is judged by nobody, so that one mistake makes one diagnostic.
+#: Placeholder for a missing text. Like any text with a load-time variable without value, it is not
+#: checked, so that one mistake gives one diagnostic.
 OPAQUE = "${}"
 
 
 def is_opaque(text: str) -> bool:
-    """Say whether a load-time variable without value is left in ``text``."""
+    """Return whether ``text`` has a load-time variable without value."""
     return "${" in text
 
 
 def entries(tree: Tree | None) -> tuple[Entry, ...]:
-    """Return the entries of a map; none when it is not one."""
+    """Return the entries of a map; none for other values."""
     return tree.entries if isinstance(tree, Mapping) else ()
 
 
 def text(tree: Tree | None) -> Located[str] | None:
-    """Return a text with its place."""
+    """Return a text with its location."""
     if isinstance(tree, Scalar) and isinstance(tree.value, str):
         return Located(tree.value, tree.span)
     return None
 
 
 def texts(tree: Tree | None) -> tuple[Located[str], ...]:
-    """Return one text, or those of a list."""
+    """Return a single text, or the texts of a list."""
     items = tree.items if isinstance(tree, Sequence) else (tree,)
     found = (text(item) for item in items)
     return tuple(item for item in found if item is not None)
 
 
 def plain_text(tree: Tree | None) -> str:
-    """Return a text without its place; empty when there is none."""
+    """Return a text without its location; empty by default."""
     found = text(tree)
     return found.value if found is not None else ""
 
 
 def text_or_opaque(tree: Tree | None, span: Span) -> Located[str]:
-    """Return a text that must be there; ``span`` is where it is missing."""
+    """Return a required text, or a placeholder at ``span``."""
     return text(tree) or Located(OPAQUE, tree.span if tree is not None else span)
 
 
 def integer(tree: Tree | None) -> Located[int] | None:
-    """Return a whole number with its place."""
+    """Return an integer with its location."""
     if (
         isinstance(tree, Scalar)
         and isinstance(tree.value, int)
@@ -65,14 +65,14 @@ def integer(tree: Tree | None) -> Located[int] | None:
 
 
 def number(tree: Tree | None) -> Located[float] | None:
-    """Return a number with its place; a whole number stays one."""
+    """Return a number with its location; an integer stays an integer."""
     if isinstance(tree, Scalar) and isinstance(tree.value, int | float):
         return None if isinstance(tree.value, bool) else Located(tree.value, tree.span)
     return None
 
 
 def choice(tree: Tree | None, kind: type[E]) -> Located[E] | None:
-    """Return the member of an enumeration that is written there; None for what is none of it."""
+    """Return the member of an enumeration, or None."""
     written = text(tree)
     known = {item.value: item for item in kind}
     if written is None or written.value not in known:
@@ -81,10 +81,10 @@ def choice(tree: Tree | None, kind: type[E]) -> Located[E] | None:
 
 
 def flag(tree: Tree | None, default: bool) -> bool:
-    """Return true or false; ``default`` when it is neither."""
+    """Return a boolean; ``default`` for other values."""
     return tree.value if isinstance(tree, Scalar) and isinstance(tree.value, bool) else default
 
 
 def key(entry: Entry) -> Located[str]:
-    """Return the key of an entry with its place."""
+    """Return the key of an entry with its location."""
     return Located(entry.name, entry.key.span)

@@ -48,19 +48,19 @@ def test_every_policy_that_is_too_weak_is_named() -> None:
             "durability",
             "volatile",
             "transient_local",
-            "the publisher keeps nothing for late joiners",
+            "the publisher does not keep messages for late joiners",
         ),
         Incompatibility(
             "deadline_ms",
             "no limit",
             "10 ms",
-            "the publisher promises messages less often than the subscription asks for",
+            "the publisher offers a longer deadline than the subscription requests",
         ),
         Incompatibility(
             "liveliness",
             "automatic",
             "manual_by_topic",
-            "the publisher does not assert its liveliness by hand",
+            "the publisher does not assert its liveliness manually",
         ),
         Incompatibility(
             "liveliness_lease_duration_ms",

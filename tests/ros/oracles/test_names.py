@@ -36,7 +36,7 @@ INVALID = (
     ValueError,
 )
 #: What the design page forbids and rcl lets through: '/a__b', and '~a', which it makes '/na'.
-STRICTER = ("contains '__'", "has no '/' behind '~'")
+STRICTER = ("contains '__'", "has no '/' after '~'")
 # Braces are substitutions to rcl and expressions to the composer: the one thing left out.
 NAMES = st.text(alphabet="ab_1/~ é-.", max_size=12)
 TOKENS = st.lists(

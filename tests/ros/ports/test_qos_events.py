@@ -64,7 +64,8 @@ def test_outsiders_with_another_qos_are_named_with_the_policy(
         reached = system.wait_for_log("publisher 'output'")
         assert reached == (
             f"publisher 'output' reaches nothing of {name} on /output: durability is "
-            "transient_local there, volatile here; the publisher keeps nothing for late joiners"
+            "transient_local there, volatile here; "
+            "the publisher does not keep messages for late joiners"
         )
         assert counts(system, "a") == {"incompatible": 2}
     of_rclpy = capfd.readouterr().err
