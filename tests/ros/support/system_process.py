@@ -1,4 +1,4 @@
-"""A system in a process of its own, and an external node that observes it."""
+"""``compose run`` in a separate process, and an external node to observe the system."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PATIENCE_S = 20.0
 
 
 class RunningSystem:
-    """``compose run`` in a process of its own, whose output is read as it arrives."""
+    """``compose run`` in a separate process, with its output read continuously."""
 
     def __init__(self, system: str, *options: str, program: Sequence[str] = COMPOSE) -> None:
         command = [*program, "run", system, *options]
@@ -63,24 +63,24 @@ class RunningSystem:
 
     @property
     def output(self) -> str:
-        """Everything printed so far."""
+        """The output so far."""
         return "\n".join(self.lines)
 
     def wait_for(self, pattern: str, timeout_s: float = PATIENCE_S) -> str:
-        """Wait for a printed line that matches, and return it; fail if the process ends."""
-        searched = re.compile(pattern)
+        """Wait for a matching line of the output and return it. Fails on exit or timeout."""
+        expression = re.compile(pattern)
         end_s = time.monotonic() + timeout_s
         with self._changed:
             while True:
                 for line in self.lines:
-                    if searched.search(line):
+                    if expression.search(line):
                         return line
-                assert not self._has_ended, f"no line like {pattern!r}, it ended: {self._code()}"
+                assert not self._has_ended, f"no line matches {pattern!r}, exit code {self._code()}"
                 if not self._changed.wait(end_s - time.monotonic()):
-                    raise AssertionError(f"no line like {pattern!r} within {timeout_s:g} s")
+                    raise AssertionError(f"no line matches {pattern!r} within {timeout_s:g} s")
 
     def stop(self, number: signal.Signals = signal.SIGINT) -> tuple[int, float]:
-        """Send a signal; return the exit code and the time to the end in seconds."""
+        """Send a signal; return the exit code and the time until the exit, in seconds."""
         sent_s = time.monotonic()
         self.process.send_signal(number)
         code = self.process.wait(timeout=PATIENCE_S)
@@ -89,7 +89,7 @@ class RunningSystem:
         return code, took_s
 
     def _end(self) -> None:
-        """End the process in order: a killed one stays in the ROS graph until its lease ends."""
+        """Stop the process; a killed one would stay in the ROS graph until its lease expires."""
         self.process.send_signal(signal.SIGINT)
         try:
             self.process.wait(timeout=PATIENCE_S)
@@ -112,7 +112,7 @@ class RunningSystem:
 
 
 class ExternalNode:
-    """An ordinary rclpy node in another process than the system."""
+    """A plain rclpy node that is external to the system."""
 
     def __init__(self, context: Context) -> None:
         self.node = Node("external_node", context=context)
@@ -125,24 +125,24 @@ class ExternalNode:
         self.node.destroy_node()
 
     def spin_until(self, condition: Callable[[], bool], timeout_s: float = PATIENCE_S) -> None:
-        """Serve callbacks until the condition holds."""
+        """Spin until the condition holds."""
         end_s = time.monotonic() + timeout_s
         while not condition():
             if time.monotonic() > end_s:
-                raise AssertionError(f"not reached within {timeout_s:g} s")
+                raise AssertionError(f"condition not met within {timeout_s:g} s")
             self.executor.spin_once(timeout_sec=0.05)
 
     def spin_for(self, seconds: float) -> None:
-        """Serve callbacks for ``seconds``, to check that something does *not* happen."""
+        """Spin for a fixed time, to verify that nothing is received."""
         end_s = time.monotonic() + seconds
         while (left_s := end_s - time.monotonic()) > 0:
             self.executor.spin_once(timeout_sec=min(left_s, 0.05))
 
     def listen(self, message_type: Any, topic: str, qos: QoSProfile | int = 10) -> list[Any]:
-        """Return a list that fills with the messages of the topic."""
-        messages: list[Any] = []
-        self.node.create_subscription(message_type, topic, messages.append, qos)
-        return messages
+        """Subscribe to a topic and return the list to which its messages are appended."""
+        received: list[Any] = []
+        self.node.create_subscription(message_type, topic, received.append, qos)
+        return received
 
     def result(self, future: Any, timeout_s: float = PATIENCE_S) -> Any:
         """Wait for an rclpy future and return its result."""
@@ -164,11 +164,11 @@ class ExternalNode:
         return str(response.current_state.label)
 
     def wait_for_state(self, node: str, state: str) -> None:
-        """Wait until the node exists and is in the state."""
+        """Wait until the node has the state."""
         self.spin_until(lambda: self.state(node) == state)
 
     def change_state(self, node: str, label: str) -> bool:
-        """Request a transition by its label; return its success."""
+        """Request a transition by its label."""
         request = ChangeState.Request()
         request.transition.label = label
         return bool(self.call(ChangeState, f"{node}/change_state", request).success)

@@ -1,4 +1,4 @@
-"""An external node, for tests of running systems."""
+"""An external node for the tests of running systems."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.ros.support.system_process import ExternalNode
 
 @pytest.fixture(scope="module")
 def external_context(shared_domain_id: int) -> Iterator[Context]:
-    """One DDS participant for many tests: Fast DDS has crashed on deleting many in a row."""
+    """One DDS participant for all tests of a module: Fast DDS may crash when deleting many."""
     context = Context()
     rclpy.init(context=context)
     yield context
@@ -22,7 +22,7 @@ def external_context(shared_domain_id: int) -> Iterator[Context]:
 
 @pytest.fixture
 def external(external_context: Context) -> Iterator[ExternalNode]:
-    """A node of an ordinary rclpy process."""
+    """A plain rclpy node in this process, which is external to the system."""
     node = ExternalNode(external_context)
     yield node
     node.close()

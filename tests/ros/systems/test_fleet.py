@@ -1,4 +1,4 @@
-"""Two robots from one file: each is where its include puts it, and does what is said there."""
+"""Two robots from one file: each one has the namespace and the parameters of its include."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from tests.ros.support.system_process import ExternalNode, RunningSystem
 SENSOR_DATA = QoSPresetProfiles.SENSOR_DATA.value
 
 
-def test_each_robot_is_a_part_of_its_own(external: ExternalNode) -> None:
+def test_the_robots_are_independent(external: ExternalNode) -> None:
     odometry = {
         robot: external.listen(Odometry, f"/{robot}/odometry", SENSOR_DATA)
         for robot in ("alpha", "beta")
     }
-    # Straight ahead, each on its own line: where it is says who it is, whenever it is heard first.
-    ways = ("alpha_controller.waypoints=[6.0, 0.0]", "beta_controller.waypoints=[6.0, 5.0]")
-    options = [word for way in ways for word in ("--set", way)]
+    # Each robot drives on its own line, so its position identifies it at any time.
+    waypoints = ("alpha_controller.waypoints=[6.0, 0.0]", "beta_controller.waypoints=[6.0, 5.0]")
+    options = [word for value in waypoints for word in ("--set", value)]
     with RunningSystem("systems/fleet.yaml", *options) as system:
         system.wait_for(r"9 of 9 nodes active")
         system.wait_for(r"alpha_controller.*driving to")

@@ -1,4 +1,4 @@
-"""Tutorial: the pipeline. The numbers mean something, and these tests hold them to it."""
+"""The pipeline: bring-up, motion of the robot, service, action and tear-down."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _distance(first: Point, second: Point) -> float:
     return math.dist((first.x, first.y, first.z), (second.x, second.y, second.z))
 
 
-def test_nodes_become_active_in_order_and_end_in_reverse(external: ExternalNode) -> None:
+def test_nodes_are_activated_in_dependency_order(external: ExternalNode) -> None:
     with RunningSystem("systems/pipeline.yaml") as system:
         for node in NODES:
             external.wait_for_state(node, "active")
@@ -44,7 +44,6 @@ def test_nodes_become_active_in_order_and_end_in_reverse(external: ExternalNode)
 
 
 def _order(system: RunningSystem, pattern: str) -> list[str]:
-
     return [
         node
         for line in system.lines
@@ -54,7 +53,7 @@ def _order(system: RunningSystem, pattern: str) -> list[str]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_every_signal_ends_it_cleanly(external: ExternalNode, number: signal.Signals) -> None:
+def test_every_signal_shuts_down_cleanly(external: ExternalNode, number: signal.Signals) -> None:
     with RunningSystem("systems/pipeline.yaml") as system:
         external.wait_for_state(NODES[-1], "active")
         code, took_s = system.stop(number)
@@ -64,7 +63,7 @@ def test_every_signal_ends_it_cleanly(external: ExternalNode, number: signal.Sig
 def test_the_robot_follows_the_planned_path(external: ExternalNode) -> None:
     commands = external.listen(Twist, "/motor_commands")
     odometry = external.listen(Odometry, "/sensor_data", QoSPresetProfiles.SENSOR_DATA.value)
-    # straight ahead, and long enough for a slow discovery
+    # A straight path that is long enough for a slow discovery.
     with RunningSystem("systems/pipeline.yaml", "--set", "motor_controller.waypoints=[6.0, 0.0]"):
         external.spin_until(lambda: bool(odometry) and odometry[-1].pose.pose.position.x > 5.9)
     speeds = [math.hypot(message.linear.x, message.linear.y) for message in commands]
@@ -78,7 +77,7 @@ def test_the_robot_follows_the_planned_path(external: ExternalNode) -> None:
         assert math.hypot(twist.x, twist.y) <= MAX_VELOCITY + ROUNDING
 
 
-def test_the_planner_answers_another_process(external: ExternalNode) -> None:
+def test_an_external_node_calls_the_planner(external: ExternalNode) -> None:
     start, goal = Point(x=1.0, y=1.0), Point(x=4.0, y=5.0)
     request = PlanTrajectory.Request(start=start, goal=goal, max_velocity=0.5)
     with RunningSystem("systems/pipeline.yaml"):
@@ -101,19 +100,19 @@ def test_the_planner_answers_another_process(external: ExternalNode) -> None:
 def _wait_for_plan(
     external: ExternalNode, request: PlanTrajectory.Request
 ) -> PlanTrajectory.Response:
-    """Ask until the planner, which has to hear odometry first, answers with a path."""
+    """Call the planner until it has received odometry and returns a path."""
     responses: list[PlanTrajectory.Response] = []
 
-    def answered() -> bool:
+    def has_path() -> bool:
         responses.append(external.call(PlanTrajectory, "/plan_trajectory", request))
         return bool(responses[-1].success)
 
-    external.spin_until(answered)
+    external.spin_until(has_path)
     return responses[-1]
 
 
-def test_another_process_navigates_and_cancels(external: ExternalNode) -> None:
-    # without waypoints it stands still until somebody sends a goal
+def test_an_external_node_navigates_and_cancels(external: ExternalNode) -> None:
+    # Without waypoints the robot waits for goals.
     with RunningSystem("systems/pipeline.yaml", "--set", "motor_controller.waypoints=[]"):
         external.wait_for_state(NODES[-1], "active")
         client = ActionClient(external.node, Navigate, "/navigate")
@@ -121,7 +120,7 @@ def test_another_process_navigates_and_cancels(external: ExternalNode) -> None:
         goal = Navigate.Goal(target=Point(x=0.0, y=1.0), max_velocity=1.0)
         outcome = external.result(external.result(client.send_goal_async(goal)).get_result_async())
         assert outcome.status == GoalStatus.STATUS_SUCCEEDED
-        # A robot whose controller gets no processor for a moment drives on, and then comes back.
+        # The robot overshoots if its controller is delayed on a busy machine.
         assert 0.9 < outcome.result.distance_traveled < 1.5
         feedback: list[float] = []
         handle = external.result(
@@ -140,7 +139,7 @@ def test_another_process_navigates_and_cancels(external: ExternalNode) -> None:
     assert outcome.result.message == "canceled on the way"
 
 
-def test_a_deactivated_planner_says_so_and_nothing_else(external: ExternalNode) -> None:
+def test_a_deactivated_planner_rejects_requests(external: ExternalNode) -> None:
     request = PlanTrajectory.Request(goal=Point(x=1.0), max_velocity=0.5)
     with RunningSystem("systems/pipeline.yaml"):
         external.wait_for_state(NODES[-1], "active")

@@ -1,4 +1,4 @@
-"""Tutorial: PlanTrajectory with its failures; Navigate with feedback, cancel and reject."""
+"""The example services and actions, and the generic node types."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SUCCEEDED = 4
 STATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def test_a_client_gets_paths_refusals_and_silence(external: ExternalNode) -> None:
+def test_a_client_gets_paths_failures_and_timeouts(external: ExternalNode) -> None:
     with RunningSystem("systems/trajectory_service.yaml") as system:
         system.wait_for(r"client.*True: 51 points")
         system.wait_for(r"client.*False: max_velocity must be above 0 m/s, not 0.0")
@@ -32,17 +32,17 @@ def test_goals_succeed_are_canceled_and_are_rejected(external: ExternalNode) -> 
         external.spin_until(lambda: all(outcomes))
         system.wait_for(r"patient.*100 % of the way")
         steps = [line for line in system.lines if "patient" in line and "% of the way" in line]
-    assert [heard[0].data for heard in outcomes] == ["succeeded", "canceled", "rejected"]
+    assert [received[0].data for received in outcomes] == ["succeeded", "canceled", "rejected"]
     assert len(steps) == 10
 
 
-def test_the_generic_nodes_do_what_they_say(external: ExternalNode) -> None:
+def test_the_generic_node_types(external: ExternalNode) -> None:
     slow = external.listen(Float64, "/reading/slow")
     large = external.listen(Float64, "/reading/large")
     degrees = external.listen(String, "/reading/degrees")
     relayed = external.listen(Float64, "/reading/relayed")
     with RunningSystem("systems/toolbox.yaml"):
-        # Enough of each: who begins to hear one a moment before the other hears a little more.
+        # Enough messages of each topic, as discovery times differ.
         external.spin_until(lambda: len(large) >= 5 and len(slow) >= 20)
         assert external.call(Trigger, "/trigger", Trigger.Request()).message == "request 0"
         assert external.call(Trigger, "/trigger", Trigger.Request()).message == "request 1"
@@ -57,28 +57,28 @@ def test_the_generic_nodes_do_what_they_say(external: ExternalNode) -> None:
 def _navigate(external: ExternalNode, target: Point) -> tuple[list[float], Any]:
     client = ActionClient(external.node, Navigate, "/navigate")
     external.spin_until(client.server_is_ready)
-    # What is told before the server has met who listens is lost, and the client cannot wait for
-    # that. Once something is heard, they have met.
+    # Feedback sent before discovery of the subscription is lost, and the client cannot wait for
+    # discovery. Repeat the goal until feedback arrives.
     feedback: list[float] = []
 
-    def have_met() -> bool:
-        external.result(_sent(external, client, target, feedback).get_result_async())
+    def receives_feedback() -> bool:
+        external.result(_send(external, client, target, feedback).get_result_async())
         return bool(feedback)
 
-    external.spin_until(have_met)
+    external.spin_until(receives_feedback)
     feedback = []
-    goal = _sent(external, client, target, feedback)
-    # Only then: with the result rclpy drops what feedback is still to be taken.
+    goal = _send(external, client, target, feedback)
+    # Request the result last, since rclpy then drops pending feedback.
     external.spin_until(lambda: len(feedback) == 10)
     result = external.result(goal.get_result_async())
     client.destroy()
     return feedback, result
 
 
-def _sent(
+def _send(
     external: ExternalNode, client: ActionClient, target: Point, feedback: list[float]
 ) -> Any:
-    """Send a goal and return it once it is accepted."""
+    """Send a goal and return its handle once it is accepted."""
     goal = external.result(
         client.send_goal_async(
             Navigate.Goal(target=target, max_velocity=1.0),

@@ -1,4 +1,4 @@
-"""Tutorial: a minimal node, talker and listener, QoS patterns, executors."""
+"""The example systems with topics: minimal, talker_listener, qos_patterns, executors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from std_msgs.msg import String
 from tests.ros.support.system_process import REPOSITORY, ExternalNode, RunningSystem
 
 
-def test_a_minimal_node_says_that_it_has_started(external: ExternalNode) -> None:
+def test_the_minimal_node_starts(external: ExternalNode) -> None:
     with RunningSystem("systems/minimal.yaml") as system:
         system.wait_for(r"minimal_node.*started")
         external.wait_for_state("/minimal_node", "active")
@@ -19,28 +19,26 @@ def test_a_minimal_node_says_that_it_has_started(external: ExternalNode) -> None
     assert code == 0
 
 
-def test_the_talker_is_heard_inside_and_outside(external: ExternalNode) -> None:
-    heard = external.listen(String, "/chatter")
+def test_messages_arrive_in_process_and_externally(external: ExternalNode) -> None:
+    received = external.listen(String, "/chatter")
     with RunningSystem("systems/talker_listener.yaml") as system:
-        external.spin_until(lambda: len(heard) >= 3)
-        # Inside nothing is lost, from the first one on that the listener was up for.
+        external.spin_until(lambda: len(received) >= 3)
+        # In-process, no message is lost after the activation of the listener.
         first = int(system.wait_for(r"listener.*Received: Sensor reading \d+$").rpartition(" ")[2])
         for number in range(first, first + 3):
             system.wait_for(rf"listener.*Received: Sensor reading {number}$")
     assert first <= 5
-    numbers = [int(message.data.removeprefix("Sensor reading ")) for message in heard]
+    numbers = [int(message.data.removeprefix("Sensor reading ")) for message in received]
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
 
 
-def test_talker_and_listener_are_short_and_without_python() -> None:
+def test_talker_listener_is_short_and_without_python() -> None:
     text = (REPOSITORY / "systems" / "talker_listener.yaml").read_text(encoding="utf-8")
     assert len(text.splitlines()) < 25
     assert "behavior" not in text
 
 
-def test_a_late_joiner_gets_the_state_but_not_the_stream_it_missed(
-    external: ExternalNode,
-) -> None:
+def test_a_late_joiner_receives_the_state_but_no_old_scans(external: ExternalNode) -> None:
     with RunningSystem("systems/qos_patterns.yaml") as system:
         external.wait_for_state("/robot", "active")
         system.wait_for(r"early_listener.*mode is ready")
@@ -50,23 +48,21 @@ def test_a_late_joiner_gets_the_state_but_not_the_stream_it_missed(
         assert external.change_state("/late_joiner", "activate")
         system.wait_for(r"late_joiner.*mode is ready")
         first = system.wait_for(r"late_joiner.*scan \d+")
-        # best effort asks for less than the reliable publisher offers: they do meet
+        # A best-effort subscription is compatible with a reliable publisher.
         system.wait_for(r"late_joiner.*order \d+")
     assert int(re.findall(r"scan (\d+)", first)[0]) > 5
 
 
-def test_a_late_joiner_from_outside_gets_the_state(external: ExternalNode) -> None:
+def test_an_external_late_joiner_receives_the_state(external: ExternalNode) -> None:
     with RunningSystem("systems/qos_patterns.yaml") as system:
         system.wait_for(r"early_listener.*order 1$")
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        heard = external.listen(String, "/mode", latched)
-        external.spin_until(lambda: len(heard) == 1)
-        assert heard[0].data == "ready"
+        received = external.listen(String, "/mode", latched)
+        external.spin_until(lambda: len(received) == 1)
+        assert received[0].data == "ready"
 
 
-def test_control_stays_on_one_thread_and_perception_uses_several(
-    external: ExternalNode,
-) -> None:
+def test_control_stays_on_one_thread_and_perception_uses_several(external: ExternalNode) -> None:
     cycles = external.listen(String, "/control/cycles")
     frames = external.listen(String, "/perception/processed", QoSPresetProfiles.SENSOR_DATA.value)
     with RunningSystem("systems/executors.yaml"):
@@ -79,8 +75,7 @@ def test_control_stays_on_one_thread_and_perception_uses_several(
     assert len({message.data for message in cycles}) == 1
 
 
-def test_an_inline_node_takes_its_behaviour_from_the_projects_node_types(tmp_path: Path) -> None:
-    """Where validate finds it, run finds it too."""
+def test_an_inline_node_uses_a_behavior_from_the_folder_of_node_types(tmp_path: Path) -> None:
     system = tmp_path / "systems" / "greeting.yaml"
     behavior = tmp_path / "nodes" / "greeter.py"
     system.parent.mkdir()
@@ -93,7 +88,7 @@ def test_an_inline_node_takes_its_behaviour_from_the_projects_node_types(tmp_pat
         running.wait_for(r"hello.*good day")
 
 
-def test_a_callback_over_its_budget_is_named(tmp_path: Path) -> None:
+def test_a_callback_over_its_budget_is_logged(tmp_path: Path) -> None:
     system = tmp_path / "slow.yaml"
     system.write_text(
         "system: slow\n"
