@@ -81,6 +81,7 @@ lint: $(STAMPS)/composer $(STAMPS)/dev
 	@$(BIN)/ruff format --quiet --check
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports --no-logo
+#	@$(BIN)/python tools/check_words.py
 
 format: $(STAMPS)/dev
 	@$(BIN)/ruff check --quiet --fix
