@@ -1,7 +1,7 @@
 """The command line: it parses arguments, calls the packages below and prints results.
 
 stdout is data, stderr is everything else. Exit codes: 0 success, 1 errors in files or a failed
-node, 2 wrong usage, 3 internal error.
+node, 2 usage error, 3 internal error.
 """
 
 from __future__ import annotations

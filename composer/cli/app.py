@@ -112,8 +112,8 @@ def compose(
 ) -> None:
     """Define, validate and run ROS 2 systems.
 
-    A system is declared in YAML files. Compose validates them, runs all nodes as lifecycle nodes in
-    one process, and works with every ROS 2 tool.
+    A system is declared in YAML files. Compose validates the files and runs the nodes as lifecycle
+    nodes in one process. All ROS 2 tools work with a running system.
 
-    Exit codes: 0 success, 1 errors in files or a failed node, 2 wrong usage, 3 internal error.
+    Exit codes: 0 success, 1 errors in files or a failed node, 2 usage error, 3 internal error.
     """

@@ -14,10 +14,10 @@ def test_includes_are_resolved(tmp_path: Path) -> None:
     for gone in ("include", "for_each", "${", "variables: {start"):
         assert gone not in done.out
     assert "alpha_controller" in done.out
-    beside = tmp_path / "one.yaml"
-    beside.write_text(done.out, encoding="utf-8")
-    assert compose("validate", str(beside)).code == 0
-    again = compose("config", str(beside))
+    resolved = tmp_path / "one.yaml"
+    resolved.write_text(done.out, encoding="utf-8")
+    assert compose("validate", str(resolved)).code == 0
+    again = compose("config", str(resolved))
     assert (again.out, again.err) == (done.out, "")
 
 

@@ -21,7 +21,7 @@ system: a
 nodes:
   one:
     subscriptions:
-      chatter: {type: std_msgs/msg/String, qos: command, external: true, when: "%s", log: heard}
+      chatter: {type: std_msgs/msg/String, qos: command, external: true, when: "%s", log: received}
 """
 LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n"

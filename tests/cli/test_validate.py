@@ -71,8 +71,8 @@ def test_problems_of_a_shared_node_type_are_reported_once(folder: Path) -> None:
     for name in ("first", "second"):
         Path(f"{name}.yaml").write_text(f"system: {name}\nnodes: {{one: {{type: odd}}}}\n")
     done = compose("validate", "--format", "json", ".")
-    places = [finding["location"]["file"] for finding in json.loads(done.out)["diagnostics"]]
-    assert places.count("nodes/odd.yaml") == 1
+    files = [item["location"]["file"] for item in json.loads(done.out)["diagnostics"]]
+    assert files.count("nodes/odd.yaml") == 1
 
 
 def test_a_file_argument_is_always_checked(folder: Path) -> None:

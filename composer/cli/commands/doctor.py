@@ -24,7 +24,7 @@ EPILOGS = {
     "doctor": examples(
         "compose doctor",
         "compose doctor --json",
-        "compose doctor --strict                     treat warnings as errors, for CI",
+        "compose doctor --strict     treat warnings as errors, for CI",
     )
 }
 _RETRY = "fix the errors above, then run 'compose doctor' again"

@@ -112,9 +112,9 @@ def graph(
     view: Annotated[
         DiagramView,
         typer.Option(
-            help="What to draw: nodes and their connections; connections between ports with their"
-            " QoS; dependencies of the lifecycle; deployment on executors; lifecycle states. An"
-            " HTML page contains all views and opens with this one.",
+            help="What to draw. nodes: nodes and their connections. connections: ports and QoS."
+            " lifecycle: dependencies between nodes. deployment: nodes by executor. states:"
+            " lifecycle states. An HTML page contains all views and opens with this one.",
         ),
     ] = DiagramView.NODES,
     layout: Annotated[

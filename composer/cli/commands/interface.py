@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 app = typer.Typer(
     help="""Show message, service and action types.
 
-    These are the types of installed packages, of the project, and those bundled with ROS 2. ROS is
-    not needed.
+    These are the types of installed packages and of the project, and the common types of ROS 2. ROS
+    is not needed.
     """,
     epilog=examples(
         "compose interface list --only-srvs", "compose interface show nav_msgs/msg/Odometry"

@@ -131,7 +131,7 @@ def set_state(
         typer.Option(
             "--to",
             metavar="STATE",
-            help="Go to this state, with as many transitions as needed.",
+            help="Go to this state: unconfigured, inactive, active or finalized.",
             show_default=False,
         ),
     ] = None,

@@ -34,10 +34,9 @@ EPILOGS = {
 def up(system: RunningSystem, timeout: Timeout = _TIMEOUT_S) -> None:
     """Bring up the nodes of a running system.
 
-    Each node is brought up to the state in which the system declares it to start. If a node fails,
-    the nodes that were started are taken down again in reverse order, and the node and the cause
-    are reported. Nodes that had failed before are retried. To start the process of a system, use
-    'compose run'.
+    Each node is brought up to its autostart state. If a node fails, the bring-up is rolled back and
+    the cause is reported. Nodes that failed before are retried. Use 'compose run' to start the
+    process of a system.
     """
     _command("up", "startup", system, timeout, failure="did not come up")
 

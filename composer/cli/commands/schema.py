@@ -30,7 +30,11 @@ class SchemaName(StrEnum):
     REPORT = "report"
 
 
-def schema(name: Annotated[SchemaName, typer.Argument(help="The kind of file.")]) -> None:
+def schema(
+    name: Annotated[
+        SchemaName, typer.Argument(metavar="NAME", help="system, node, project or report.")
+    ],
+) -> None:
     """Print a JSON Schema (draft-07) for editors.
 
     An editor with a YAML language server uses it for completion and checks. Add this as the first

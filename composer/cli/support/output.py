@@ -1,4 +1,4 @@
-"""Results of commands on stdout: YAML for people, JSON for programs, and lists of names."""
+"""Results of commands on stdout: YAML, JSON and lists of names."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from tests.ros.support.commands import (
     finished,
     listed,
     measured,
-    said,
+    output_of,
     start,
 )
 
@@ -82,21 +82,23 @@ def test_topic_info() -> None:
 
 
 def test_echo_receives_from_a_best_effort_publisher() -> None:
-    lines = said("topic", "echo", "/lab/count", "--count", "5", "--json").splitlines()
+    lines = output_of("topic", "echo", "/lab/count", "--count", "5", "--json").splitlines()
     values = [json.loads(line)["data"] for line in lines]
     assert values == list(range(values[0], values[0] + 5))
 
 
 def test_echo_receives_earlier_messages_and_truncates_them() -> None:
-    text = yaml.safe_load(said("topic", "echo", "/lab/text", "--once").removesuffix("---\n"))
+    text = yaml.safe_load(output_of("topic", "echo", "/lab/text", "--once").removesuffix("---\n"))
     assert text == {"data": "x" * 128 + "..."}
-    full = said("topic", "echo", "/lab/text", "--once", "--full-length", "--field", "data")
+    full = output_of("topic", "echo", "/lab/text", "--once", "--full-length", "--field", "data")
     assert full == "x" * 200 + "\n---\n"
 
 
 def test_echo_filters_by_an_expression() -> None:
     condition = "message.data > 20 and message.data < 1000000"
-    value = said("topic", "echo", "/lab/count", "--once", "--filter", condition, "--field", "data")
+    value = output_of(
+        "topic", "echo", "/lab/count", "--once", "--filter", condition, "--field", "data"
+    )
     assert int(value.removesuffix("---\n")) > 20
     assert "has no field 'x'" in error("topic", "echo", "/lab/count", "--filter", "message.x > 1")
     done = compose("topic", "echo", "/lab/count", "--filter", "message.data >")
@@ -193,7 +195,7 @@ def plain_subscription() -> Iterator[list[tuple[float, int]]]:
 
 
 def test_hz_prints_text() -> None:
-    assert "average rate: " in said("topic", "hz", "/lab/count", "--count", "10")
+    assert "average rate: " in output_of("topic", "hz", "/lab/count", "--count", "10")
 
 
 def test_bw_counts_serialized_bytes() -> None:
@@ -222,10 +224,10 @@ def test_published_messages_arrive() -> None:
     assert (done.returncode, done.stdout) == (0, "")
     assert done.stderr == "published #2: std_msgs.msg.String(data='number 1')\n"
     last = "number 1\n---\n"  # the talker may still publish the one before
-    echo = ("topic", "echo", "/lab/heard", "--once", "--field", "data")
+    echo = ("topic", "echo", "/lab/received", "--once", "--field", "data")
     assert listed((last,), *echo) == last
     once = ("topic", "pub", "--once", "--json", "--qos-history", "keep_all", *arguments)
-    assert json.loads(said(*once)) == {"data": "number 0"}
+    assert json.loads(output_of(*once)) == {"data": "number 0"}
 
 
 def test_publishing_reports_errors() -> None:

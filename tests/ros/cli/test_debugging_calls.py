@@ -16,7 +16,7 @@ from tests.ros.support.commands import (
     error,
     finished,
     listed,
-    said,
+    output_of,
     start,
 )
 
@@ -25,12 +25,14 @@ pytestmark = pytest.mark.usefixtures("talker")
 
 def test_services() -> None:
     assert "/lab/add" in listed(("/lab/add\n",), "service", "list").split()
-    assert said("service", "type", "/lab/add") == "std_srvs/srv/SetBool\n"
-    assert json.loads(said("service", "type", "/lab/add", "--json")) == ["std_srvs/srv/SetBool"]
+    assert output_of("service", "type", "/lab/add") == "std_srvs/srv/SetBool\n"
+    assert json.loads(output_of("service", "type", "/lab/add", "--json")) == [
+        "std_srvs/srv/SetBool"
+    ]
     response = {"success": True, "message": "switched"}
-    assert yaml.safe_load(said("service", "call", "/lab/add", "{data: true}")) == response
+    assert yaml.safe_load(output_of("service", "call", "/lab/add", "{data: true}")) == response
     typed = ("service", "call", "/lab/add", "std_srvs/srv/SetBool", "{data: true}", "--json")
-    assert json.loads(said(*typed)) == response
+    assert json.loads(output_of(*typed)) == response
     assert "SetBool_Request has no field 'dta'" in error("service", "call", "/lab/add", "{dta: 1}")
     assert "did you mean '/lab/add'?" in error("service", "call", "/lab/ad", "{data: true}")
     gone = ("service", "call", "/lab/gone", "std_srvs/srv/SetBool", "{}", "--timeout", "0.5")
@@ -44,12 +46,12 @@ def test_actions() -> None:
     ]
     info = json.loads(listed(("/lab/talker",), "action", "info", "/lab/navigate", "--json"))
     assert info["servers"] == ["/lab/talker"]
-    assert json.loads(said("action", "info", "lab/navigate", "--json")) == info
+    assert json.loads(output_of("action", "info", "lab/navigate", "--json")) == info
 
 
 def test_a_goal_prints_feedback_and_the_result() -> None:
     goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: 1.0}", "--feedback", "--json")
-    printed = [json.loads(line) for line in said(*goal).splitlines()]
+    printed = [json.loads(line) for line in output_of(*goal).splitlines()]
     assert [item["feedback"]["progress_percent"] for item in printed[:-1]] == [0.0, 1.0, 2.0]
     assert printed[-1]["status"] == "succeeded"
     assert printed[-1]["result"]["distance_traveled"] == 2.5
@@ -97,16 +99,16 @@ def test_ctrl_c_cancels_a_goal() -> None:
 
 
 def test_parameters_can_be_read_and_set() -> None:
-    assert {"speed", "name", "gains"} <= set(said("param", "list", "talker").split())
-    assert said("param", "get", "talker", "speed") == "1.5\n"
-    assert said("param", "set", "talker", "speed", "2") == "/lab/talker speed: 2.0\n"
-    assert json.loads(said("param", "get", "/lab/talker", "speed", "--json")) == 2.0
-    assert json.loads(said("param", "set", "talker", "name", "123", "--json")) == {
+    assert {"speed", "name", "gains"} <= set(output_of("param", "list", "talker").split())
+    assert output_of("param", "get", "talker", "speed") == "1.5\n"
+    assert output_of("param", "set", "talker", "speed", "2") == "/lab/talker speed: 2.0\n"
+    assert json.loads(output_of("param", "get", "/lab/talker", "speed", "--json")) == 2.0
+    assert json.loads(output_of("param", "set", "talker", "name", "123", "--json")) == {
         "/lab/talker": {"ros__parameters": {"name": "123"}}
     }
-    assert json.loads(said("param", "get", "talker", "name", "--json")) == "123"
-    said("param", "set", "talker", "gains", "[3, 4.5]")
-    assert json.loads(said("param", "get", "talker", "gains", "--json")) == [3.0, 4.5]
+    assert json.loads(output_of("param", "get", "talker", "name", "--json")) == "123"
+    output_of("param", "set", "talker", "gains", "[3, 4.5]")
+    assert json.loads(output_of("param", "get", "talker", "gains", "--json")) == [3.0, 4.5]
 
 
 def test_rejected_parameters_are_reported_with_the_reason() -> None:
@@ -121,7 +123,7 @@ def test_rejected_parameters_are_reported_with_the_reason() -> None:
 
 
 def test_a_parameter_is_described() -> None:
-    assert json.loads(said("param", "describe", "talker", "speed", "--json")) == {
+    assert json.loads(output_of("param", "describe", "talker", "speed", "--json")) == {
         "name": "speed",
         "type": "double",
         "description": "How fast.",
@@ -135,21 +137,21 @@ def test_parameters_of_all_nodes_are_listed_and_several_described() -> None:
     assert {"speed", "name", "gains"} <= set(everything["/lab/talker"])
     head = "/lab/talker:\n"
     assert head in listed((head,), "param", "list")
-    several = json.loads(said("param", "describe", "talker", "speed", "name", "--json"))
+    several = json.loads(output_of("param", "describe", "talker", "speed", "name", "--json"))
     assert [item["name"] for item in several] == ["speed", "name"]
 
 
 def test_a_dump_can_be_loaded(tmp_path: Path) -> None:
     file = tmp_path / "talker.yaml"
-    dumped = yaml.safe_load(said("param", "dump", "talker"))
+    dumped = yaml.safe_load(output_of("param", "dump", "talker"))
     values = dumped["/lab/talker"]["ros__parameters"]
     assert values["start_type_description_service"] is True  # read-only, as in every ROS node
     values.update(speed=0.25, name="loaded")
     file.write_text(yaml.safe_dump(dumped))
-    loaded = json.loads(said("param", "load", "talker", str(file), "--json"))
+    loaded = json.loads(output_of("param", "load", "talker", str(file), "--json"))
     del values["start_type_description_service"]
     assert loaded == dumped
-    assert said("param", "get", "talker", "speed") == "0.25\n"
+    assert output_of("param", "get", "talker", "speed") == "0.25\n"
 
 
 def test_parameter_files_can_nest_names_and_use_wildcards(tmp_path: Path) -> None:
@@ -158,7 +160,7 @@ def test_parameter_files_can_nest_names_and_use_wildcards(tmp_path: Path) -> Non
         "/**: {ros__parameters: {speed: 1, for_others: 5}}\n"
         "lab: {talker: {ros__parameters: {limits: {reach: 2}}}}\n"
     )
-    assert said("param", "load", "talker", str(file)) == (
+    assert output_of("param", "load", "talker", str(file)) == (
         "/lab/talker speed: 1.0\n/lab/talker limits.reach: 2.0\n"
     )
     file.write_text("/other: {ros__parameters: {speed: 1.0}}\n")

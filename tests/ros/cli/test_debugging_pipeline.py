@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 import yaml
 
-from tests.ros.support.commands import PATIENCE_S, listed, running, said
+from tests.ros.support.commands import PATIENCE_S, listed, output_of, running
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -43,35 +43,35 @@ OUTPUTS = {
 
 def test_commands_that_read() -> None:
     with ThreadPoolExecutor(4) as pool:
-        texts = pool.map(output_of, OUTPUTS)
+        texts = pool.map(retried_output, OUTPUTS)
     for (arguments, expected), text in zip(OUTPUTS.items(), texts, strict=True):
         assert expected in text, arguments
 
 
-def output_of(arguments: tuple[str, ...]) -> str:
+def retried_output(arguments: tuple[str, ...]) -> str:
     """Return the output; retry lists, because discovery may take longer on a busy machine."""
     patient = (*arguments, "--timeout", "20")
     if "list" not in arguments and "info" not in arguments:
-        return said(*patient)
+        return output_of(*patient)
     return listed((OUTPUTS[arguments],), *patient)
 
 
 def test_a_goal_is_reached() -> None:
     goal = ("action", "send-goal", "/navigate", "{target: {x: 0.3}, max_velocity: 2.0}")
-    printed = [json.loads(line) for line in said(*goal, "--feedback", "--json").splitlines()]
+    printed = [json.loads(line) for line in output_of(*goal, "--feedback", "--json").splitlines()]
     assert printed[-1]["status"] == "succeeded"
     assert all(0.0 <= item["feedback"]["progress_percent"] <= 100.0 for item in printed[:-1])
 
 
 def test_a_parameter_is_set_and_a_message_published() -> None:
     command = ("param", "set", "motor_controller", "max_velocity", "0.5")
-    assert said(*command) == "/control/motor_controller max_velocity: 0.5\n"
+    assert output_of(*command) == "/control/motor_controller max_velocity: 0.5\n"
     once = ("topic", "pub", "--once", "--json", "/motor_commands", "geometry_msgs/msg/Twist")
-    assert json.loads(said(*once, "{linear: {x: 0.1}}"))["linear"]["x"] == 0.1
+    assert json.loads(output_of(*once, "{linear: {x: 0.1}}"))["linear"]["x"] == 0.1
 
 
 def test_doctor_reports_no_problems() -> None:
-    found = json.loads(said("doctor", "--json"))
+    found = json.loads(output_of("doctor", "--json"))
     assert [item for item in found if item["level"] in ("warning", "error")] == []
     (graph,) = (item["message"] for item in found if item["area"] == "graph")
     assert graph.startswith("all endpoints are compatible: ")
@@ -81,7 +81,9 @@ def test_messages_are_fresh() -> None:
     until_s = time.monotonic() + PATIENCE_S
     while True:
         # Twenty messages may take longer than a second, then there is more than one report.
-        reports = said("topic", "delay", "/sensor_data", "--count", "20", "--json").splitlines()
+        reports = output_of(
+            "topic", "delay", "/sensor_data", "--count", "20", "--json"
+        ).splitlines()
         delay = json.loads(reports[-1])
         # A command that is not scheduled for a moment receives old messages afterwards.
         if delay["average_s"] < 0.1 or time.monotonic() > until_s:
@@ -90,11 +92,13 @@ def test_messages_are_fresh() -> None:
 
 
 def test_topic_info() -> None:
-    found = json.loads(said("topic", "info", "-v", "/sensor_data", "--json"))
+    found = json.loads(output_of("topic", "info", "-v", "/sensor_data", "--json"))
     assert [item["node"] for item in found["publishers"]] == ["/perception/sensor_simulator"]
     assert [item["qos"]["reliability"] for item in found["subscriptions"]] == ["best_effort"] * 2
 
 
 def test_a_response_is_printed_as_yaml() -> None:
-    response = yaml.safe_load(said("service", "call", "/plan_trajectory", "{max_velocity: 0.5}"))
+    response = yaml.safe_load(
+        output_of("service", "call", "/plan_trajectory", "{max_velocity: 0.5}")
+    )
     assert "success" in response

@@ -17,14 +17,14 @@ from tests.ros.support.commands import PATIENCE_S, compose, hand_written, measur
 
 
 @pytest.fixture(scope="module")
-def misfits(shared_domain_id: int) -> Iterator[subprocess.Popen[str]]:
+def incompatible_nodes(shared_domain_id: int) -> Iterator[subprocess.Popen[str]]:
     with hand_written("hand_written_misfits.py") as process:
         yield process
 
 
 @pytest.fixture(scope="module")
-def found(misfits: subprocess.Popen[str]) -> list[dict[str, str]]:
-    assert misfits.poll() is None
+def found(incompatible_nodes: subprocess.Popen[str]) -> list[dict[str, str]]:
+    assert incompatible_nodes.poll() is None
     done = compose("doctor", "--json")
     assert done.returncode == 1, done.stderr
     results: list[dict[str, str]] = json.loads(done.stdout)
@@ -71,7 +71,7 @@ def test_a_missing_type_is_reported_once() -> None:
     assert result.message.startswith("arm_interfaces/msg/Grip (topic /grip) is not installed")
 
 
-@pytest.mark.usefixtures("misfits")
+@pytest.mark.usefixtures("incompatible_nodes")
 def test_delay_is_the_age_of_the_stamp() -> None:
     def is_prompt(delay: dict[str, Any]) -> bool:
         """A command that is not scheduled for a moment receives older messages afterwards."""
@@ -86,7 +86,7 @@ def test_delay_is_the_age_of_the_stamp() -> None:
     assert float(match[1]) >= 0.25
 
 
-@pytest.mark.usefixtures("misfits")
+@pytest.mark.usefixtures("incompatible_nodes")
 def test_measurements_can_be_filtered() -> None:
     # The limit also applies to the discovery of the topic.
     options = ("--filter", "message.header.stamp.nanosec < 0", "--timeout", "5")
@@ -95,7 +95,7 @@ def test_measurements_can_be_filtered() -> None:
     assert "no message received on '/lab/scan' for 5 s" in done.stderr
 
 
-@pytest.mark.usefixtures("misfits")
+@pytest.mark.usefixtures("incompatible_nodes")
 def test_delay_needs_a_header() -> None:
     done = compose("topic", "delay", "/lab/plain", "--qos-depth", "5")
     assert done.returncode == 1
@@ -103,11 +103,11 @@ def test_delay_needs_a_header() -> None:
 
 
 # Must be the last test, because it ends the process of the nodes.
-def test_a_lost_action_server_is_reported(misfits: subprocess.Popen[str]) -> None:
+def test_a_lost_action_server_is_reported(incompatible_nodes: subprocess.Popen[str]) -> None:
     process = start("action", "send-goal", "/lab/endless", "{}")
     assert process.stderr is not None
     assert any("goal accepted" in line for line in process.stderr)
-    misfits.send_signal(signal.SIGINT)
+    incompatible_nodes.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
     assert "the server of '/lab/endless' is gone, so the goal is lost" in err

@@ -16,7 +16,14 @@ from typing import Any
 import pytest
 
 from composer.runtime.process.instance_lock import local_systems
-from tests.ros.support.commands import COMPOSE, PATIENCE_S, asked_until, compose, errors, said
+from tests.ros.support.commands import (
+    COMPOSE,
+    PATIENCE_S,
+    compose,
+    errors,
+    output_of,
+    repeated_until,
+)
 from tests.ros.support.in_process import wait_until
 
 ROBOT = """
@@ -91,13 +98,13 @@ class Robot:
     def __init__(self, path: Path, *options: object) -> None:
         self.path = path
         self.began_s = time.time()
-        self.text = said("run", path, "--wait", "--timeout", 20, *options)
+        self.text = output_of("run", path, "--wait", "--timeout", 20, *options)
         found = re.search(r"\(process (\d+), log (.*)\)", self.text)
         assert found is not None
         self.pid, self.log = int(found[1]), Path(found[2])
 
     def states(self) -> dict[str, str]:
-        system = json.loads(said("ps", self.path, "--json"))["systems"][0]
+        system = json.loads(output_of("ps", self.path, "--json"))["systems"][0]
         return {node["node"]: node["state"] for node in system["nodes"]}
 
     def kill(self, number: signal.Signals = signal.SIGKILL) -> None:
@@ -143,7 +150,7 @@ def test_top_once_does_not_use_the_full_screen(robot: Robot, options: tuple[str,
 
 def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
     assert robot.text.startswith("2 of 3 nodes active after")
-    text = said("ps")
+    text = output_of("ps")
     line, head, *rows = text.splitlines()
     assert line.startswith("/fleet/robot: running, 2 of 3 nodes active (host ")
     assert f"process {robot.pid})" in line
@@ -154,7 +161,7 @@ def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
         ["/fleet/camera", "inactive"],
     ]
     # A system that is not scheduled for a moment sends fewer messages in that second.
-    text = asked_until(
+    text = repeated_until(
         lambda text: planner_in(text)["sent_hz"] == pytest.approx(20.0, abs=3.0), "ps", "--json"
     )
     planner = planner_in(text)
@@ -165,7 +172,7 @@ def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
     assert 0.0 < tick["mean_ms"] <= tick["longest_ms"]
     assert tick["late_longest_ms"] > 0.0
 
-    text = asked_until(
+    text = repeated_until(
         lambda text: callback_in(text)["calls_hz"] == pytest.approx(20.0, abs=5.0),
         *("top", "--once", "--json"),
     )
@@ -181,7 +188,7 @@ def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
     assert "system '/fleet/robot' already runs in ROS domain" in refusal
     assert "stop it with 'compose down /fleet/robot'" in refusal
 
-    assert said("down", "robot").startswith("/fleet/robot: the system has stopped")
+    assert output_of("down", "robot").startswith("/fleet/robot: the system has stopped")
     # 'down' waits until the instance lock is released; the summary is printed later.
     summary = re.compile(r"ran for .*\n/fleet/planner +timer 'tick' +\d+", re.DOTALL)
     wait_until(lambda: summary.search(robot.log.read_text()), "the summary")
@@ -191,36 +198,36 @@ def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
 
 
 def test_commands_to_a_whole_system(robot: Robot) -> None:
-    assert said("pause", "robot") == "/fleet/robot: 0 of 3 nodes active\n"
+    assert output_of("pause", "robot") == "/fleet/robot: 0 of 3 nodes active\n"
     assert robot.states() == dict.fromkeys(robot.states(), "inactive")
-    assert said("resume", "/fleet/robot") == "/fleet/robot: 2 of 3 nodes active\n"
-    assert said("reset", robot.path) == "/fleet/robot: 0 of 3 nodes active\n"
+    assert output_of("resume", "/fleet/robot") == "/fleet/robot: 2 of 3 nodes active\n"
+    assert output_of("reset", robot.path) == "/fleet/robot: 0 of 3 nodes active\n"
     assert robot.states() == dict.fromkeys(robot.states(), "unconfigured")
 
-    said("param", "set", "/fleet/planner", "fault", "configure")
+    output_of("param", "set", "/fleet/planner", "fault", "configure")
     refusal = refused("up", "robot")
     assert refusal.startswith(
         "compose: /fleet/robot did not come up: /fleet/planner: configure failed: "
         "ValueError: no map; rolled back"
     )
     assert robot.states() == dict.fromkeys(robot.states(), "unconfigured")
-    said("param", "set", "/fleet/planner", "fault", "none")
-    assert said("up", "robot") == "/fleet/robot: 2 of 3 nodes active\n"
+    output_of("param", "set", "/fleet/planner", "fault", "none")
+    assert output_of("up", "robot") == "/fleet/robot: 2 of 3 nodes active\n"
     assert refused("up", "rowbot").splitlines()[1] == "  did you mean '/fleet/robot'?"
 
 
 def test_lifecycle_set_with_several_nodes_patterns_and_systems(robot: Robot) -> None:
-    moved = said("lifecycle", "set", "motor", "planner", "deactivate")
+    moved = output_of("lifecycle", "set", "motor", "planner", "deactivate")
     assert moved == "/fleet/motor: active -> inactive\n/fleet/planner: active -> inactive\n"
-    moved = said("lifecycle", "set", "/fleet/[mp]*", "--to", "active")
+    moved = output_of("lifecycle", "set", "/fleet/[mp]*", "--to", "active")
     assert moved == "/fleet/motor: inactive -> active\n/fleet/planner: inactive -> active\n"
-    moved = said("lifecycle", "set", "--system", "robot", "--to", "unconfigured")
+    moved = output_of("lifecycle", "set", "--system", "robot", "--to", "unconfigured")
     assert moved.splitlines() == [
         "/fleet/camera: inactive -> unconfigured",
         "/fleet/motor: active -> unconfigured",
         "/fleet/planner: active -> unconfigured",
     ]
-    moved = said("lifecycle", "set", "--system", "robot", "configure")
+    moved = output_of("lifecycle", "set", "--system", "robot", "configure")
     assert [line.partition(":")[0] for line in moved.splitlines()] == [
         "/fleet/planner",
         "/fleet/motor",
@@ -235,7 +242,7 @@ def test_lifecycle_set_with_several_nodes_patterns_and_systems(robot: Robot) -> 
     assert "there is no lifecycle node matching 'x*'" in refused(
         "lifecycle", "set", "x*", "cleanup"
     )
-    said("lifecycle", "set", "camera", "--to", "finalized")
+    output_of("lifecycle", "set", "camera", "--to", "finalized")
     refusal = refused("lifecycle", "set", "camera", "--to", "active")
     assert "'active' cannot be reached: /fleet/camera is finalized" in refusal
     for arguments in (["motor"], ["--to", "active"], ["--system", "robot", "motor", "activate"]):
@@ -243,8 +250,8 @@ def test_lifecycle_set_with_several_nodes_patterns_and_systems(robot: Robot) -> 
 
 
 def test_unresponsive_nodes_and_systems_are_reported_in_time(robot: Robot) -> None:
-    said("lifecycle", "set", "planner", "deactivate")
-    said("param", "set", "/fleet/planner", "fault", "hang")
+    output_of("lifecycle", "set", "planner", "deactivate")
+    output_of("param", "set", "/fleet/planner", "fault", "hang")
     refusal = refused("lifecycle", "set", "planner", "activate", "--timeout", 5)
     assert "/fleet/planner did not respond within 5 s" in refusal
     began_s = time.monotonic()
@@ -256,7 +263,7 @@ def test_unresponsive_nodes_and_systems_are_reported_in_time(robot: Robot) -> No
         refusal = refused("pause", "robot", "--timeout", 1.5)
         assert f"its process is {robot.pid}" in refusal
         began_s = time.monotonic()
-        assert "no response, its process may be busy or gone" in said("ps")
+        assert "no response, its process may be busy or gone" in output_of("ps")
         assert time.monotonic() - began_s < 15.0
     finally:
         robot.kill(signal.SIGCONT)
@@ -266,8 +273,8 @@ def test_a_killed_system_is_not_running(robot: Robot) -> None:
     robot.kill()
     wait_until(lambda: not local_systems(), "its end")
     began_s = time.monotonic()
-    assert said("ps") == "no system is running\n"
-    assert said("lifecycle", "nodes") == ""
+    assert output_of("ps") == "no system is running\n"
+    assert output_of("lifecycle", "nodes") == ""
     commands = ("ps", "up", "down", "pause", "resume", "reset")
     for text in errors(*((command, "robot") for command in commands)):
         assert "there is no running system 'robot'" in text
@@ -287,8 +294,8 @@ def test_a_killed_system_is_not_running(robot: Robot) -> None:
 
 
 def test_a_command_does_not_wait_for_an_ended_process(robot: Robot) -> None:
-    said("param", "set", "/fleet/planner", "fault", "hang")
-    said("pause", "robot")
+    output_of("param", "set", "/fleet/planner", "fault", "hang")
+    output_of("pause", "robot")
     limit_s = 25.0
     with subprocess.Popen(
         [*COMPOSE, "resume", "robot", "--timeout", str(limit_s)], stderr=subprocess.PIPE, text=True

@@ -1,8 +1,8 @@
-"""A plain rclpy process with one of everything that the debugging commands look at.
+"""A plain rclpy node with one of each kind of endpoint, for the tests of commands.
 
 Node /lab/talker publishes /lab/count (Int32, 50 Hz, best effort), /lab/text (String, transient
-local, once) and what it hears on /lab/in (String) on /lab/heard; serves /lab/add (SetBool) and the
-action /lab/navigate, which rejects a max_velocity of 0 and works until canceled at -1; has
+local, once) and /lab/received with what it receives on /lab/in; serves /lab/add (SetBool) and
+the action /lab/navigate, which rejects a max_velocity of 0 and works until canceled at -1; has
 parameters. Prints ``ready`` at the start and counts the messages it sent on /lab/count.
 """
 
@@ -33,8 +33,8 @@ class Talker(Node):
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.text = self.create_publisher(String, "text", kept)
         self.text.publish(String(data="x" * 200))
-        self.heard = self.create_publisher(String, "heard", kept)
-        self.create_subscription(String, "in", self.heard.publish, 10)
+        self.received = self.create_publisher(String, "received", kept)
+        self.create_subscription(String, "in", self.received.publish, 10)
         self.create_service(SetBool, "add", self.answer)
         self.server = ActionServer(
             self,

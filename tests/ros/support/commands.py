@@ -1,4 +1,4 @@
-"""Commands in processes of their own, systems that they run, and nodes for them to look at."""
+"""Run commands, systems and plain rclpy nodes in other processes."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-#: Python, with the settings of Fast DDS that people have who choose nothing: those of the tests are
-#: gone, and with that the composer chooses its own.
+#: Python without the Fast DDS profile of the tests, so that ros2-composer chooses its own.
 PYTHON = (
     *("env", "-u", "FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"),
     sys.executable,
@@ -39,7 +38,7 @@ def hand_written(program: str, *arguments: str) -> Iterator[subprocess.Popen[str
 
 
 class Running:
-    """A ``compose run`` in another terminal."""
+    """A ``compose run`` in another process."""
 
     def __init__(self, log: Path, *arguments: str) -> None:
         self.log = log
@@ -51,12 +50,12 @@ class Running:
     def wait_for(self, text: str) -> None:
         until_s = time.monotonic() + PATIENCE_S
         while True:
-            has_ended = self.process.poll() is not None  # and has said all, if so
+            has_ended = self.process.poll() is not None  # and has written its whole log, if so
             if text in self.log.read_text():
                 return
             assert not has_ended, self.log.read_text()
             assert time.monotonic() < until_s, self.log.read_text()
-            time.sleep(0.02)  # between two looks at a file that nothing announces
+            time.sleep(0.02)  # poll: nothing announces changes of the file
 
     def stop(self, number: int = signal.SIGINT) -> tuple[int, str, str]:
         """Send the signal; return exit code, stdout and stderr."""
@@ -76,7 +75,7 @@ def running(log: Path, *arguments: str) -> Iterator[Running]:
 
 
 def compose(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end, however it ends."""
+    """Run a command and return its result, whatever the exit code."""
     return subprocess.run(
         [*COMPOSE, *map(str, arguments)],
         check=False,
@@ -86,60 +85,60 @@ def compose(*arguments: object) -> subprocess.CompletedProcess[str]:
     )
 
 
-def said(*arguments: object) -> str:
-    """Run a command that has to succeed and return what it prints."""
+def output_of(*arguments: object) -> str:
+    """Run a command that must succeed; return its stdout."""
     done = compose(*arguments)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:
-    """Begin a command."""
+    """Start a command."""
     return subprocess.Popen(
         [*COMPOSE, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
 
 
 def finished(process: subprocess.Popen[str]) -> str:
-    """Return what a command that was begun has printed, once it has ended well."""
+    """Wait for a started command, which must succeed; return its stdout."""
     output, error = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, error
     return output
 
 
 def listed(parts: tuple[str, ...], *arguments: str) -> str:
-    """Ask again until all parts are found: on a busy machine discovery outlasts a command."""
-    return asked_until(lambda text: all(part in text for part in parts), *arguments)
+    """Repeat a command until its output contains all parts: discovery may take longer."""
+    return repeated_until(lambda text: all(part in text for part in parts), *arguments)
 
 
 def measured(fits: Callable[[dict[str, Any]], bool], *arguments: str) -> dict[str, Any]:
-    """Measure again until it fits: what else a machine does changes rates and ages for a while."""
-    text = asked_until(lambda text: fits(json.loads(text.splitlines()[-1])), *arguments)
+    """Repeat a measurement until it fits: a busy machine distorts rates and delays."""
+    text = repeated_until(lambda text: fits(json.loads(text.splitlines()[-1])), *arguments)
     found: dict[str, Any] = json.loads(text.splitlines()[-1])
     return found
 
 
-def asked_until(fits: Callable[[str], bool], *arguments: str) -> str:
-    """Return the first answer that fits, or the last one there is patience for."""
+def repeated_until(fits: Callable[[str], bool], *arguments: str) -> str:
+    """Repeat a command; return the first output that fits, or the last one before the limit."""
     until_s = time.monotonic() + PATIENCE_S
     while True:
-        text = said(*arguments)
+        text = output_of(*arguments)
         if fits(text) or time.monotonic() > until_s:
             return text
 
 
 def errors(*commands: tuple[object, ...]) -> list[str]:
-    """Run commands that have to fail at the same time, for most of theirs is spent waiting."""
+    """Run commands that must fail in parallel, because they mostly wait; return their stderr."""
     processes = [start(*map(str, arguments)) for arguments in commands]
-    ends = [process.communicate(timeout=PATIENCE_S) for process in processes]
-    for process, (output, told) in zip(processes, ends, strict=True):
-        assert process.returncode == 1, told
+    results = [process.communicate(timeout=PATIENCE_S) for process in processes]
+    for process, (output, text) in zip(processes, results, strict=True):
+        assert process.returncode == 1, text
         assert output == ""
-    return [told for _, told in ends]
+    return [text for _, text in results]
 
 
 def error(*arguments: str) -> str:
-    """Run a command that has to fail and return what it says, having printed nothing."""
+    """Run a command that must fail with an empty stdout; return its stderr."""
     done = compose(*arguments)
     assert done.returncode == 1, done.stderr
     assert done.stdout == ""

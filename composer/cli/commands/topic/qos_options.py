@@ -32,15 +32,18 @@ class QosOptions:
     """
 
     profile: Annotated[Preset | None, typer.Option(help="QoS preset.")] = None
-    history: Annotated[History | None, typer.Option()] = None
+    history: Annotated[History | None, typer.Option(help="QoS history.")] = None
     depth: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Queue size with keep_last.")
     ] = None
-    reliability: Annotated[Reliability | None, typer.Option()] = None
-    durability: Annotated[Durability | None, typer.Option()] = None
-    liveliness: Annotated[Liveliness | None, typer.Option()] = None
+    reliability: Annotated[Reliability | None, typer.Option(help="QoS reliability.")] = None
+    durability: Annotated[Durability | None, typer.Option(help="QoS durability.")] = None
+    liveliness: Annotated[Liveliness | None, typer.Option(help="QoS liveliness.")] = None
     liveliness_lease_duration_seconds: Annotated[
-        float | None, typer.Option(min=0.0, callback=finite, metavar="SECONDS")
+        float | None,
+        typer.Option(
+            min=0.0, callback=finite, metavar="SECONDS", help="QoS liveliness lease duration."
+        ),
     ] = None
 
     def applied_to(self, start: QosProfile) -> QosProfile:

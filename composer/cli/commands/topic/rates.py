@@ -51,7 +51,7 @@ def hz(
     qos: QosOptions,
     timeout: ReceiveTimeout = None,
 ) -> None:
-    """Print the average rate of a topic, every second."""
+    """Print the average rate of a topic every second."""
     from composer.remote.rates import RateWindow
 
     rates = RateWindow(window)
@@ -82,7 +82,7 @@ def bw(
     qos: QosOptions,
     timeout: ReceiveTimeout = None,
 ) -> None:
-    """Print the bandwidth that a topic uses, every second.
+    """Print the bandwidth of a topic every second.
 
     Sizes are those of serialized messages.
     """
@@ -116,7 +116,7 @@ def delay(
     qos: QosOptions,
     timeout: ReceiveTimeout = None,
 ) -> None:
-    """Print the delay of a topic's messages, every second.
+    """Print the delay of a topic's messages every second.
 
     The delay is the time between header.stamp and reception, by the clock of this computer.
     """
