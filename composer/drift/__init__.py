@@ -1,23 +1,23 @@
-"""What a system declares held against what runs: pure, so it works and is tested without ROS.
+"""Compares a declared system with an observed ROS graph, without using ROS.
 
-``snapshot`` is what somebody saw of the ROS graph, ``expected`` what a system should look like,
-``compare`` the differences, ``patience`` which of them last long enough to be told.
+``snapshot`` is the observed graph, ``compare`` finds the differences, ``drift`` describes one of
+them, and ``debounce`` selects those that last long enough to be reported.
 """
 
 from __future__ import annotations
 
 from composer.drift.compare import compare
-from composer.drift.patience import Change, Patience
-from composer.drift.report import Drift, DriftKind
-from composer.drift.snapshot import EndSeen, NodeSeen, Snapshot
+from composer.drift.debounce import Debouncer, DriftChange
+from composer.drift.drift import Drift, DriftKind
+from composer.drift.snapshot import ObservedEndpoint, ObservedNode, Snapshot
 
 __all__ = [
-    "Change",
+    "Debouncer",
     "Drift",
+    "DriftChange",
     "DriftKind",
-    "EndSeen",
-    "NodeSeen",
-    "Patience",
+    "ObservedEndpoint",
+    "ObservedNode",
     "Snapshot",
     "compare",
 ]

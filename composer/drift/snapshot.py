@@ -1,4 +1,4 @@
-"""What somebody saw of a ROS graph at one moment."""
+"""A snapshot of the ROS graph."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from composer.model import PortKind
 from composer.qos import QosProfile
 from composer.tree import Plain
 
-#: Services that every node has for tools (rcl_interfaces, lifecycle_msgs, type_description).
+#: Services of every node for tools (rcl_interfaces, lifecycle_msgs, type_description).
 _TOOL_SERVICES = {
     "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
     "get_parameter_types": "rcl_interfaces/srv/GetParameterTypes",
@@ -26,7 +26,7 @@ _TOOL_SERVICES = {
     "set_logger_levels": "rcl_interfaces/srv/SetLoggerLevels",
     "get_type_description": "type_description_interfaces/srv/GetTypeDescription",
 }
-#: Topics that nodes have for tools.
+#: Topics of every node for tools.
 _TOOL_TOPICS = {
     "/rosout": "rcl_interfaces/msg/Log",
     "/parameter_events": "rcl_interfaces/msg/ParameterEvent",
@@ -35,11 +35,11 @@ _TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
 
 
 @dataclass(frozen=True, slots=True)
-class EndSeen:
+class ObservedEndpoint:
     """A publisher, subscription, service, ... of a node.
 
-    ``qos`` is what the node really offers or asks for: that of topics is told to everybody (but
-    for history and depth), that of services and actions to nobody, so it is None.
+    ``qos`` is the profile that the node offers or requests. Discovery reports it for topics only,
+    without history and depth; for services and actions it is None.
     """
 
     kind: PortKind
@@ -49,7 +49,7 @@ class EndSeen:
 
     @property
     def is_for_tools(self) -> bool:
-        """True for what nodes have beside what they are for: parameters, logs, lifecycle."""
+        """True for the endpoints of parameters, logs and lifecycle."""
         last = self.name.rpartition("/")[2]
         if self.kind.channel.value == "service":
             return _TOOL_SERVICES.get(last) == self.type
@@ -60,23 +60,23 @@ class EndSeen:
 
 
 @dataclass(frozen=True, slots=True)
-class NodeSeen:
+class ObservedNode:
     """A node of the graph.
 
-    ``state`` is its lifecycle state: empty for a node that has none, None when it did not say.
-    ``parameters`` are its values by name, None when it did not say. ``count`` is how many nodes
-    have that name: the ends are those of all of them.
+    ``state`` is its lifecycle state: empty if it has none, None if it did not respond.
+    ``parameters`` are its values by name, None if it did not respond. ``count`` is the number of
+    nodes with that name; ``endpoints`` contains the endpoints of all of them.
     """
 
     full_name: str
-    ends: tuple[EndSeen, ...] = ()
+    endpoints: tuple[ObservedEndpoint, ...] = ()
     state: str | None = ""
     parameters: Mapping[str, Plain] | None = field(default_factory=dict)
     count: int = 1
 
     @property
     def is_hidden(self) -> bool:
-        """True for nodes of tools: a part of their name begins with an underscore."""
+        """True for nodes of tools: a part of their name starts with an underscore."""
         return any(part.startswith("_") for part in self.full_name.split("/"))
 
 
@@ -84,8 +84,8 @@ class NodeSeen:
 class Snapshot:
     """The nodes of the graph. Endpoints for tools are left out."""
 
-    nodes: tuple[NodeSeen, ...]
+    nodes: tuple[ObservedNode, ...]
 
-    def node(self, full_name: str) -> NodeSeen | None:
-        """Return the node of that name, or None."""
+    def node(self, full_name: str) -> ObservedNode | None:
+        """Return the node with that name, or None."""
         return next((node for node in self.nodes if node.full_name == full_name), None)

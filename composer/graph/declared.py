@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from composer.drift.expected import states_after_bring_up
+from composer.drift.compare import states_after_bring_up
 from composer.graph.diagnostics import DiagnosticIndex
 from composer.graph.facts import node_facts, port_facts
 from composer.graph.labels import qos_label

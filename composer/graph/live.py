@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
-from composer.drift import EndSeen, NodeSeen, Snapshot
+from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.graph.labels import qos_facts, told_qos_label
 from composer.graph.namespaces import parent_of
 from composer.graph.picture import Details
@@ -19,7 +19,10 @@ _TITLE = "ROS graph"
 def scene_of(snapshot: Snapshot, rates_hz: Mapping[str, float]) -> Scene:
     """Return the nodes that were seen. ``rates_hz`` is how often messages came, by topic."""
     publishers = Counter(
-        end.name for node in snapshot.nodes for end in node.ends if end.kind is PortKind.PUBLISHER
+        end.name
+        for node in snapshot.nodes
+        for end in node.endpoints
+        if end.kind is PortKind.PUBLISHER
     )
     # Who of several sent what is not told: the rate is that of the topic then.
     alone = {topic: rate for topic, rate in rates_hz.items() if publishers[topic] == 1}
@@ -30,7 +33,7 @@ def scene_of(snapshot: Snapshot, rates_hz: Mapping[str, float]) -> Scene:
     )
 
 
-def _actor(node: NodeSeen, rates_hz: Mapping[str, float]) -> Actor:
+def _actor(node: ObservedNode, rates_hz: Mapping[str, float]) -> Actor:
     ends = tuple(_ends(node, rates_hz))
     state = "state unknown" if node.state is None else node.state
     return Actor(
@@ -45,9 +48,9 @@ def _actor(node: NodeSeen, rates_hz: Mapping[str, float]) -> Actor:
     )
 
 
-def _ends(node: NodeSeen, rates_hz: Mapping[str, float]) -> Iterator[End]:
+def _ends(node: ObservedNode, rates_hz: Mapping[str, float]) -> Iterator[End]:
     seen: Counter[tuple[PortKind, str]] = Counter()
-    for end in node.ends:
+    for end in node.endpoints:
         seen[end.kind, end.name] += 1
         number = seen[end.kind, end.name]
         rate = rates_hz.get(end.name) if end.kind is PortKind.PUBLISHER else None
@@ -62,7 +65,7 @@ def _ends(node: NodeSeen, rates_hz: Mapping[str, float]) -> Iterator[End]:
         )
 
 
-def _end_facts(end: EndSeen, rate_hz: float | None) -> Details:
+def _end_facts(end: ObservedEndpoint, rate_hz: float | None) -> Details:
     facts: dict[str, Plain] = {"kind": end.kind.value, "name": end.name, "type": end.type}
     if end.qos is not None:
         # History and depth are not told to other processes.
@@ -73,7 +76,7 @@ def _end_facts(end: EndSeen, rate_hz: float | None) -> Details:
     return tuple(facts.items())
 
 
-def _facts(node: NodeSeen, ends: tuple[End, ...]) -> Details:
+def _facts(node: ObservedNode, ends: tuple[End, ...]) -> Details:
     facts: dict[str, Plain] = {"full_name": node.full_name}
     if node.state != "":
         facts["state"] = node.state

@@ -14,7 +14,7 @@ from rclpy.action.graph import (
 )
 from rclpy.node import Node
 
-from composer.drift import EndSeen, NodeSeen, Snapshot
+from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.model import PortKind
 from composer.remote.graph_names import is_hidden
 from composer.remote.parameters import plain_value
@@ -31,7 +31,7 @@ _RESPONSE_S = 2.0
 _STATE_TYPE = "lifecycle_msgs/srv/GetState"
 _LIST_TYPE = "rcl_interfaces/srv/ListParameters"
 
-_Ends: TypeAlias = dict[str, list[EndSeen]]
+_Ends: TypeAlias = dict[str, list[ObservedEndpoint]]
 _Where: TypeAlias = tuple[str, str]
 
 
@@ -65,9 +65,9 @@ class GraphObserver:
         parameters = self._parameters(services, deadline)
         return Snapshot(
             tuple(
-                NodeSeen(
+                ObservedNode(
                     full_name=name,
-                    ends=tuple(end for end in ends[name] if not end.is_for_tools),
+                    endpoints=tuple(end for end in ends[name] if not end.is_for_tools),
                     state=states.get(name, ""),
                     parameters=parameters.get(name, {}),
                     count=max(counts[name], 1),
@@ -165,7 +165,7 @@ def _offering(services: dict[str, dict[str, str]], last: str, type_name: str) ->
     }
 
 
-def _endpoints(node: Node) -> tuple[tuple[str, tuple[EndSeen, ...]], ...]:
+def _endpoints(node: Node) -> tuple[tuple[str, tuple[ObservedEndpoint, ...]], ...]:
     """Return the endpoints of all nodes as a hashable value."""
     ends = _endpoints_by_node(node)
     return tuple((name, tuple(ends[name])) for name in sorted(ends))
@@ -181,14 +181,14 @@ def _endpoints_by_node(node: Node) -> _Ends:
         ):
             for end in found:
                 if end.node in ends:
-                    ends[end.node].append(EndSeen(kind, topic, end.type, end.qos))
+                    ends[end.node].append(ObservedEndpoint(kind, topic, end.type, end.qos))
     for name, of_node in ends.items():
         of_node.extend(_services_and_actions(node, name))
         of_node.sort(key=lambda end: (list(PortKind).index(end.kind), end.name, end.type))
     return ends
 
 
-def _services_and_actions(node: Node, full_name: str) -> Iterator[EndSeen]:
+def _services_and_actions(node: Node, full_name: str) -> Iterator[ObservedEndpoint]:
     namespace, _, name = full_name.rpartition("/")
     where = (name, namespace or "/")
     readers: tuple[tuple[PortKind, Callable[[_Where], Iterable[Any]]], ...] = (
@@ -200,7 +200,7 @@ def _services_and_actions(node: Node, full_name: str) -> Iterator[EndSeen]:
     for kind, read in readers:
         for found, types in _read(read, where):
             if not is_hidden(found):
-                yield from (EndSeen(kind, found, type_name) for type_name in types)
+                yield from (ObservedEndpoint(kind, found, type_name) for type_name in types)
 
 
 def _read(read: Callable[[_Where], Iterable[Any]], where: _Where) -> Iterable[Any]:

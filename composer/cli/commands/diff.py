@@ -140,15 +140,15 @@ def _settled(
     observer: GraphObserver, compare: Compare, timeout_s: float, grace_s: float
 ) -> tuple[Drift, ...]:
     """Return the differences: none as soon as there are none, else those that persist."""
-    from composer.drift import Patience
+    from composer.drift import Debouncer
     from composer.remote.session import Deadline
 
     deadline = Deadline(timeout_s)
-    patience = Patience(grace_s)
+    debouncer = Debouncer(grace_s)
     while True:
         drifts = compare(observer.snapshot(deadline))
-        patience.update(time.monotonic(), drifts)
-        if patience.is_settled(drifts) or deadline.passed:
+        debouncer.update(time.monotonic(), drifts)
+        if debouncer.is_settled(drifts) or deadline.passed:
             return drifts
 
 
@@ -160,16 +160,16 @@ def _watched(
     json: bool,
 ) -> tuple[Drift, ...]:
     """Print changes until Ctrl-C or the end of the time; return the remaining differences."""
-    from composer.drift import Patience
+    from composer.drift import Debouncer
     from composer.remote.session import Deadline
 
     timeout_s, grace_s, watch_for_s = seconds
     end = Deadline(watch_for_s if watch_for_s is not None else float("inf"))
-    patience = Patience(grace_s)
+    debouncer = Debouncer(grace_s)
     try:
         while not end.passed:
             drifts = compare(observer.snapshot(Deadline(min(timeout_s, end.left_s))))
-            change = patience.update(time.monotonic(), drifts)
+            change = debouncer.update(time.monotonic(), drifts)
             for drift in change.resolved:
                 write(_event("resolved", drift, json=json))
             for drift in change.appeared:
@@ -177,7 +177,7 @@ def _watched(
             time.sleep(min(_PAUSE_S, end.left_s))
     except KeyboardInterrupt:
         pass  # the normal way to stop
-    return patience.told
+    return debouncer.reported
 
 
 def _print(system: System, drifts: tuple[Drift, ...], *, json: bool) -> None:

@@ -75,7 +75,7 @@ def test_an_external_publisher_of_another_type_is_reported(pipeline: Running) ->
         assert (data["system"], data["clean"]) == ("pipeline", False)
         assert [item["message"] for item in data["drift"]] == [
             conflict,
-            "/intruder: the node is there, but not declared",
+            "/intruder: the node exists, but is not declared",
         ]
         assert [item["kind"] for item in data["drift"]] == ["wrong type", "extra node"]
         ignoring = compose("diff", "pipeline", "--ignore", "/intr*")
@@ -122,8 +122,8 @@ def test_an_empty_graph_is_reported_in_time() -> None:
     assert time.monotonic() - started_s < 20.0
     assert done.returncode == 1
     assert differences(done) == [
-        "/talker: the node is not there",
-        "/listener: the node is not there",
+        "/talker: the node does not exist",
+        "/listener: the node does not exist",
     ]
 
 
@@ -148,10 +148,10 @@ def test_different_qos_and_similar_names_are_reported(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert differences(done) == [
         "/twin/talker: reliability of publisher /twin/chatter is best_effort, declared reliable",
-        "/twin/listener: the node is not there",
-        "/twin/listner: the node is there, but not declared",
+        "/twin/listener: the node does not exist",
+        "/twin/listner: the node exists, but is not declared",
     ]
-    assert "'/twin/listner' is there: is it meant?" in done.stdout
+    assert "'/twin/listner' exists: did you mean that?" in done.stdout
 
 
 def test_start_options_apply_to_the_comparison(tmp_path: Path) -> None:

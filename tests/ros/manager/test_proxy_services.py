@@ -22,7 +22,7 @@ from rcl_interfaces.srv import (
 from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter
 
-from composer.drift import NodeSeen
+from composer.drift import ObservedNode
 from composer.remote.lifecycle import LifecycleClient, TransitionError
 from composer.remote.parameters import ParameterClient, ParameterRejectedError, names_by_node
 from composer.remote.session import Deadline, Session
@@ -150,7 +150,7 @@ def test_parameters_are_those_of_the_node(session: Session) -> None:
 
 
 def test_an_observer_reads_states_and_parameters(session: Session) -> None:
-    def observed(name: str) -> NodeSeen:
+    def observed(name: str) -> ObservedNode:
         node = snapshot.node(name)
         assert node is not None
         return node

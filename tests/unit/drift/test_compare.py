@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from composer.drift import Drift, DriftKind, EndSeen, NodeSeen, Snapshot, compare
+from composer.drift import Drift, DriftKind, ObservedEndpoint, ObservedNode, Snapshot, compare
 from composer.model import PortKind, PrimaryState
 from composer.qos import Durability, QosProfile, Reliability
 from tests.unit.support.resolving import system_of
@@ -29,23 +29,23 @@ SYSTEM = system_of("""
 """)
 STRING = "std_msgs/msg/String"
 STATE = QosProfile(durability=Durability.TRANSIENT_LOCAL)
-BILL = EndSeen(PortKind.PUBLISHER, "/bill", STRING, STATE)
-ASK = EndSeen(PortKind.SERVICE, "/front/ask", "std_srvs/srv/Trigger")
-CLERK = NodeSeen(
+BILL = ObservedEndpoint(PortKind.PUBLISHER, "/bill", STRING, STATE)
+ASK = ObservedEndpoint(PortKind.SERVICE, "/front/ask", "std_srvs/srv/Trigger")
+CLERK = ObservedNode(
     "/front/clerk", (BILL, ASK), "active", {"speed": 1.5, "on": True, "tags": ["a", "b"]}
 )
-GUARD = NodeSeen(
-    "/guard", (EndSeen(PortKind.SUBSCRIPTION, "/bill", STRING, QosProfile()),), "inactive"
+GUARD = ObservedNode(
+    "/guard", (ObservedEndpoint(PortKind.SUBSCRIPTION, "/bill", STRING, QosProfile()),), "inactive"
 )
-SLEEPER = NodeSeen("/sleeper", (), "unconfigured")
+SLEEPER = ObservedNode("/sleeper", (), "unconfigured")
 ALL = (CLERK, GUARD, SLEEPER)
 
 
-def differences(*nodes: NodeSeen, **options: object) -> list[str]:
+def differences(*nodes: ObservedNode, **options: object) -> list[str]:
     return [drift.message for drift in found(*nodes, **options)]
 
 
-def found(*nodes: NodeSeen, **options: object) -> tuple[Drift, ...]:
+def found(*nodes: ObservedNode, **options: object) -> tuple[Drift, ...]:
     return compare(SYSTEM, Snapshot(nodes), **options)  # type: ignore[arg-type]
 
 
@@ -56,38 +56,40 @@ def test_what_is_as_declared_differs_in_nothing() -> None:
 def test_a_missing_node_is_named_with_the_one_that_is_nearly_it() -> None:
     clark = replace(CLERK, full_name="/front/clark")
     missing, extra = found(clark, GUARD, SLEEPER)
-    assert missing.message == "/front/clerk: the node is not there"
-    assert missing.hint == "'/front/clark' is there: is it meant?"
+    assert missing.message == "/front/clerk: the node does not exist"
+    assert missing.hint == "'/front/clark' exists: did you mean that?"
     assert missing.span is not None
-    assert extra.message == "/front/clark: the node is there, but not declared"
+    assert extra.message == "/front/clark: the node exists, but is not declared"
 
 
 def test_a_node_in_another_namespace_is_nearly_it() -> None:
     (missing, _) = found(replace(CLERK, full_name="/clerk"), GUARD, SLEEPER)
-    assert "'/clerk' is there" in missing.hint
+    assert "'/clerk' exists" in missing.hint
 
 
-def test_two_nodes_of_one_name_are_told() -> None:
+def test_two_nodes_with_one_name_are_reported() -> None:
     assert differences(replace(CLERK, count=2), GUARD, SLEEPER) == [
         "/front/clerk: 2 nodes have this name"
     ]
 
 
 def test_others_are_extra_unless_ignored_hidden_or_the_systems_own() -> None:
-    manager = NodeSeen(
+    manager = ObservedNode(
         "/shop/manager",
-        (EndSeen(PortKind.SERVICE, "/shop/manager/is_active", "std_srvs/srv/Trigger"),),
+        (ObservedEndpoint(PortKind.SERVICE, "/shop/manager/is_active", "std_srvs/srv/Trigger"),),
     )
-    assert differences(*ALL, manager, NodeSeen("/_ros2cli_7")) == []
-    assert differences(*ALL, NodeSeen("/other/manager")) == [
-        "/other/manager: the node is there, but not declared"
+    assert differences(*ALL, manager, ObservedNode("/_ros2cli_7")) == []
+    assert differences(*ALL, ObservedNode("/other/manager")) == [
+        "/other/manager: the node exists, but is not declared"
     ]
-    assert differences(*ALL, NodeSeen("/rviz2"), ignored=["/rviz*"]) == []
+    assert differences(*ALL, ObservedNode("/rviz2"), ignored=["/rviz*"]) == []
 
 
 @pytest.mark.parametrize("name", ["/stranger", "/_ros2cli_7"])
 def test_another_type_on_a_declared_topic_is_named_whoever_has_it(name: str) -> None:
-    stranger = NodeSeen(name, (EndSeen(PortKind.PUBLISHER, "/bill", "std_msgs/msg/Int8"),))
+    stranger = ObservedNode(
+        name, (ObservedEndpoint(PortKind.PUBLISHER, "/bill", "std_msgs/msg/Int8"),)
+    )
     assert (
         f"{name}: type of its publisher /bill is std_msgs/msg/Int8, declared {STRING}"
     ) in differences(*ALL, stranger, ignored=["/stranger"])
@@ -95,15 +97,15 @@ def test_another_type_on_a_declared_topic_is_named_whoever_has_it(name: str) -> 
 
 def test_a_missing_endpoint_is_named_with_the_one_that_is_nearly_it() -> None:
     bills = replace(BILL, name="/bills")
-    missing, extra = found(replace(CLERK, ends=(bills, ASK)), GUARD, SLEEPER)
+    missing, extra = found(replace(CLERK, endpoints=(bills, ASK)), GUARD, SLEEPER)
     assert missing.kind is DriftKind.MISSING_ENDPOINT
     assert missing.message == "/front/clerk: publisher /bill is missing"
-    assert missing.hint == "it has '/bills': is that meant?"
-    assert extra.message == "/front/clerk: publisher /bills is there, but not declared"
+    assert missing.hint == "it has '/bills': did you mean that?"
+    assert extra.message == "/front/clerk: publisher /bills exists, but is not declared"
 
 
-def test_a_cleaned_up_node_is_told_with_its_state_and_what_it_lacks() -> None:
-    gone = found(replace(CLERK, ends=(), state="unconfigured"), GUARD, SLEEPER)
+def test_a_cleaned_up_node_is_reported_with_its_state_and_missing_endpoints() -> None:
+    gone = found(replace(CLERK, endpoints=(), state="unconfigured"), GUARD, SLEEPER)
     assert [drift.message for drift in gone] == [
         "/front/clerk: lifecycle state is unconfigured, declared active",
         "/front/clerk: publisher /bill is missing",
@@ -146,15 +148,15 @@ def test_how_far_the_system_was_brought_up_may_be_said() -> None:
     ],
 )
 def test_types_and_what_is_really_offered(
-    change: Callable[[EndSeen], EndSeen], expected: str
+    change: Callable[[ObservedEndpoint], ObservedEndpoint], expected: str
 ) -> None:
-    clerk = replace(CLERK, ends=(change(BILL), ASK))
+    clerk = replace(CLERK, endpoints=(change(BILL), ASK))
     assert differences(clerk, GUARD, SLEEPER) == [f"/front/clerk: {expected}"]
 
 
-def test_depth_and_history_are_not_told_so_they_are_not_compared() -> None:
+def test_depth_and_history_are_not_compared_because_discovery_omits_them() -> None:
     deep = replace(BILL, qos=replace(STATE, depth=77))
-    assert differences(replace(CLERK, ends=(deep, ASK)), GUARD, SLEEPER) == []
+    assert differences(replace(CLERK, endpoints=(deep, ASK)), GUARD, SLEEPER) == []
 
 
 @pytest.mark.parametrize(
@@ -177,17 +179,17 @@ def test_a_parameter_that_is_not_there() -> None:
     assert differences(clerk, GUARD, SLEEPER) == ["/front/clerk: parameter speed is missing"]
 
 
-def test_a_node_that_does_not_answer_is_told_as_such() -> None:
+def test_a_node_that_does_not_respond_is_reported() -> None:
     silent = replace(CLERK, state=None, parameters=None)
     assert differences(silent, GUARD, SLEEPER) == [
-        "/front/clerk: it does not tell its lifecycle state",
-        "/front/clerk: it does not tell its parameters",
+        "/front/clerk: no response to the request for its lifecycle state",
+        "/front/clerk: no response to the request for its parameters",
     ]
 
 
 def test_a_node_without_a_lifecycle_is_not_what_is_declared() -> None:
     assert differences(replace(CLERK, state=""), GUARD, SLEEPER) == [
-        "/front/clerk: lifecycle state is none: it is no lifecycle node, declared active"
+        "/front/clerk: lifecycle state is none: it is not a lifecycle node, declared active"
     ]
 
 
@@ -200,9 +202,7 @@ def test_a_node_without_a_lifecycle_is_not_what_is_declared() -> None:
         (PortKind.CLIENT, "/a/change_state", "lifecycle_msgs/srv/ChangeState"),
     ],
 )
-def test_what_every_node_has_for_tools_is_told_from_what_it_is_for(
-    kind: PortKind, name: str, type_name: str
-) -> None:
-    assert EndSeen(kind, name, type_name).is_for_tools
-    assert not EndSeen(kind, name, "example_interfaces/msg/Other").is_for_tools
-    assert not EndSeen(kind, f"{name}_more", type_name).is_for_tools
+def test_endpoints_for_tools_are_recognized(kind: PortKind, name: str, type_name: str) -> None:
+    assert ObservedEndpoint(kind, name, type_name).is_for_tools
+    assert not ObservedEndpoint(kind, name, "example_interfaces/msg/Other").is_for_tools
+    assert not ObservedEndpoint(kind, f"{name}_more", type_name).is_for_tools

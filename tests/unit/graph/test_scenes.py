@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from composer.drift import EndSeen, NodeSeen, Snapshot
+from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.graph import View, build_graph, live_scene_of, scene_of
 from composer.graph.picture import Graph
 from composer.model import PortKind
@@ -75,11 +75,23 @@ def seen() -> Snapshot:
     best_effort = QosProfile(reliability=Reliability.BEST_EFFORT)
     return Snapshot(
         (
-            NodeSeen("/a/one", (EndSeen(PortKind.PUBLISHER, "/t", STRING, best_effort),), "active"),
-            NodeSeen("/a/two", (EndSeen(PortKind.SUBSCRIPTION, "/t", STRING, best_effort),), None),
-            NodeSeen("/b", (EndSeen(PortKind.PUBLISHER, "/u", STRING, QosProfile()),), count=2),
-            NodeSeen("/c", (EndSeen(PortKind.PUBLISHER, "/u", STRING, QosProfile()),)),
-            NodeSeen("/_tool", (EndSeen(PortKind.SUBSCRIPTION, "/u", STRING, QosProfile()),)),
+            ObservedNode(
+                "/a/one",
+                (ObservedEndpoint(PortKind.PUBLISHER, "/t", STRING, best_effort),),
+                "active",
+            ),
+            ObservedNode(
+                "/a/two",
+                (ObservedEndpoint(PortKind.SUBSCRIPTION, "/t", STRING, best_effort),),
+                None,
+            ),
+            ObservedNode(
+                "/b", (ObservedEndpoint(PortKind.PUBLISHER, "/u", STRING, QosProfile()),), count=2
+            ),
+            ObservedNode("/c", (ObservedEndpoint(PortKind.PUBLISHER, "/u", STRING, QosProfile()),)),
+            ObservedNode(
+                "/_tool", (ObservedEndpoint(PortKind.SUBSCRIPTION, "/u", STRING, QosProfile()),)
+            ),
         )
     )
 

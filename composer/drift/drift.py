@@ -1,4 +1,4 @@
-"""A difference between what is declared and what runs."""
+"""A difference between the declared and the observed system."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from composer.source import Span
 
 
 class DriftKind(StrEnum):
-    """What differs."""
+    """The kinds of difference."""
 
     MISSING_NODE = "missing node"
     EXTRA_NODE = "extra node"
@@ -25,13 +25,13 @@ class DriftKind(StrEnum):
 
 
 _SENTENCES = {
-    DriftKind.MISSING_NODE: "the node is not there",
-    DriftKind.EXTRA_NODE: "the node is there, but not declared",
+    DriftKind.MISSING_NODE: "the node does not exist",
+    DriftKind.EXTRA_NODE: "the node exists, but is not declared",
     DriftKind.DUPLICATE_NODE: "{live} nodes have this name",
     DriftKind.MISSING_ENDPOINT: "{subject} is missing",
     DriftKind.MISSING_PARAMETER: "{subject} is missing",
-    DriftKind.EXTRA_ENDPOINT: "{subject} is there, but not declared",
-    DriftKind.NO_ANSWER: "it does not tell its {subject}",
+    DriftKind.EXTRA_ENDPOINT: "{subject} exists, but is not declared",
+    DriftKind.NO_ANSWER: "no response to the request for its {subject}",
 }
 
 
@@ -39,9 +39,9 @@ _SENTENCES = {
 class Drift:
     """One difference.
 
-    ``node`` is a full name; ``subject`` is what of it differs, empty for the node itself.
-    ``declared`` and ``live`` are the two sides as people say them, empty where a side has nothing.
-    ``span`` is where the declaration stands.
+    ``node`` is a full name. ``subject`` is the part of it that differs, empty for the node itself.
+    ``declared`` and ``live`` describe the two sides, empty if one has nothing. ``span`` is the
+    declaration.
     """
 
     kind: DriftKind
@@ -54,13 +54,13 @@ class Drift:
 
     @property
     def identity(self) -> tuple[DriftKind, str, str]:
-        """What makes it the same difference again, even with another value."""
+        """The identity of the difference, independent of its value."""
         return (self.kind, self.node, self.subject)
 
     @property
     def message(self) -> str:
-        """Say it in one line, without the hint."""
-        said = _SENTENCES.get(self.kind, "{subject} is {live}, declared {declared}")
-        return f"{self.node}: " + said.format(
+        """The difference in one line, without the hint."""
+        sentence = _SENTENCES.get(self.kind, "{subject} is {live}, declared {declared}")
+        return f"{self.node}: " + sentence.format(
             subject=self.subject, live=self.live, declared=self.declared
         )
