@@ -1,4 +1,4 @@
-"""How a hand-written node of a test leaves the ROS graph at once."""
+"""Destroys a hand-written node of a test, with its actions."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from rclpy.node import Node
 
 
 def leave(node: Node) -> None:
-    """Destroy a node with all that is of it.
+    """Destroy a node with its actions.
 
-    rclpy's ``destroy_node`` leaves actions out, and they keep the node, and that its participant,
-    until the garbage collector comes by.
+    rclpy's ``destroy_node`` does not destroy actions, which keep the node and its participant until
+    a garbage collection.
     """
     for waitable in list(node.waitables):
         if isinstance(waitable, (ActionClient, ActionServer)):
