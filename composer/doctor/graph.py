@@ -16,8 +16,8 @@ from composer.doctor.result import CheckResult, error, note, ok, warning
 from composer.qos import incompatibilities
 from composer.remote.graph_names import GraphNames
 from composer.remote.session import Deadline, Session
-from composer.runtime.intra_process.ignore_local_publications import why_not_ignored
-from composer.runtime.ros.endpoints import End, TopicInfo, topic_info
+from composer.runtime.intra_process.ignore_local_publications import unsupported_reason
+from composer.runtime.ros.endpoints import Endpoint, TopicInfo, topic_info
 from composer.runtime.ros.messages import MessageError, interface_class
 
 _TESTED_MIDDLEWARE = "rmw_fastrtps_cpp"
@@ -39,7 +39,7 @@ def check_middleware() -> CheckResult:
 
 def check_delivery(session: Session) -> CheckResult:
     """Check whether messages within a process can bypass the middleware."""
-    reason = why_not_ignored(session.node.context)
+    reason = unsupported_reason(session.node.context)
     if reason is None:
         return ok("delivery", "messages within a process bypass the middleware")
     return note(
@@ -153,7 +153,7 @@ def check_types_built(used: Iterable[tuple[str, str, tuple[str, ...]]]) -> Itera
             )
 
 
-def _check_pair(topic: str, publisher: End, subscription: End) -> Iterator[CheckResult]:
+def _check_pair(topic: str, publisher: Endpoint, subscription: Endpoint) -> Iterator[CheckResult]:
     for found in incompatibilities(publisher.qos, subscription.qos):
         yield error(
             "qos",

@@ -22,7 +22,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from composer.runtime.process import dds_profiles
 from composer.runtime.process.dds_participants import count_participants, enlarge_receive_buffers
 from composer.runtime.process.instance_lock import local_systems
-from composer.runtime.ros.endpoints import NO_NAME
+from composer.runtime.ros.endpoints import UNKNOWN_NODE
 from composer.runtime.ros.manager_protocol import NAME
 
 T = TypeVar("T")
@@ -202,7 +202,7 @@ class Session:
             for topic, _ in node.get_topic_names_and_types()
             for endpoint in node.get_publishers_info_by_topic(topic)
         ]
-        named = [endpoint for endpoint in publishers if endpoint.node_name != NO_NAME]
+        named = [endpoint for endpoint in publishers if endpoint.node_name != UNKNOWN_NODE]
         announced = {_participant(endpoint) for endpoint in named}
         return len(named) == len(publishers) and announced.issuperset(
             map(_participant, participants)

@@ -1,4 +1,4 @@
-"""What users have written for a port, called so that nothing of it hurts anybody else."""
+"""Calls a handler of user code so that its faults stay contained."""
 
 from __future__ import annotations
 
@@ -8,54 +8,54 @@ from typing import Any, Final
 
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.timing import CallbackTimer
-from composer.runtime.executors.user_code import calls_user_code
-from composer.runtime.metrics.histogram import TOGETHER
+from composer.runtime.executors.stacks import calls_user_code
+from composer.runtime.metrics.histogram import BATCH_SIZE
 from composer.runtime.metrics.statistics import CallbackStatistics
 from composer.source import Located
 
-_LAST = TOGETHER - 1  # whoever comes then has all of them counted
-#: What is handed to a handler without an argument.
-NOTHING: Final = object()
+_LAST = BATCH_SIZE - 1  # the call that completes a batch
+#: The message of a handler without an argument.
+NO_ARGUMENT: Final = object()
 
 
 class Callback(CallbackTimer):
-    """Calls a handler: what it raises is a fault of ``name``, what it takes is counted."""
+    """Calls a handler and times it; its exceptions are faults of ``name``."""
 
-    __slots__ = ("_core", "_handle", "_name")
+    __slots__ = ("_context", "_handle", "_name")
 
     def __init__(
         self,
-        core: NodeContext,
+        context: NodeContext,
         name: str,
         handle: Callable[..., Any],
         statistics: CallbackStatistics,
         budget_ms: Located[float] | None,
     ) -> None:
-        super().__init__(core, statistics, budget_ms)
-        self._core = core
+        super().__init__(context, statistics, budget_ms)
+        self._context = context
         self._name = name
         self._handle = handle
 
     @calls_user_code
     def _call(self, message: Any) -> Coroutine[Any, Any, None] | None:
-        """Have ``message`` handled; return the rest of that, where it is ``async``."""
+        """Handle ``message``; return the rest of the call if it is ``async``."""
         began_s = 0.0
-        if self.pause > 0.0:  # two threads may both count down the last
-            self.pause -= 1
+        if self.to_skip > 0.0:  # two threads may both decrement the last one
+            self.to_skip -= 1
         else:
             began_s = monotonic()
         try:
-            result = self._handle() if message is NOTHING else self._handle(message)
+            result = self._handle() if message is NO_ARGUMENT else self._handle(message)
         except BaseException as error:
-            self._core.error_log.exception(self._name, error)
+            self._context.error_log.exception(self._name, error)
             result = None
-        rest = None if result is None else self._core.rest_of(self._name, result)
+        rest = None if result is None else self._context.continuation(self._name, result)
         if not began_s:
             return rest
-        took_s = monotonic() - began_s
-        waiting = self._waiting
-        if rest is not None or took_s > self._budget_s or len(waiting) >= _LAST:
-            return self.took(began_s, rest)
-        waiting.append(took_s)  # as in took, but without a call
-        self.pause = self._pause
+        duration_s = monotonic() - began_s
+        batch = self._batch
+        if rest is not None or duration_s > self._budget_s or len(batch) >= _LAST:
+            return self.finish(began_s, rest)
+        batch.append(duration_s)  # as in finish, without a call
+        self.to_skip = self._skip
         return None

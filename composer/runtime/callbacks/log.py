@@ -1,4 +1,4 @@
-"""A node's logger, and what becomes of the exceptions of user code."""
+"""A node's logger, and the log of its errors and repeated events."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from composer.model import LogLevel
+from composer.runtime.executors.tasks import Cancellable, SupportsCallLater
 from composer.runtime.metrics.statistics import Statistics
 
 _SEVERITIES = {
@@ -27,29 +28,32 @@ _SEVERITIES = {
     LogLevel.ERROR: 40,
     LogLevel.FATAL: 50,
 }
-#: As rcl_qos_profile_rosout_default: who listens late still gets the last ten seconds.
+#: As rcl_qos_profile_rosout_default: a late joiner gets the last ten seconds.
 _ROSOUT_QOS = QoSProfile(
     depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=Duration(seconds=10)
 )
-#: What there is to hear of a node, or of a whole context, that is gone.
-_GONE = (InvalidHandle, rclpy_implementation.RCLError)
-_AGAIN_AFTER_S = 1.0
+#: Raised if the node or its rclpy context has been destroyed.
+_DESTROYED = (InvalidHandle, rclpy_implementation.RCLError)
+#: Minimum time between two log lines about errors of the same callback.
+_ERROR_PERIOD_S = 1.0
+#: Minimum time between two warnings about the same event.
+WARNING_PERIOD_S = 10.0
 
-#: Takes (level, name of the logger, message).
+#: Called with (level, name of the logger, message).
 Write: TypeAlias = Callable[[LogLevel, str, str], None]
 
 
 class Log:
-    """A behaviour's ``log``: to whoever shows it, and to /rosout.
+    """A behavior's ``log``: to the console of the process, and to /rosout.
 
-    Not by way of rcl: its console knows no time that starts with the system, and rclpy's logger
-    looks for its caller in the stack at every call, which takes longer than the rest.
+    Not by rcl, whose console has no timestamps relative to the start of the system. rclpy's logger
+    also inspects the stack for its caller at every call, which takes longer than the rest.
     """
 
     def __init__(self, node: Node, level: LogLevel, write: Write, *, rosout: bool = True) -> None:
-        """Log what is at least ``level``. ``node`` must not have a rosout publisher of rcl's.
+        """Log messages of at least ``level``. ``node`` must not have rcl's rosout publisher.
 
-        Without ``rosout`` to whoever shows it alone.
+        Without ``rosout``, to the console only.
         """
         self._name = node.get_fully_qualified_name().strip("/").replace("/", ".")
         self._lowest = _SEVERITIES[level]
@@ -57,19 +61,19 @@ class Log:
         self._clock = node.get_clock()
         self._rosout = node.create_publisher(LogMessage, "/rosout", _ROSOUT_QOS) if rosout else None
 
-    def is_on(self, level: LogLevel) -> bool:
-        """Say whether anything becomes of a message at ``level``."""
+    def is_enabled_for(self, level: LogLevel) -> bool:
+        """Return whether messages at ``level`` are logged."""
         return _SEVERITIES[level] >= self._lowest
 
     def write(self, level: LogLevel, message: str) -> None:
         """Log ``message`` at ``level``."""
-        if not self.is_on(level):
+        if not self.is_enabled_for(level):
             return
         text = str(message)
         self._write(level, self._name, text)
         if self._rosout is None:
             return
-        with suppress(*_GONE):
+        with suppress(*_DESTROYED):
             self._rosout.publish(
                 LogMessage(
                     stamp=self._clock.now().to_msg(),
@@ -80,23 +84,23 @@ class Log:
             )
 
     def debug(self, message: str) -> None:
-        """Log for whoever looks for a fault."""
+        """Log details for debugging."""
         self.write(LogLevel.DEBUG, message)
 
     def info(self, message: str) -> None:
-        """Log what a person running the system wants to see."""
+        """Log information for the operator of the system."""
         self.write(LogLevel.INFO, message)
 
     def warn(self, message: str) -> None:
-        """Log what may be wrong."""
+        """Log a possible problem."""
         self.write(LogLevel.WARN, message)
 
     def error(self, message: str) -> None:
-        """Log what is wrong."""
+        """Log an error."""
         self.write(LogLevel.ERROR, message)
 
     def fatal(self, message: str) -> None:
-        """Log what ends the node."""
+        """Log an unrecoverable error of the node."""
         self.write(LogLevel.FATAL, message)
 
 
@@ -157,7 +161,7 @@ class ErrorLog:
         self._omitted: dict[str, int] = {}
 
     def exception(self, callback: str, error: BaseException) -> None:
-        """Log that ``callback`` raised ``error``."""
+        """Log an exception of ``callback``."""
         self.error(callback, describe(error), traceback_of(error))
 
     def error(self, callback: str, text: str, details: str = "") -> None:
@@ -170,7 +174,7 @@ class ErrorLog:
         if quiet_until_s is not None and now_s < quiet_until_s:
             self._omitted[callback] = self._omitted.get(callback, 0) + 1
             return
-        self._quiet_until_s[callback] = now_s + _AGAIN_AFTER_S
+        self._quiet_until_s[callback] = now_s + _ERROR_PERIOD_S
         omitted = self._omitted.pop(callback, 0)
         times = f" ({omitted} more since the last message)" if omitted else ""
         story = f"\n{details}" if details and quiet_until_s is None else ""
@@ -178,8 +182,41 @@ class ErrorLog:
         self._report(callback, text)
 
 
+class RepeatedWarning:
+    """Warns of one kind of event at once, and of its repetitions in summary."""
+
+    def __init__(self, log: Log, clock: SupportsCallLater, text: Callable[[], str]) -> None:
+        """``text()`` returns the warning when it is logged."""
+        self._log = log
+        self._clock = clock
+        self._text = text
+        self._unreported = 0
+        self._timer: Cancellable | None = None
+
+    def on_events(self, number: int) -> None:
+        """Warn of ``number`` events, or count them if there was a warning just before."""
+        self._unreported += number
+        if self._timer is not None:
+            return
+        self._unreported -= 1
+        self._log.warn(self._text())
+        self._timer = self._clock.call_later(WARNING_PERIOD_S, self._summarize)
+
+    def close(self) -> None:
+        """Log nothing more."""
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def _summarize(self) -> None:
+        self._timer = None
+        if self._unreported:
+            times, self._unreported = self._unreported, 0
+            self._log.warn(f"{self._text()} ({times} times more within {WARNING_PERIOD_S:g} s)")
+            self._timer = self._clock.call_later(WARNING_PERIOD_S, self._summarize)
+
+
 def describe(error: BaseException) -> str:
-    """Return the exception as one line: its type and, where it has one, its text."""
+    """Return the exception as one line: its type and its text, if any."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 

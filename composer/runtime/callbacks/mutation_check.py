@@ -1,8 +1,8 @@
-"""Finds who changes messages that were published or received: ``compose run --check-mutation``.
+"""Finds callbacks that change published or received messages: ``compose run --check-mutation``.
 
-Ports of one process share messages by reference, so one that is changed changes for everybody. With
-the check on, the serialized form of what a node has published or received lately is compared after
-each of its callbacks. That takes long: it is for looking, not for every day.
+Ports of one process share messages by reference, so a change affects all of them. The check
+compares the serialized form of a node's latest messages after each of its callbacks. That is slow:
+it is for debugging, not for production.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from weakref import WeakValueDictionary
 
 from rclpy.serialization import serialize_message
 
+from composer.runtime.executors.futures import Future
 from composer.runtime.executors.strand import Work, in_steps
-from composer.runtime.executors.tasks import Future
 
 T = TypeVar("T")
 
-#: Told (the callback, what it has done).
-Tell = Callable[[str, str], None]
+#: Called with (the callback, what it did).
+Report = Callable[[str, str], None]
 
-_REMEMBERED = 32  # messages of each node
+_REMEMBERED = 32  # messages per node
 
 
-class _Seen:
-    """A message and the form it had when it was last looked at."""
+class _Snapshot:
+    """A message and its serialized form at the last check."""
 
     __slots__ = ("__weakref__", "form", "message")
 
@@ -35,74 +35,76 @@ class _Seen:
         self.form = serialize_message(message)
 
 
-class SeenMessages:
-    """Every message that a node of the process remembers, once."""
+class MessageSnapshots:
+    """One snapshot of each message that a node of the process remembers."""
 
     def __init__(self) -> None:
-        self._by_identity: WeakValueDictionary[int, _Seen] = WeakValueDictionary()
+        self._by_identity: WeakValueDictionary[int, _Snapshot] = WeakValueDictionary()
 
-    def of(self, message: Any) -> _Seen:
-        """Return what is known of the message; as it is now, where that is nothing."""
-        seen = self._by_identity.get(id(message))
-        if seen is None:
-            seen = self._by_identity[id(message)] = _Seen(message)
-        return seen
+    def of(self, message: Any) -> _Snapshot:
+        """Return the snapshot of the message, a new one if there is none."""
+        snapshot = self._by_identity.get(id(message))
+        if snapshot is None:
+            snapshot = self._by_identity[id(message)] = _Snapshot(message)
+        return snapshot
 
 
 class MutationCheck:
-    """What one node has published and received lately, and whether it is as it was."""
+    """The latest messages of one node, and whether they have changed."""
 
-    def __init__(self, messages: SeenMessages, tell: Tell) -> None:
-        self._messages = messages
-        self._tell = tell
-        self._lately: deque[tuple[_Seen, str]] = deque(maxlen=_REMEMBERED)
+    def __init__(self, snapshots: MessageSnapshots, report: Report) -> None:
+        self._snapshots = snapshots
+        self._report = report
+        self._latest: deque[tuple[_Snapshot, str]] = deque(maxlen=_REMEMBERED)
 
-    def remember(self, message: Any, what: str) -> None:
-        """Look at the message from now on; ``what`` is told of it: ``published by 'odometry'``."""
-        self._lately.append((self._messages.of(message), what))
+    def remember(self, message: Any, origin: str) -> None:
+        """Check the message from now on; ``origin`` is reported: ``published by 'odometry'``."""
+        self._latest.append((self._snapshots.of(message), origin))
 
-    def around(self, callback: str, work: Work[T]) -> Work[T]:
-        """Return ``work``, after which everything is looked at."""
+    def wrap(self, callback: str, work: Work[T]) -> Work[T]:
+        """Return ``work``, followed by a check."""
 
-        def watched(item: T) -> Coroutine[Any, Any, None] | None:
+        def checked(item: T) -> Coroutine[Any, Any, None] | None:
             try:
                 rest = work(item)
             finally:
-                self.look(callback)
-            return None if rest is None else self.steps(callback, rest)
+                self.check(callback)
+            return None if rest is None else self.wrap_steps(callback, rest)
 
-        return watched
+        return checked
 
-    def steps(self, callback: str, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
-        """Return ``coroutine``, after each step of which everything is looked at."""
-        return in_steps(_Look(self, callback), coroutine)
+    def wrap_steps(
+        self, callback: str, coroutine: Coroutine[Any, Any, T]
+    ) -> Coroutine[Any, Any, T]:
+        """Return ``coroutine`` with a check after each of its steps."""
+        return in_steps(_CheckAfter(self, callback), coroutine)
 
-    def look(self, callback: str) -> None:
-        """Tell what has changed since the last look: it was ``callback``."""
-        for seen, what in tuple(self._lately):
-            form = serialize_message(seen.message)
-            if form != seen.form:
-                seen.form = form
-                kind = type(seen.message).__name__
-                self._tell(callback, f"has changed a message ({kind}) after it was {what}")
+    def check(self, callback: str) -> None:
+        """Report messages that have changed since the last check: ``callback`` changed them."""
+        for snapshot, origin in tuple(self._latest):
+            form = serialize_message(snapshot.message)
+            if form != snapshot.form:
+                snapshot.form = form
+                kind = type(snapshot.message).__name__
+                self._report(callback, f"has changed a message ({kind}) after it was {origin}")
 
 
-class Remembered:
-    """Has each message that is put there looked at from now on."""
+class RememberingTarget:
+    """Remembers each message that is put."""
 
-    __slots__ = ("_check", "_what")
+    __slots__ = ("_check", "_origin")
 
-    def __init__(self, check: MutationCheck, what: str) -> None:
+    def __init__(self, check: MutationCheck, origin: str) -> None:
         self._check = check
-        self._what = what
+        self._origin = origin
 
     def put(self, message: Any) -> None:
-        """Look at the message from now on."""
-        self._check.remember(message, self._what)
+        """Check the message from now on."""
+        self._check.remember(message, self._origin)
 
 
-class _Look:
-    """Looks after each step of a coroutine."""
+class _CheckAfter:
+    """Checks after each step of a coroutine."""
 
     __slots__ = ("_callback", "_check")
 
@@ -115,5 +117,5 @@ class _Look:
         return None
 
     def leave(self) -> None:
-        """Look."""
-        self._check.look(self._callback)
+        """Check."""
+        self._check.check(self._callback)

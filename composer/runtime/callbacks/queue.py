@@ -1,4 +1,4 @@
-"""The waiting line of a port: one run of its handler at a time, the oldest makes room."""
+"""The queue of a port: one item is handled at a time; if it is full, the oldest is dropped."""
 
 from __future__ import annotations
 
@@ -14,65 +14,65 @@ from composer.runtime.executors.strand import InlineStrand, Work
 T = TypeVar("T")
 
 
-def line_for(
-    core: NodeContext,
+def queue_for(
+    context: NodeContext,
     work: Work[T],
     timer: CallbackTimer | None,
     *,
     depth: int | None,
     reentrant: bool,
-) -> Line[T]:
-    """Return the line of a port of ``core``, for ``work`` that ``timer`` takes the times of.
+) -> CallbackQueue[T]:
+    """Return the queue of a port for ``work``, which ``timer`` times.
 
-    ``depth`` is how many may wait; None means any number. With ``reentrant`` nothing waits: every
-    item is worked on at once.
+    ``depth`` is how many items may wait; None is unlimited. With ``reentrant`` no item waits:
+    each is worked on at once.
     """
     if reentrant:
-        return OverlappingLine(core, work, timer, depth)
-    if isinstance(core.strand, InlineStrand):
-        return OneThreadLine(core, work, timer, depth)
-    return Line(core, work, timer, depth)
+        return ReentrantQueue(context, work, timer, depth)
+    if isinstance(context.strand, InlineStrand):
+        return SingleThreadQueue(context, work, timer, depth)
+    return CallbackQueue(context, work, timer, depth)
 
 
-class Line(Generic[T]):
+class CallbackQueue(Generic[T]):
     """Items that wait for ``work``, on several threads."""
 
-    __slots__ = ("_busy", "_core", "_depth", "_lock", "_waiting", "_work")
+    __slots__ = ("_busy", "_context", "_depth", "_lock", "_waiting", "_work")
 
     def __init__(
-        self, core: NodeContext, work: Work[T], timer: CallbackTimer | None, depth: int | None
+        self, context: NodeContext, work: Work[T], timer: CallbackTimer | None, depth: int | None
     ) -> None:
-        self._core = core
-        self._work = work if timer is None else timer.around(work)
+        self._context = context
+        self._work = work if timer is None else timer.wrap(work)
         self._depth = depth
         self._waiting: deque[T] = deque()
         self._busy = False
         self._lock = threading.Lock()
 
     def put(self, item: T) -> T | None:
-        """Take ``item`` in; return the one that had to make room for it, if any."""
-        pushed_out = None
+        """Add ``item``; return the item that was dropped for it, if any."""
+        dropped = None
         with self._lock:
             if self._busy and self._depth is not None and len(self._waiting) >= self._depth:
                 if self._depth == 0:
                     return item
-                pushed_out = self._waiting.popleft()
+                dropped = self._waiting.popleft()
             self._waiting.append(item)
             if self._busy:
-                return pushed_out
+                return dropped
             self._busy = True
-        self._core.strand.post(self._run)
+        self._context.strand.post(self._run)
         return None
 
     def clear(self) -> list[T]:
-        """Take out everything that waits and return it."""
+        """Remove and return all waiting items."""
         with self._lock:
-            left = list(self._waiting)
+            removed = list(self._waiting)
             self._waiting.clear()
-        return left
+        return removed
 
     def _run(self) -> None:
-        """Work on what waits until something has to be awaited or nothing is left."""
+        """Work on the waiting items until one has to be awaited or none is left."""
         while True:
             with self._lock:
                 if not self._waiting:
@@ -85,20 +85,20 @@ class Line(Generic[T]):
                 return
 
     def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> None:
-        task = self._core.spawn(self._core.strand.wrap(coroutine))
+        task = self._context.spawn(self._context.strand.wrap(coroutine))
         task.add_done_callback(self._next)
 
     def _next(self, _: object) -> None:
-        self._core.strand.post(self._run)
+        self._context.strand.post(self._run)
 
 
-class OneThreadLine(Line[T]):
-    """The line of a port whose loop has one thread: nothing has to be locked."""
+class SingleThreadQueue(CallbackQueue[T]):
+    """The queue of a port whose loop has one thread: nothing is locked."""
 
     __slots__ = ()
 
     def put(self, item: T) -> T | None:
-        """Take ``item`` in; return the one that had to make room for it, if any."""
+        """Add ``item``; return the item that was dropped for it, if any."""
         if self._busy:
             return super().put(item)
         self._busy = True
@@ -112,8 +112,8 @@ class OneThreadLine(Line[T]):
         return None
 
 
-class OverlappingLine(Line[T]):
-    """The line of a reentrant port: nobody waits in it."""
+class ReentrantQueue(CallbackQueue[T]):
+    """The queue of a reentrant port: no item waits."""
 
     __slots__ = ()
 
@@ -121,4 +121,4 @@ class OverlappingLine(Line[T]):
         """Work on ``item`` at once."""
         coroutine = self._work(item)
         if coroutine is not None:
-            self._core.spawn(coroutine)
+            self._context.spawn(coroutine)

@@ -1,4 +1,4 @@
-"""Carries out what YAML says is to happen when something happens."""
+"""Runs the reactions of YAML: what a node does when something happens."""
 
 from __future__ import annotations
 
@@ -13,44 +13,44 @@ from composer.runtime.ros.messages import Build, compile_message
 from composer.templates import Template, evaluate, expressions_in
 
 
-class Caller(Protocol):
-    """A client or action client port: what a reaction sends requests and goals through."""
+class ReactionClient(Protocol):
+    """A client or action client port, through which a reaction sends requests and goals."""
 
     @property
     def content_type(self) -> Any:
-        """The class of what is sent."""
+        """The class of requests or goals."""
 
     def send(self, content: Any) -> None:
-        """Send it and let the port's own reactions deal with what comes back."""
+        """Send it; the port's own reactions handle the response."""
 
 
 #: The publisher and client ports of a node, by name.
 Publishers: TypeAlias = Mapping[str, Publisher]
-Callers: TypeAlias = Mapping[str, Caller]
+Clients: TypeAlias = Mapping[str, ReactionClient]
 Action: TypeAlias = Callable[[dict[str, Any]], None]
 
 
 class RunningReaction:
     """A reaction of one node, compiled when the node is configured.
 
-    ``count`` counts every time it was asked to run, also when ``when`` was false, so that
-    ``count % 10 == 0`` means every tenth message.
+    ``count`` includes the runs for which ``when`` was false, so that ``count % 10 == 0`` means
+    every tenth message.
     """
 
-    __slots__ = ("_actions", "_core", "_needs_now", "_respond", "_when", "count")
+    __slots__ = ("_actions", "_context", "_needs_now", "_respond", "_when", "count")
 
     def __init__(
         self,
-        core: NodeContext,
+        context: NodeContext,
         reaction: Reaction,
         publishers: Publishers,
-        callers: Callers,
+        clients: Clients,
         response_type: Any = None,
     ) -> None:
-        """Compile it. Raises MessageError for what can never become the message it is to be."""
-        self._core = core
+        """Compile it. Raises MessageError for content that never fits its message type."""
+        self._context = context
         self._when = reaction.when.holds if reaction.when is not None else None
-        self._actions = tuple(_actions(core, reaction, publishers, callers))
+        self._actions = tuple(_actions(context, reaction, publishers, clients))
         self._respond: Build | None = None
         if reaction.respond is not None and response_type is not None:
             self._respond = compile_message(reaction.respond, response_type, "'respond'")
@@ -58,14 +58,14 @@ class RunningReaction:
         self.count = 0
 
     def run(self, **values: Any) -> Any:
-        """Carry it out with ``values`` in scope and return the response, where there is one.
+        """Run it with ``values`` in scope; return the response, if it has one.
 
         Raises EvaluationError and MessageError.
         """
-        scope = self._core.names | values
+        scope = self._context.names | values
         scope["count"] = self.count
         if self._needs_now:
-            scope["now"] = self._core.now_s()
+            scope["now"] = self._context.now_s()
         self.count += 1
         if self._when is not None and not self._when(scope):
             return None
@@ -75,7 +75,7 @@ class RunningReaction:
 
 
 def uses_now(expression: Expression) -> bool:
-    """Say whether the time has to be looked up for ``expression``."""
+    """Return whether ``expression`` uses the time."""
     return any(path.root == "now" for path in expression.paths)
 
 
@@ -91,38 +91,38 @@ def _expressions(reaction: Reaction) -> Iterable[Expression]:
 
 
 def _actions(
-    core: NodeContext, reaction: Reaction, publishers: Publishers, callers: Callers
+    context: NodeContext, reaction: Reaction, publishers: Publishers, clients: Clients
 ) -> Iterable[Action]:
     if reaction.state:
-        yield _set_state(core.names["state"], reaction)
+        yield _set_state(context.names["state"], reaction)
     if reaction.log is not None:
-        yield _write_log(core, reaction, reaction.log)
+        yield _write_log(context, reaction, reaction.log)
     for send in reaction.publish:
         publisher = publishers[send.port.value]
         what = f"'publish' to '{send.port.value}'"
         yield _send(compile_message(send.content, publisher.message_type, what), publisher.publish)
     for send in reaction.call:
-        caller = callers[send.port.value]
+        client = clients[send.port.value]
         what = f"'call' of '{send.port.value}'"
-        yield _send(compile_message(send.content, caller.content_type, what), caller.send)
+        yield _send(compile_message(send.content, client.content_type, what), client.send)
 
 
 def _set_state(state: dict[str, Any], reaction: Reaction) -> Action:
     entries = [(name.value, content) for name, content in reaction.state]
 
     def set_state(scope: dict[str, Any]) -> None:
-        # Every value is worked out from the old state before any is stored.
+        # Evaluate all values with the old state before any is stored.
         state.update({name: evaluate(content, scope) for name, content in entries})
 
     return set_state
 
 
-def _write_log(core: NodeContext, reaction: Reaction, content: Template) -> Action:
+def _write_log(context: NodeContext, reaction: Reaction, content: Template) -> Action:
     level = reaction.log_level
 
     def write_log(scope: dict[str, Any]) -> None:
-        if core.log.is_on(level):
-            core.log.write(level, str(evaluate(content, scope)))
+        if context.log.is_enabled_for(level):
+            context.log.write(level, str(evaluate(content, scope)))
 
     return write_log
 

@@ -1,12 +1,12 @@
-"""How long callbacks take.
+"""How long callbacks take, and which exceed their budget.
 
-What is counted is the time for which a callback keeps its thread; while an ``async`` one waits it
-does not.
+The time counted is that during which a callback keeps its thread; an ``async`` callback does not
+keep it while it awaits.
 
-This is always on and so has to cost little, which two looks at the clock, a tenth of a microsecond,
-are not for who is called a hundred thousand times a second: of callbacks that come more often than
-:data:`HOT_HZ` each sixteenth call stands for sixteen. One with a ``budget_ms`` is timed at every
-call.
+Timing is always on, so it must be cheap. Reading the clock twice takes a tenth of a microsecond,
+too much for a hundred thousand calls per second. Of callbacks with more than :data:`HOT_HZ` calls
+per second, every sixteenth call is timed and counts sixteen times. A callback with a ``budget_ms``
+is timed at every call.
 """
 
 from __future__ import annotations
@@ -16,134 +16,163 @@ from math import inf
 from time import monotonic
 from typing import Any, TypeVar
 
-from composer.runtime.callbacks.budget import Budget
 from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.callbacks.log import Log
 from composer.runtime.callbacks.mutation_check import MutationCheck
 from composer.runtime.executors.strand import Work, in_steps
-from composer.runtime.metrics.histogram import TOGETHER
+from composer.runtime.metrics.histogram import BATCH_SIZE
 from composer.runtime.metrics.statistics import CallbackStatistics
 from composer.source import Located
 
 T = TypeVar("T")
 
-#: Up to so many calls a second, every one of them is timed.
+#: Up to this rate, every call is timed.
 HOT_HZ = 1000.0
-_STANDS_FOR = 16
+_HOT_WEIGHT = 16
+#: Minimum time between two warnings about the same callback.
+WARNING_PERIOD_S = 5.0
+
+
+class CallbackBudget:
+    """Counts the calls of one callback that exceed its ``budget_ms``, and warns about them."""
+
+    def __init__(self, log: Log, callback: CallbackStatistics, budget_s: float) -> None:
+        self._log = log
+        self._callback = callback
+        self._budget_s = budget_s
+        self._quiet_until_s = 0.0
+
+    def on_overrun(self, duration_s: float) -> None:
+        """Count a call that took too long, and warn unless there was a warning just before."""
+        callback = self._callback
+        callback.overruns += 1
+        now_s = monotonic()
+        if now_s < self._quiet_until_s:
+            return
+        self._quiet_until_s = now_s + WARNING_PERIOD_S
+        self._log.warn(
+            f"{callback} took {duration_s * 1e3:.1f} ms, over its budget of "
+            f"{self._budget_s * 1e3:g} ms ({callback.overruns} times so far, at most "
+            f"{callback.times.longest_s * 1e3:.1f} ms)"
+        )
 
 
 class CallbackTimer:
-    """Takes the times of one callback, and names it when it takes longer than it may.
+    """Times the calls of one callback and checks its budget.
 
-    ``pause`` is how many of the calls to come need not be timed: whoever makes one that is not
-    counts it down.
+    ``to_skip`` is the number of the next calls that need not be timed. The caller decrements it for
+    each call that it does not time.
     """
 
     __slots__ = (
+        "_adapted_s",
+        "_batch",
         "_budget",
         "_budget_s",
-        "_looked_s",
         "_mutations",
-        "_pause",
+        "_skip",
         "_statistics",
         "_times",
-        "_waiting",
-        "pause",
+        "to_skip",
     )
 
     def __init__(
-        self, core: NodeContext, statistics: CallbackStatistics, budget_ms: Located[float] | None
+        self,
+        context: NodeContext,
+        statistics: CallbackStatistics,
+        budget_ms: Located[float] | None,
     ) -> None:
         self._statistics = statistics
-        self._mutations = core.mutations
+        self._mutations = context.mutations
         self._budget_s = inf if budget_ms is None else budget_ms.value / 1e3
-        self._budget = Budget(core.log, statistics, self._budget_s)
+        self._budget = CallbackBudget(context.log, statistics, self._budget_s)
         self._times = statistics.times
-        self._waiting = statistics.times.waiting
-        self._looked_s = 0.0
-        is_on = core.statistics.tracing or budget_ms is not None
-        self._pause = self.pause = 0.0 if is_on else inf
+        self._batch = statistics.times.batch
+        self._adapted_s = 0.0
+        is_on = context.statistics.tracing or budget_ms is not None
+        self._skip = self.to_skip = 0.0 if is_on else inf
 
     def call(self, work: Work[T], item: T) -> Coroutine[Any, Any, None] | None:
         """Do the work, timed."""
         began_s = monotonic()
-        return self.took(began_s, work(item))
+        return self.finish(began_s, work(item))
 
-    def took(
-        self, began_s: float, rest: Coroutine[Any, Any, None] | None
+    def finish(
+        self, began_s: float, continuation: Coroutine[Any, Any, None] | None
     ) -> Coroutine[Any, Any, None] | None:
-        """Count what began at ``began_s`` of ``monotonic()`` and keeps the thread no longer.
+        """Count a call that began at ``began_s`` of ``monotonic()`` and releases its thread now.
 
-        Returns ``rest``, timed: what is left of it where it is ``async``.
+        Returns ``continuation``, the rest of an ``async`` call, timed.
         """
-        took_s = monotonic() - began_s
-        if rest is not None:
-            self._time_each(1)
-            return self._to_its_end(rest, took_s)
-        waiting = self._waiting
-        waiting.append(took_s)
-        if len(waiting) >= TOGETHER:
-            self._look(began_s)
-        self.pause = self._pause
-        if took_s > self._budget_s:
-            self._budget.take(took_s)
+        duration_s = monotonic() - began_s
+        if continuation is not None:
+            self._time_every(1)
+            return self._timed_steps(continuation, duration_s)
+        batch = self._batch
+        batch.append(duration_s)
+        if len(batch) >= BATCH_SIZE:
+            self._adapt(began_s)
+        self.to_skip = self._skip
+        if duration_s > self._budget_s:
+            self._budget.on_overrun(duration_s)
         return None
 
-    def around(self, work: Work[T]) -> Work[T]:
+    def wrap(self, work: Work[T]) -> Work[T]:
         """Return ``work``, timed."""
-        work = watched(self._mutations, self._statistics, work)
+        work = mutation_checked(self._mutations, self._statistics, work)
 
         def timed(item: T) -> Coroutine[Any, Any, None] | None:
-            if self.pause > 0:  # two threads may both count down the last
-                self.pause -= 1
+            if self.to_skip > 0:  # two threads may both decrement the last one
+                self.to_skip -= 1
                 return work(item)
             return self.call(work, item)
 
         return timed
 
-    def steps(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
-        """Return ``coroutine``, the steps of which are timed and count as one call."""
+    def wrap_steps(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
+        """Return ``coroutine`` with its steps timed, as one call."""
         if self._mutations is not None:
-            coroutine = self._mutations.steps(str(self._statistics), coroutine)
-        return coroutine if self.pause == inf else self._to_its_end(coroutine, 0.0)
+            coroutine = self._mutations.wrap_steps(str(self._statistics), coroutine)
+        return coroutine if self.to_skip == inf else self._timed_steps(coroutine, 0.0)
 
-    async def _to_its_end(self, coroutine: Coroutine[Any, Any, T], took_s: float) -> T:
-        stopwatch = _Stopwatch(took_s)
+    async def _timed_steps(self, coroutine: Coroutine[Any, Any, T], duration_s: float) -> T:
+        stopwatch = _Stopwatch(duration_s)
         try:
             return await in_steps(stopwatch, coroutine)
         finally:
-            self._times.take(stopwatch.took_s)
-            if stopwatch.took_s > self._budget_s:
-                self._budget.take(stopwatch.took_s)
+            self._times.add(stopwatch.total_s)
+            if stopwatch.total_s > self._budget_s:
+                self._budget.on_overrun(stopwatch.total_s)
 
-    def _look(self, now_s: float) -> None:
-        """Put what waits into the histogram, and see how often the callback is called."""
-        self._times.settle()
+    def _adapt(self, now_s: float) -> None:
+        """Flush the batch, and choose how many calls are timed by how frequent they are."""
+        self._times.flush()
         if self._budget_s == inf:
-            calls = TOGETHER * (self._pause + 1)
-            is_hot = calls > HOT_HZ * (now_s - self._looked_s)
-            self._looked_s = now_s
-            self._time_each(_STANDS_FOR if is_hot else 1)
+            calls = BATCH_SIZE * (self._skip + 1)
+            is_hot = calls > HOT_HZ * (now_s - self._adapted_s)
+            self._adapted_s = now_s
+            self._time_every(_HOT_WEIGHT if is_hot else 1)
 
-    def _time_each(self, how_many: int) -> None:
-        """Time one of so many calls, for all of them."""
-        self._pause = how_many - 1.0
-        self._times.stand_for(how_many)
+    def _time_every(self, weight: int) -> None:
+        """Time one of ``weight`` calls, and count it ``weight`` times."""
+        self._skip = weight - 1.0
+        self._times.set_weight(weight)
 
 
-def watched(
+def mutation_checked(
     mutations: MutationCheck | None, statistics: CallbackStatistics, work: Work[T]
 ) -> Work[T]:
-    """Return ``work``, after which messages are looked at where that is asked for."""
-    return work if mutations is None else mutations.around(str(statistics), work)
+    """Return ``work``, followed by a mutation check if that is enabled."""
+    return work if mutations is None else mutations.wrap(str(statistics), work)
 
 
 class _Stopwatch:
     """Adds up the steps of a coroutine."""
 
-    __slots__ = ("_began_s", "took_s")
+    __slots__ = ("_began_s", "total_s")
 
-    def __init__(self, took_s: float) -> None:
-        self.took_s = took_s
+    def __init__(self, total_s: float) -> None:
+        self.total_s = total_s
         self._began_s = 0.0
 
     def enter(self) -> None:
@@ -152,4 +181,4 @@ class _Stopwatch:
 
     def leave(self) -> None:
         """End a step."""
-        self.took_s += monotonic() - self._began_s
+        self.total_s += monotonic() - self._began_s

@@ -1,7 +1,7 @@
-"""A node's clock: what time it is for the node, and calls at a time by it.
+"""A node's clock: the node's time, and calls scheduled by it.
 
-In simulated time (the parameter ``use_sim_time``) that is the time of /clock; otherwise now is what
-the computer's clock says, and calls go by the steady clock, which nobody sets.
+In simulated time (parameter ``use_sim_time``) that is the time of /clock. Otherwise the time is
+that of the system clock, and calls are scheduled by the steady clock, which nothing adjusts.
 """
 
 from __future__ import annotations
@@ -15,68 +15,68 @@ from rclpy.parameter import Parameter
 from rclpy.time import Time
 from rclpy.time_source import USE_SIM_TIME_NAME
 
-from composer.runtime.clock.sim_time import UNKNOWN, SimulatedTime
-from composer.runtime.clock.sim_timers import SimulatedCalls
-from composer.runtime.executors.loop import Loop, Timer
+from composer.runtime.clock.sim_time import UNKNOWN, SimTimeSource
+from composer.runtime.clock.sim_timers import SimTimers
+from composer.runtime.executors.loop import Loop, TimerHandle
 
 
-class Clock:
+class NodeTime:
     """Follows the node's parameter ``use_sim_time``."""
 
     def __init__(
         self,
         node: Node,
         loop: Loop,
-        simulated_time: SimulatedTime,
-        switched: Callable[[], None] = lambda: None,
+        sim_time: SimTimeSource,
+        on_switch: Callable[[], None] = lambda: None,
     ) -> None:
-        """``switched`` is called when the node's time has become another."""
+        """``on_switch`` is called when the node has switched to or from simulated time."""
         self._loop = loop
-        self._simulated_time = simulated_time
-        self._switched = switched
-        self._calls = SimulatedCalls(loop)
-        self._waits: set[_Wait] = set()
+        self._sim_time = sim_time
+        self._on_switch = on_switch
+        self._sim_timers = SimTimers(loop)
+        self._delayed_calls: set[_DelayedCall] = set()
         self.is_simulated = False
         self._ros = cast(ROSClock, node.get_clock())
-        # rclpy's source of time goes on to watch the parameter and to switch the clock, but
-        # without its node it subscribes to nothing.
+        # rclpy's time source still follows the parameter and switches the clock, but without its
+        # node it does not subscribe.
         node._time_source.detach_node()
         node.add_post_set_parameters_callback(self._follow_parameter)
 
-    def call_later(self, delay_s: float, callback: Callable[[], object]) -> _Wait:
+    def call_later(self, delay_s: float, callback: Callable[[], object]) -> _DelayedCall:
         """Call ``callback`` on the node's loop once, ``delay_s`` seconds from now.
 
-        When the node's time becomes another the delay begins anew.
+        The delay starts again when the node switches to or from simulated time.
         """
-        wait = _Wait(self, delay_s, callback)
-        self._waits.add(wait)
-        wait.begin()
-        return wait
+        call = _DelayedCall(self, delay_s, callback)
+        self._delayed_calls.add(call)
+        call.start()
+        return call
 
-    def call_every(self, period_s: float, callback: Callable[[], object]) -> Timer:
+    def call_every(self, period_s: float, callback: Callable[[], object]) -> TimerHandle:
         """Call ``callback`` on the node's loop each ``period_s`` seconds.
 
-        It goes by the time that the node has now: whoever asked asks anew when that was switched.
-        Raises ValueError for a period that is not positive.
+        It uses the node's current time: the caller schedules it again after a switch. Raises
+        ValueError for a period that is not positive.
         """
         if self.is_simulated:
-            return self._calls.add(period_s, callback, repeats=True)
+            return self._sim_timers.add(period_s, callback, repeats=True)
         return self._loop.call_every(period_s, callback)
 
     def close(self) -> None:
-        """Follow nothing more."""
+        """Stop following /clock."""
         if self.is_simulated:
-            self._simulated_time.leave(self._take_time)
+            self._sim_time.leave(self._set_time)
 
-    def schedule(self, delay_s: float, callback: Callable[[], object]) -> Timer:
-        """Call ``callback`` once, by the time that the node has now."""
+    def schedule(self, delay_s: float, callback: Callable[[], object]) -> TimerHandle:
+        """Call ``callback`` once, by the node's current time."""
         if self.is_simulated:
-            return self._calls.add(delay_s, callback)
+            return self._sim_timers.add(delay_s, callback)
         return self._loop.call_later(delay_s, callback)
 
-    def forget(self, wait: _Wait) -> None:
-        """Let a wait be: it is over."""
-        self._waits.discard(wait)
+    def discard(self, call: _DelayedCall) -> None:
+        """Forget a call that was made or canceled."""
+        self._delayed_calls.discard(call)
 
     def _follow_parameter(self, parameters: Iterable[Parameter]) -> None:
         for parameter in parameters:
@@ -86,42 +86,42 @@ class Clock:
     def _switch(self, *, simulated: bool) -> None:
         self.is_simulated = simulated
         if simulated:
-            self._simulated_time.join(self._take_time)
+            self._sim_time.join(self._set_time)
         else:
-            self._simulated_time.leave(self._take_time)
-            self._take_time(UNKNOWN)
-        for wait in tuple(self._waits):
-            wait.begin()
-        self._switched()
+            self._sim_time.leave(self._set_time)
+            self._set_time(UNKNOWN)
+        for call in tuple(self._delayed_calls):
+            call.start()
+        self._on_switch()
 
-    def _take_time(self, now: Time) -> None:
+    def _set_time(self, now: Time) -> None:
         self._ros.set_ros_time_override(now)
-        self._calls.take_time(now.nanoseconds)
+        self._sim_timers.set_time(now.nanoseconds)
 
 
-class _Wait:
-    """A call at a time, whichever time it is."""
+class _DelayedCall:
+    """A call after a delay, by whichever time the node has."""
 
     __slots__ = ("_callback", "_clock", "_delay_s", "_timer")
 
-    def __init__(self, clock: Clock, delay_s: float, callback: Callable[[], object]) -> None:
+    def __init__(self, clock: NodeTime, delay_s: float, callback: Callable[[], object]) -> None:
         self._clock = clock
         self._delay_s = delay_s
         self._callback = callback
-        self._timer: Timer | None = None
+        self._timer: TimerHandle | None = None
 
-    def begin(self) -> None:
-        """Begin to wait, now."""
+    def start(self) -> None:
+        """Start the delay now."""
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = self._clock.schedule(self._delay_s, self._end)
+        self._timer = self._clock.schedule(self._delay_s, self._call)
 
     def cancel(self) -> None:
         """Never call."""
-        self._clock.forget(self)
+        self._clock.discard(self)
         if self._timer is not None:
             self._timer.cancel()
 
-    def _end(self) -> Any:
-        self._clock.forget(self)
+    def _call(self) -> Any:
+        self._clock.discard(self)
         return self._callback()

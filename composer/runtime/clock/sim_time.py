@@ -1,7 +1,7 @@
-"""What /clock says, for all nodes of a process.
+"""The time of /clock, for all nodes of a process.
 
-rclpy has each node that uses simulated time subscribe by itself, which is an endpoint a node and
-the same message taken as often as there are nodes. Here one subscription serves all of them.
+In rclpy each node that uses simulated time has its own subscription: an endpoint per node, and the
+same message taken as often as there are nodes. Here one subscription serves all of them.
 """
 
 from __future__ import annotations
@@ -22,54 +22,54 @@ from composer.runtime.executors.loop import Loop, Taken
 
 #: As rclpy and rclcpp subscribe: only the latest time matters.
 _QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-#: ROS takes zero for a time that nobody has told yet.
+#: In ROS, zero means that no time was received yet.
 UNKNOWN = Time(clock_type=ClockType.ROS_TIME)
 
-#: Is given each new time; must be quick and raise nothing.
+#: Called with each new time; must be fast and must not raise.
 Follower: TypeAlias = Callable[[Time], None]
 
 
-class SimulatedTime:
-    """Gives the time of /clock to whoever follows it, and listens only while somebody does."""
+class SimTimeSource:
+    """Passes the time of /clock to its followers. It subscribes only while there are any."""
 
     def __init__(self, node: Node, loop: Loop) -> None:
-        """Listen with a subscription of ``node``, which ``loop`` serves."""
+        """Subscribe with ``node``, on ``loop``."""
         self._node = node
         self._loop = loop
-        self._changing = threading.Lock()  # who has left is not called any more
+        self._changing = threading.Lock()  # a follower that has left is not called
         self._followers: set[Follower] = set()
         self._now = UNKNOWN
         self._subscription: Subscription | None = None
 
     def join(self, follower: Follower) -> None:
-        """Tell ``follower`` the time now, :data:`UNKNOWN` before it was told, and each later one.
+        """Call ``follower`` with the current time, or :data:`UNKNOWN`, and with each later one.
 
-        From any thread; ``follower`` is called on the loop from then on.
+        From any thread; later calls are made on the loop.
         """
         with self._changing:
             self._followers.add(follower)
             follower(self._now)
-        self._loop.call_soon(self._listen_while_wanted)
+        self._loop.call_soon(self._update_subscription)
 
     def leave(self, follower: Follower) -> None:
-        """Tell ``follower`` nothing more. From any thread."""
+        """Stop calling ``follower``. From any thread."""
         with self._changing:
             self._followers.discard(follower)
-        self._loop.call_soon(self._listen_while_wanted)
+        self._loop.call_soon(self._update_subscription)
 
-    def _listen_while_wanted(self) -> None:
+    def _update_subscription(self) -> None:
         if self._followers and self._subscription is None:
             self._subscription = self._node.create_subscription(
-                ClockMessage, CLOCK_TOPIC, self._take, _QOS
+                ClockMessage, CLOCK_TOPIC, self._on_clock, _QOS
             )
-            self._loop.add_subscription(self._subscription, self._take)
+            self._loop.add_subscription(self._subscription, self._on_clock)
         elif not self._followers and self._subscription is not None:
             self._loop.remove(self._subscription)
-            self._now = UNKNOWN  # what was heard long ago is no time to start from
+            self._now = UNKNOWN  # an outdated time must not be a starting point
             self._node.destroy_subscription(self._subscription)
             self._subscription = None
 
-    def _take(self, taken: Taken) -> None:
+    def _on_clock(self, taken: Taken) -> None:
         message: ClockMessage = taken[0]
         now = Time.from_msg(message.clock)
         with self._changing:

@@ -1,15 +1,9 @@
-"""QoS events, counted as the middleware announces them, and their status where that tells more.
+"""QoS events, counted from rcl's callbacks, and the status of those where a count is not enough.
 
-What is announced is a number (``Signal``), which is all that is
-needed to count. To take a status is another matter. With rmw_fastrtps of Jazzy a system that took
-those of missed deadlines of 2 ms froze in ``take_event`` within two seconds, with the lock of the
-interpreter held: rmw keeps the status that it has announced, and hands that out under a lock of its
-own; with that lock held it asks the reader where there is none, whose lock is held by who announces
-the next one and waits for rmw's. So a status is taken only where one is there for certain.
-
-To begin to watch is no better: rmw asks for the status with its lock held. It is safe as long as
-nothing else that is watched happens to the endpoint in that instant. So all of it is watched as
-soon as the endpoint is made, first what happens rarely, last what may happen all the time.
+A count needs only the number that a ``Signal`` carries. Taking a status is another matter: with
+rmw_fastrtps of Jazzy, ``take_event`` can deadlock while the middleware reports the next event. So
+a status is taken only when one is certain to be available, and everything is watched as soon as
+the endpoint exists. See docs/decisions/0012-qos-events-are-counted.md.
 """
 
 from __future__ import annotations
@@ -21,116 +15,116 @@ from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
+from composer.runtime.executors.entities.readiness import EVENT, Signal
+from composer.runtime.executors.entities.source_group import SourceGroup
 from composer.runtime.executors.event_loop import EventLoop
-from composer.runtime.executors.readiness import EVENT, Signal
-from composer.runtime.executors.source_group import Slot
 
 
-class AnnouncedEvents:
-    """Those of all publishers and subscriptions of a process. Any thread may call.
+class EventCounts:
+    """The QoS events of all publishers and subscriptions of a process. Any thread may call.
 
-    What is watched is to be ended before ``endpoint``, rclpy's handle of a publisher or a
-    subscription, is destroyed. All raise rclpy's UnsupportedEventTypeError.
+    ``endpoint`` is rclpy's handle of a publisher or a subscription; stop watching before it is
+    destroyed. Every method raises rclpy's UnsupportedEventTypeError.
     """
 
     def __init__(self, loop: EventLoop) -> None:
-        """``loop`` is where it is told that something happened, whatever loops nodes have."""
+        """``loop`` makes the calls, whatever loops the nodes have."""
         self._loop = loop
 
     def watch(
-        self, endpoint: Any, kind: IntEnum, happened: Callable[[], None]
+        self, endpoint: Any, kind: IntEnum, on_event: Callable[[], None]
     ) -> Callable[[], None]:
-        """Call ``happened`` for each event of ``kind``; return what ends that."""
-        slot = self._loop.open_slot(_Announced(endpoint, kind, happened))
-        return lambda: self._loop.close_slot(slot)
+        """Call ``on_event`` for each event of ``kind``; return a function that stops that."""
+        group = self._loop.add_group(_CountSource(endpoint, kind, on_event))
+        return lambda: self._loop.remove_group(group)
 
     def watch_status(
-        self, endpoint: Any, kind: IntEnum, happened: Callable[[Any], None]
+        self, endpoint: Any, kind: IntEnum, on_status: Callable[[Any], None]
     ) -> Callable[[], None]:
-        """Call ``happened`` with the status after events of ``kind``; return what ends that.
+        """Call ``on_status`` after events of ``kind``; return a function that stops that.
 
-        One status may be that of several events. One that comes in the instant in which the last
-        status is taken is told with the next.
+        One status may cover several events. An event that occurs while the last status is being
+        taken is reported with the next one.
         """
-        source = _Status(endpoint, kind, happened)
-        slot = self._loop.open_slot(source)
-        self._loop.call_soon(lambda: source.begin(slot))
-        return lambda: self._loop.close_slot(slot)
+        source = _StatusSource(endpoint, kind, on_status)
+        group = self._loop.add_group(source)
+        self._loop.call_soon(lambda: source.begin(group))
+        return lambda: self._loop.remove_group(group)
 
 
-class _Event:
-    """An event of an endpoint, which the loop has announced once when it begins to serve it."""
+class _EventSource:
+    """One kind of event of an endpoint. A group signals a new source once by itself."""
 
-    passes_over = True
+    may_skip = True
 
-    def __init__(self, endpoint: Any, kind: IntEnum, happened: Callable[..., None]) -> None:
+    def __init__(self, endpoint: Any, kind: IntEnum, callback: Callable[..., None]) -> None:
         with endpoint:
             self._event = rclpy_implementation.EventHandle(endpoint, kind)
-        self._happened = happened
+        self._callback = callback
         self.name = kind.name
 
     def attach(self, signal: Signal) -> None:
-        """Have the event announced."""
+        """Signal the event."""
         signal.attach(self._event, EVENT)
 
     def detach(self, signal: Signal) -> None:
-        """End that, and give it back."""
+        """Stop that and release the event."""
         signal.detach(self._event)
         self._event.destroy_when_not_in_use()
 
 
-class _Announced(_Event):
-    """A source of the loop: what is announced has happened."""
+class _CountSource(_EventSource):
+    """Calls back for each signaled event."""
 
-    def __init__(self, endpoint: Any, kind: IntEnum, happened: Callable[[], None]) -> None:
-        super().__init__(endpoint, kind, happened)
+    def __init__(self, endpoint: Any, kind: IntEnum, on_event: Callable[[], None]) -> None:
+        super().__init__(endpoint, kind, on_event)
         self._is_first = True
 
     def take(self) -> bool | None:
-        """Return true for each announcement but the loop's own, which is the first."""
+        """Return true for each signal but the first, which is that of the group."""
         if self._is_first:
             self._is_first = False
             return None
         return True
 
     def call(self, _: bool) -> None:
-        """Tell."""
-        self._happened()
+        """Call back."""
+        self._callback()
 
 
-class _Status(_Event):
-    """A source of the loop: the status of what is announced.
+class _StatusSource(_EventSource):
+    """Calls back with the status of signaled events.
 
-    ``take`` is called once for each announcement. Whatever was announced until a status had been
-    taken may be part of it, and is passed over.
+    ``take`` is called once per signal. Events that were signaled before a status was taken may be
+    part of it, and are skipped.
     """
 
-    def __init__(self, endpoint: Any, kind: IntEnum, happened: Callable[[Any], None]) -> None:
-        super().__init__(endpoint, kind, happened)
-        self._passed_over: float = inf  # so many announcements to come; until it has begun, all
+    def __init__(self, endpoint: Any, kind: IntEnum, on_status: Callable[[Any], None]) -> None:
+        super().__init__(endpoint, kind, on_status)
+        self._to_skip: float = inf  # number of signals to skip; all of them until it begins
 
-    def begin(self, slot: Slot) -> None:
-        """Take the status of what is announced from now on. To be called on the loop."""
-        self._slot = slot
-        self._passed_over = slot.due + self._waiting()
+    def begin(self, group: SourceGroup) -> None:
+        """Take the status of events from now on. Call it on the loop."""
+        self._group = group
+        self._to_skip = group.due + self._count_uncounted()
 
     def take(self) -> Any:
-        """Return the status, or None for what is passed over."""
-        if self._passed_over:
-            self._passed_over -= 1
+        """Return the status, or None for a skipped signal."""
+        if self._to_skip:
+            self._to_skip -= 1
             return None
         status = self._event.take_event()
-        self._passed_over = self._slot.due - 1 + self._waiting()
+        self._to_skip = self._group.due - 1 + self._count_uncounted()
         return status
 
     def call(self, status: Any) -> None:
-        """Tell."""
-        self._happened(status)
+        """Call back with the status."""
+        self._callback(status)
 
-    def _waiting(self) -> int:
-        """Return how many announcements the loop has not counted yet."""
-        signal = self._slot.signal
-        waiting = signal.count()
-        if waiting:
-            signal.announce(waiting)
-        return waiting
+    def _count_uncounted(self) -> int:
+        """Return how many signals the loop has not counted yet."""
+        signal = self._group.signal
+        count = signal.count()
+        if count:
+            signal.write(count)
+        return count

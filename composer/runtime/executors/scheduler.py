@@ -1,64 +1,48 @@
-"""The composer's own scheduler: one thread, no wait set, a cost that does not grow with entities.
+"""The composer's own scheduler: one thread, no wait set, constant cost per event.
 
-rcl announces what is ready (``readiness``); the scheduler goes round what was
-announced, one item each, and never keeps a due timer waiting for more than one callback.
+rcl signals what is ready (``readiness``). The scheduler serves the ready groups round robin, one
+item each, and a due timer never waits for more than one callback.
 """
 
 from __future__ import annotations
 
 import threading
-import traceback
 from collections import deque
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from functools import partial
 from math import inf
 from time import monotonic, sleep
-from typing import Any, TypeVar
 
-from composer.runtime.executors.cross_thread_call import Handover
-from composer.runtime.executors.entity_sources import Source
+from composer.runtime.executors.base_loop import (
+    BUSY_S,
+    PAUSE_AFTER_FAULT_S,
+    YIELD_S,
+    BaseLoop,
+)
+from composer.runtime.executors.entities.source_group import EntitySource, SourceGroup
 from composer.runtime.executors.loop import ExceptionHandler
-from composer.runtime.executors.poller import Poller, wake_in_time
-from composer.runtime.executors.source_group import Slot
-from composer.runtime.executors.stacks import where
-from composer.runtime.executors.tasks import Future, Task, name_of
-from composer.runtime.executors.timer_queue import ScheduledCall, Timetable
+from composer.runtime.executors.poller import Poller, use_precise_wakeups
+from composer.runtime.executors.tasks import name_of
+from composer.runtime.executors.timer_queue import ScheduledCall, TimerQueue
 
-T = TypeVar("T")
-
-#: So long calls, then items of entities, go on before readiness is looked at again.
+#: How long calls, then items of entities, are served before the next poll.
 _ROUND_S = 5e-4
-_LAST_ROUNDS = 64  # of calls that others bring about at the very end
-_PAUSE_AFTER_FAULT_S = 0.01
-#: So long the loop may be busy before it sleeps for a moment. Each look at what is ready lets go of
-#: the interpreter's lock and has it back before a thread that waits for it is awake, who takes that
-#: for a change of hands and asks for none: for seconds he gets no turn.
-BUSY_S = 0.005
-MOMENT_S = 5e-5  # enough to wake up
+_MAX_FINAL_ROUNDS = 64  # of calls that other calls cause at shutdown
 
 
-class Scheduler:
-    """Runs calls, timers, tasks and whatever has a slot. It runs once: start, then stop."""
+class Scheduler(BaseLoop):
+    """Runs calls, timers, tasks and groups of sources. It runs once: start, then stop."""
 
     def __init__(self, name: str, on_exception: ExceptionHandler) -> None:
-        self._name = name
-        self._on_exception = on_exception
+        super().__init__(name, on_exception)
         self._poller = Poller()
-        self._timers = Timetable()
+        self._timers = TimerQueue()
         self._calls: deque[Callable[[], object]] = deque()
-        self._ready: deque[Slot] = deque()  # with something to take
-        self._slots: dict[int, Slot] = {}  # by the file descriptor of their signal
-        self._tasks: set[Task[Any]] = set()
-        self._running: object = None  # a source or a callback, while it is called
+        self._ready: deque[SourceGroup] = deque()  # with something to take
+        self._groups: dict[int, SourceGroup] = {}  # by the file descriptor of their signal
+        self._running: object = None  # the source or callback that is being called
         self._sleeping = False
-        self._stopping = False
-        self._stopped = False
         self._thread = threading.Thread(target=self._spin, name=f"executor {name}", daemon=True)
-
-    @property
-    def name(self) -> str:
-        """The name of the executor in YAML."""
-        return self._name
 
     def call_soon(self, callback: Callable[[], object]) -> None:
         """Call ``callback`` on the loop as soon as it is free."""
@@ -66,60 +50,25 @@ class Scheduler:
         if self._sleeping:
             self._poller.wake()
 
-    def call_later(self, delay_s: float, callback: Callable[[], object]) -> ScheduledCall:
-        """Call ``callback`` once, ``delay_s`` seconds from now."""
-        # Never before now: what is due then is called in one go, whatever else there is to do.
-        return self._schedule(ScheduledCall(monotonic() + max(delay_s, 0.0), None, callback))
-
-    def call_every(self, period_s: float, callback: Callable[[], object]) -> ScheduledCall:
-        """Call ``callback`` each ``period_s`` seconds; a late call does not shift the next.
-
-        Raises ValueError for a period that is not positive.
-        """
-        return self._schedule(ScheduledCall(monotonic() + period_s, period_s, callback))
-
-    def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
-        """Run a coroutine; the future is its outcome. Cancelling the future closes it."""
-        task = Task(coroutine, self.call_soon, self._report, self._tasks.discard)
-        self._tasks.add(task)
-        future = task.start()
-        if self._stopped:
-            task.abandon()
-        return future
-
-    def run(self, function: Callable[[], T], timeout_s: float | None = None) -> T:
-        """Call ``function`` on the loop and wait for it (at once when already there).
-
-        Raises what ``function`` raises, and TimeoutError when it takes longer; it is not begun
-        after that.
-        """
-        if threading.current_thread() is self._thread:
-            return function()
-        handover = Handover(function)
-        self.call_soon(handover.call)
-        if self._stopped and handover.call_off():
-            raise RuntimeError(f"executor '{self._name}' has stopped")
-        return handover.wait(timeout_s, self.where)
-
     def start(self) -> None:
-        """Begin to call, on a thread of the loop's own."""
+        """Start the thread of the loop."""
         self._thread.start()
 
-    def thread_ids(self) -> tuple[int, ...]:
+    def native_thread_ids(self) -> tuple[int, ...]:
         """Return Linux's ids of all threads of the loop, once it was started."""
         return (self._thread.native_id or 0,)
 
     def stop(self, timeout_s: float) -> bool:
-        """End the thread; false when a callback did not return in time.
+        """Stop the thread; return false if a callback did not return in time.
 
-        Tasks are cancelled and get a moment to clean up. Called on the loop itself, this asks for
-        the end and answers false.
+        Tasks are canceled and get a moment to clean up. On the loop itself, this requests the stop
+        and returns false.
         """
         self._stopping = True
-        if threading.current_thread() is self._thread:
+        if self._is_current():
             return False
         if self._thread.ident is None:  # never started
-            self._wind_up()
+            self._shut_down()
             return True
         self._poller.wake()
         self._thread.join(timeout_s)
@@ -129,54 +78,53 @@ class Scheduler:
             task.abandon()
         return False
 
-    def where(self) -> str:
-        """Return the Python stack of the callback that runs now; empty when none does."""
-        return where(self.threads())
-
-    def threads(self) -> tuple[int, ...]:
+    def busy_threads(self) -> tuple[int, ...]:
         """Return the identifiers of the threads that are in a callback now."""
         ident = self._thread.ident
         return () if ident is None or self._running is None else (ident,)
 
-    # --- for those who serve entities
+    def _is_current(self) -> bool:
+        return threading.current_thread() is self._thread
 
-    def open_slot(self, *sources: Source) -> Slot:
-        """Serve ``sources``, announced by one signal. Raises InvalidHandle, RuntimeError."""
-        slot = Slot()
-        self._slots[slot.signal.fd] = slot
-        self._poller.watch(slot.signal.fd)
+    # --- groups of sources
+
+    def add_group(self, *sources: EntitySource) -> SourceGroup:
+        """Serve ``sources`` as one group. Raises InvalidHandle and RuntimeError."""
+        group = SourceGroup()
+        self._groups[group.signal.fd] = group
+        self._poller.register(group.signal.fd)
         try:
             for source in sources:
-                slot.add(source)
+                group.add(source)
         except BaseException:
-            self.close_slot(slot)
+            self.remove_group(group)
             raise
-        return slot
+        return group
 
-    def close_slot(self, slot: Slot) -> None:
-        """Serve the slot's sources no more."""
-        if self._slots.pop(slot.signal.fd, None) is not None:
-            self._poller.forget(slot.signal.fd)
-            slot.close()
+    def remove_group(self, group: SourceGroup) -> None:
+        """Stop serving the group's sources."""
+        if self._groups.pop(group.signal.fd, None) is not None:
+            self._poller.unregister(group.signal.fd)
+            group.close()
 
     # --- the thread
 
     def _spin(self) -> None:
-        wake_in_time()
+        use_precise_wakeups()
         while not self._stopping:
             try:
-                self._take_turns()
-            except BaseException as error:  # between two callbacks: an asynchronous one, or ours
-                self._report(f"executor '{self._name}'", error)
-                sleep(_PAUSE_AFTER_FAULT_S)  # a lasting fault must not fill the log in a second
-                self._ready.clear()  # one may have been on its way
-                self._ready.extend(slot for slot in list(self._slots.values()) if slot.due)
-        self._wind_up()
+                self._serve_until_stopped()
+            except BaseException as error:  # between callbacks: an asynchronous one, or a bug
+                self.report(f"executor '{self._name}'", error)
+                sleep(PAUSE_AFTER_FAULT_S)
+                self._ready.clear()  # one group may have been in neither list
+                self._ready.extend(group for group in list(self._groups.values()) if group.due)
+        self._shut_down()
 
-    def _take_turns(self) -> None:
+    def _serve_until_stopped(self) -> None:
         timers, calls, poller = self._timers, self._calls, self._poller
-        slots, ready = self._slots, self._ready
-        rest_at_s = inf  # not known yet
+        groups, ready = self._groups, self._ready
+        yield_at_s = inf  # not known yet
         while not self._stopping:
             now_s = monotonic()
             if now_s >= timers.next_s:
@@ -184,125 +132,122 @@ class Scheduler:
             if calls:
                 self._run_calls()
             if calls or ready:
-                rest_at_s = _rest(rest_at_s, now_s)
-                announced = poller.ready()
+                yield_at_s = _yield_if_due(yield_at_s, now_s)
+                signaled = poller.poll()
             else:
-                rest_at_s = inf
+                yield_at_s = inf
                 self._sleeping = True
-                # Calls may have been put there while nobody thought us asleep.
-                is_free = not (calls or self._stopping)
-                announced = poller.wait(timers.next_due_s()) if is_free else poller.ready()
+                # Check again: a call may have been added before ``_sleeping`` was set.
+                is_idle = not (calls or self._stopping)
+                signaled = poller.wait(timers.next_due_s()) if is_idle else poller.poll()
                 self._sleeping = False
-            for fd, _ in announced:
-                slot = slots.get(fd)
-                if slot is None:
+            for fd, _ in signaled:
+                group = groups.get(fd)
+                if group is None:
                     continue
                 try:
-                    count = slot.signal.read()
+                    count = group.signal.read()
                 except BlockingIOError:
-                    continue  # it is another slot's by now, and nothing was announced there yet
-                if not slot.due:
-                    ready.append(slot)
-                slot.due += count
+                    continue  # the descriptor belongs to a new group, without events yet
+                if not group.due:
+                    ready.append(group)
+                group.due += count
             if ready:
                 self._serve_round()
 
     def _run_timers(self, now_s: float) -> None:
         timers = self._timers
         while timers.next_s <= now_s:
-            call = timers.take()
+            call = timers.pop()
             try:
                 if not call.cancelled:
                     self._calls.appendleft(call.callback)
-                    self._run_calls()  # what it brings about need not wait until it is put back
+                    self._run_calls()  # calls that it causes run before it is rescheduled
             finally:
-                timers.repeat(call)
+                timers.reschedule(call)
 
     def _run_calls(self) -> None:
         calls, timers = self._calls, self._timers
         until_s = monotonic() + _ROUND_S
-        while True:  # those that calls bring about included
+        while True:  # including calls that calls add
             self._running = callback = calls.popleft()
             try:
                 callback()
             except BaseException as error:
-                self._report(name_of(callback), error)
+                self.report(name_of(callback), error)
             if not calls or (now_s := monotonic()) >= timers.next_s or now_s >= until_s:
                 break
         self._running = None
 
     def _serve_round(self) -> None:
-        # Few functions from here to the handler: after a sleep each is fetched from far away.
+        # Inlined from here to the handler: after a sleep, each further function is a cache miss.
         ready, timers = self._ready, self._timers
         until_s = monotonic() + _ROUND_S
         while True:
-            slot = ready.popleft()
-            brought = 0
-            for source in slot.sources:
+            group = ready.popleft()
+            taken_count = 0
+            for source in group.sources:
                 self._running = source
                 try:
                     taken = source.take()
                 except BaseException as error:
-                    if source in slot.sources:  # not removed meanwhile
-                        self._report(source.name, error)
-                        brought += 1
+                    if source in group.sources:  # not removed meanwhile
+                        self.report(source.name, error)
+                        taken_count += 1
                     continue
                 if taken is None:
                     continue
-                brought += 1
+                taken_count += 1
                 try:
                     source.call(taken)
                 except BaseException as error:
-                    self._report(source.name, error)
+                    self.report(source.name, error)
             self._running = None
-            if brought == slot.due:  # as most often
-                slot.due = 0
+            if taken_count == group.due:  # the usual case
+                group.due = 0
             else:
-                slot.note_round(brought)
-                if slot.due:
-                    ready.append(slot)
+                group.finish_round(taken_count)
+                if group.due:
+                    ready.append(group)
             if not ready or (now_s := monotonic()) >= timers.next_s or now_s >= until_s:
                 break
+
+    def _schedule(self, call: ScheduledCall) -> ScheduledCall:
+        if self._is_current():
+            self._timers.add(call)
+        else:
+            self.call_soon(partial(self._timers.add, call))
+        return call
+
+    def _shut_down(self) -> None:
+        for task in list(self._tasks):
+            task.future.cancel()
+        self._stopped = True
+        for _ in range(_MAX_FINAL_ROUNDS):
+            for _ in range(len(self._calls)):
+                self._call(self._calls.popleft())
+        for task in list(self._tasks):
+            task.close()
+        for group in list(self._groups.values()):
+            self.remove_group(group)
+        self._ready.clear()
 
     def _call(self, callback: Callable[[], object]) -> None:
         self._running = callback
         try:
             callback()
         except BaseException as error:
-            self._report(name_of(callback), error)
+            self.report(name_of(callback), error)
         self._running = None
 
-    def _report(self, what: str, error: BaseException) -> None:
-        try:
-            self._on_exception(what, error)
-        except BaseException:
-            traceback.print_exc()  # the last resort: the handler itself failed
 
-    def _schedule(self, call: ScheduledCall) -> ScheduledCall:
-        if threading.current_thread() is self._thread:
-            self._timers.add(call)
-        else:
-            self.call_soon(partial(self._timers.add, call))
-        return call
+def _yield_if_due(yield_at_s: float, now_s: float) -> float:
+    """Sleep briefly if ``yield_at_s`` has passed; return when to do so next.
 
-    def _wind_up(self) -> None:
-        for task in list(self._tasks):
-            task.future.cancel()
-        self._stopped = True
-        for _ in range(_LAST_ROUNDS):
-            for _ in range(len(self._calls)):
-                self._call(self._calls.popleft())
-        for task in list(self._tasks):
-            task.close()
-        for slot in list(self._slots.values()):
-            self.close_slot(slot)
-        self._ready.clear()
-
-
-def _rest(rest_at_s: float, now_s: float) -> float:
-    """Sleep for a moment if it is time to; return when it will be, which infinity leaves open."""
-    if now_s > rest_at_s:
-        sleep(MOMENT_S)
-    elif rest_at_s != inf:
-        return rest_at_s
+    Infinity starts the time of :data:`BUSY_S`.
+    """
+    if now_s > yield_at_s:
+        sleep(YIELD_S)
+    elif yield_at_s != inf:
+        return yield_at_s
     return now_s + BUSY_S

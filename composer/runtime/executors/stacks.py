@@ -1,8 +1,8 @@
-"""The Python stacks of threads that go on while somebody looks at them.
+"""The Python stacks of running threads, and which of their frames call user code.
 
-Up to Python 3.11 garbage may be collected whenever something is allocated, and what is collected
-may run Python: the threads change in the middle of a look, and the frame that is looked at is gone.
-``sys._current_frames`` may wait for itself then (gh-106883), and reading a frame crash.
+Up to Python 3.11 an allocation may collect garbage, and a finalizer may run Python: other threads
+run while a stack is being read, and its frames may go away. ``sys._current_frames`` may then
+deadlock (gh-106883), and reading a frame may crash. So no garbage is collected meanwhile.
 """
 
 from __future__ import annotations
@@ -11,49 +11,74 @@ import gc
 import sys
 import threading
 import traceback
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from types import FrameType
+from types import CodeType, FrameType
+from typing import Any, TypeVar
 
-_LOOKING = threading.RLock()
+F = TypeVar("F", bound=Callable[..., Any])
+
+#: Code objects of the functions marked by :func:`calls_user_code`, by id: hashing a code object
+#: reads all of it.
+USER_CODE_CALLERS: dict[int, CodeType] = {}
+#: Code objects of the functions marked by :func:`interruptible`, by id.
+INTERRUPTIBLE: dict[int, CodeType] = {}
+
+_READING = threading.RLock()
+
+
+def calls_user_code(function: F) -> F:
+    """Mark a function that calls user code directly.
+
+    Interrupts are raised only in user code. The function must treat every exception of a call,
+    ``BaseException`` included, as a fault of the user code. The mark has no cost per call.
+    """
+    USER_CODE_CALLERS[id(function.__code__)] = function.__code__
+    return function
+
+
+def interruptible(function: F) -> F:
+    """Mark a function of the composer that user code calls and that may be interrupted."""
+    INTERRUPTIBLE[id(function.__code__)] = function.__code__
+    return function
 
 
 @contextmanager
-def undisturbed() -> Iterator[None]:
-    """Collect no garbage meanwhile."""
-    with _LOOKING:
-        collects = gc.isenabled()
+def gc_paused() -> Iterator[None]:
+    """Collect no garbage within the block."""
+    with _READING:
+        was_enabled = gc.isenabled()
         gc.disable()
         try:
             yield
         finally:
-            if collects:
+            if was_enabled:
                 gc.enable()
 
 
 def stacks_of(threads: Iterable[int]) -> dict[int, list[FrameType]]:
     """Return the frames of the threads with these identifiers, the innermost first."""
-    wanted = tuple(threads)
-    if not wanted:
+    idents = tuple(threads)
+    if not idents:
         return {}
-    with undisturbed():
+    with gc_paused():
         current = sys._current_frames()
-        stacks = {ident: list(_outward(current[ident])) for ident in wanted if ident in current}
-        # This very frame is among them: a cycle, which would keep what callbacks hold, large
-        # messages above all, until garbage is collected.
+        stacks = {ident: list(_outward(current[ident])) for ident in idents if ident in current}
+        # This frame is among them: a cycle, which would keep the callbacks' locals, such as large
+        # messages, until the next garbage collection.
         current.clear()
         return stacks
 
 
-def shown(stack: Sequence[FrameType]) -> str:
-    """Return a stack as in a traceback."""
+def format_stack(stack: Sequence[FrameType]) -> str:
+    """Return a stack as text, as in a traceback."""
     lines = traceback.StackSummary.extract((frame, frame.f_lineno) for frame in stack[::-1])
     return "".join(lines.format())
 
 
-def where(threads: Iterable[int]) -> str:
-    """Return the stacks of threads as text; empty when there are none."""
-    return "\n".join(map(shown, stacks_of(threads).values()))
+def format_stacks(threads: Iterable[int]) -> str:
+    """Return the stacks of threads as text; empty if there are none."""
+    return "\n".join(map(format_stack, stacks_of(threads).values()))
 
 
 def _outward(frame: FrameType | None) -> Iterator[FrameType]:

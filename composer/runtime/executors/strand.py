@@ -1,7 +1,7 @@
-"""One callback of a node at a time, whichever threads its loop has.
+"""Strands: run one callback of a node at a time, on a loop with any number of threads.
 
-A loop of one thread gives that by itself; on several threads a node's callbacks take turns here,
-without holding up a thread while they wait.
+A loop of one thread needs no strand. With several threads, a strand queues the callbacks of a node
+without blocking a thread while they wait.
 """
 
 from __future__ import annotations
@@ -12,26 +12,26 @@ from collections.abc import Callable, Coroutine, Generator
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
-from composer.runtime.executors.tasks import Future, awaited_rclpy_future, wrap_future
+from composer.runtime.executors.futures import Future, awaited_rclpy_future, wrap_future
 
 T = TypeVar("T")
 
-#: Does the work for one item; what it returns, if anything, is awaited. Must not raise.
+#: Handles one item; a coroutine that it returns is awaited. Must not raise.
 Work = Callable[[T], "Coroutine[Any, Any, None] | None"]
 
 
 class Strand(Protocol):
-    """Runs the callbacks of one node. Callbacks given to it must not raise."""
+    """Runs the callbacks of one node, which must not raise."""
 
     def post(self, call: Callable[[], object]) -> None:
-        """Run ``call`` now, or when those before it are through."""
+        """Run ``call`` now, or after the calls that were posted before it."""
 
     def wrap(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
-        """Return a coroutine each step of which is a turn of its own."""
+        """Return a coroutine that runs each step of ``coroutine`` on the strand."""
 
 
 class InlineStrand:
-    """The strand of a node whose loop has one thread, and of ports that may overlap."""
+    """The strand of a node whose loop has one thread, and of reentrant ports."""
 
     def post(self, call: Callable[[], object]) -> None:
         """Run ``call`` now."""
@@ -48,45 +48,45 @@ class SerialStrand:
     def __init__(self, call_soon: Callable[[Callable[[], object]], None]) -> None:
         self._call_soon = call_soon
         self._lock = threading.Lock()
-        self._taken = False
-        # A waiting coroutine is a future: finishing it hands the turn over.
+        self._is_held = False
+        # A waiting coroutine is a future: setting its result hands the strand over.
         self._queue: deque[Callable[[], object] | Future[None]] = deque()
 
     def post(self, call: Callable[[], object]) -> None:
-        """Run ``call`` now, or when those before it are through."""
+        """Run ``call`` now, or after the calls that were posted before it."""
         with self._lock:
-            if self._taken:
+            if self._is_held:
                 self._queue.append(call)
                 return
-            self._taken = True
+            self._is_held = True
         self._run(call)
 
     def wrap(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
-        """Return a coroutine each step of which is a turn of its own."""
+        """Return a coroutine that runs each step of ``coroutine`` on the strand."""
         return in_steps(self, coroutine)
 
     def enter(self) -> Future[None] | None:
-        """Take the turn; where it is taken, return the future that will give it."""
+        """Acquire the strand; if it is held, return a future that is done once it is acquired."""
         with self._lock:
-            if self._taken:
-                turn: Future[None] = Future()
-                self._queue.append(turn)
-                return turn
-            self._taken = True
+            if self._is_held:
+                acquired: Future[None] = Future()
+                self._queue.append(acquired)
+                return acquired
+            self._is_held = True
             return None
 
     def leave(self) -> None:
-        """Give the turn to whoever is next."""
+        """Release the strand to the next in the queue."""
         while True:
             with self._lock:
                 if not self._queue:
-                    self._taken = False
+                    self._is_held = False
                     return
                 following = self._queue.popleft()
             if isinstance(following, Future):
                 if following.set_result(None):
                     return
-                continue  # it gave up waiting
+                continue  # canceled while it waited
             self._call_soon(partial(self._run, following))
             return
 
@@ -97,32 +97,32 @@ class SerialStrand:
             self.leave()
 
 
-class Around(Protocol):
-    """What is done before and after each step of a coroutine."""
+class StepScope(Protocol):
+    """Called before and after each step of a coroutine."""
 
     def enter(self) -> Future[None] | None:
-        """Begin a step, or return the future that is done when it may begin."""
+        """Begin a step, or return a future that is done when the step may begin."""
 
     def leave(self) -> None:
         """End the step."""
 
 
-def in_steps(around: Around, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
-    """Return what drives ``coroutine`` step by step, from one wait to the next."""
-    return _InSteps(around, coroutine)
+def in_steps(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
+    """Return a coroutine that runs each step of ``coroutine``, up to its next wait, in scope."""
+    return _InSteps(scope, coroutine)
 
 
 class _InSteps(Coroutine[Any, Any, T]):
-    """Ended before it has begun, it ends the coroutine that it drives as well.
+    """Closes the inner coroutine too if it is closed before it has begun.
 
-    That would be garbage, and Python's complaint that it was never awaited.
+    Otherwise Python would warn that the inner coroutine was never awaited.
     """
 
-    __slots__ = ("_driven", "_steps")
+    __slots__ = ("_inner", "_steps")
 
-    def __init__(self, around: Around, driven: Coroutine[Any, Any, T]) -> None:
-        self._driven = driven
-        self._steps = _steps(around, driven)
+    def __init__(self, scope: StepScope, inner: Coroutine[Any, Any, T]) -> None:
+        self._inner = inner
+        self._steps = _steps(scope, inner)
 
     def __await__(self) -> Generator[Any, Any, T]:
         return self._steps
@@ -134,27 +134,27 @@ class _InSteps(Coroutine[Any, Any, T]):
         try:
             return self._steps.throw(*raised)
         except BaseException:
-            self._driven.close()
+            self._inner.close()
             raise
 
     def close(self) -> None:
         self._steps.close()
-        self._driven.close()
+        self._inner.close()
 
 
-def _steps(around: Around, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
+def _steps(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
     raised: BaseException | None = None
     try:
         while True:
-            yield from _entered(around)
+            yield from _enter(scope)
             try:
                 yielded = coroutine.send(None) if raised is None else coroutine.throw(raised)
             except StopIteration as stop:
                 return stop.value  # type: ignore[no-any-return]
             finally:
-                around.leave()
+                scope.leave()
             raised = None
-            # rclpy's futures yield nothing and want to be polled: wait for them instead.
+            # rclpy's futures yield None and expect to be polled: await them instead.
             foreign = awaited_rclpy_future(coroutine) if yielded is None else None
             try:
                 yield yielded if foreign is None else wrap_future(foreign)
@@ -166,13 +166,13 @@ def _steps(around: Around, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, 
         coroutine.close()
 
 
-def _entered(around: Around) -> Generator[Any, Any, None]:
-    turn = around.enter()
-    if turn is None:
+def _enter(scope: StepScope) -> Generator[Any, Any, None]:
+    entered = scope.enter()
+    if entered is None:
         return
     try:
-        yield from turn.__await__()
+        yield from entered.__await__()
     except BaseException:
-        if not turn.cancel():  # the turn had come already
-            around.leave()
+        if not entered.cancel():  # it was entered already
+            scope.leave()
         raise

@@ -1,4 +1,4 @@
-"""Calls at a time of the steady clock."""
+"""Calls scheduled at times of the steady clock."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from collections.abc import Callable
 from math import floor, inf, isnan
 from time import monotonic
 
-_MANY = 64  # cancelled calls that may linger before they are swept out
+_SWEEP_SIZE = 64  # entries at which canceled calls are removed
 
 
 class ScheduledCall:
-    """A call that is due at ``due_s``, and each ``period_s`` after that where there is one."""
+    """A call that is due at ``due_s``, and each ``period_s`` seconds after that if it has one."""
 
     __slots__ = ("callback", "cancelled", "due_s", "period_s")
 
     def __init__(
         self, due_s: float, period_s: float | None, callback: Callable[[], object]
     ) -> None:
-        """Raise ValueError for a period that is not positive and a time that is no number."""
+        """Raise ValueError for a period that is not positive and a time that is NaN."""
         if period_s is not None and not period_s > 0:
             raise ValueError(f"a period must be positive, not {period_s:g} s")
         if isnan(due_s):
@@ -39,36 +39,36 @@ class ScheduledCall:
         self.cancelled = True
 
 
-class Timetable:
-    """Scheduled calls. To be used by one thread.
+class TimerQueue:
+    """Scheduled calls, for use by one thread.
 
-    A sorted list, the next call last, and no heap: to take that one out and, where there are few,
-    to put it back is no search then, and a call has to be put back each time it was made.
+    A sorted list with the next call last, not a heap: taking that call and, if there are few,
+    inserting it again needs no search. A periodic call is inserted again each time.
     """
 
     def __init__(self) -> None:
-        self._entries: list[tuple[float, int, ScheduledCall]] = []  # -due_s, -place, call
-        self._places = itertools.count(0, -1)  # calls due at the same time keep their order
-        self._sweep_at = _MANY
-        self.next_s = inf  # nothing is due before; a cancelled call may still count here
+        self._entries: list[tuple[float, int, ScheduledCall]] = []  # ascending: -due_s, -order
+        self._order = itertools.count(0, -1)  # calls due at the same time keep their order
+        self._sweep_at = _SWEEP_SIZE
+        self.next_s = inf  # no call is due before; possibly that of a canceled call
 
     def add(self, call: ScheduledCall) -> None:
-        """Put a call in its place."""
+        """Add a call."""
         self._insert(call)
         self.next_s = min(self.next_s, call.due_s)
 
     def next_due_s(self) -> float:
-        """Return when the next call is due; infinity when there is none."""
+        """Return when the next call is due; infinity if there is none."""
         entries = self._entries
         while entries and entries[-1][2].cancelled:
             entries.pop()
         self.next_s = -entries[-1][0] if entries else inf
         return self.next_s
 
-    def take(self) -> ScheduledCall:
-        """Take the next call out, a cancelled one as well. Raises IndexError when there is none.
+    def pop(self) -> ScheduledCall:
+        """Remove and return the next call, even a canceled one. Raises IndexError if empty.
 
-        ``next_s`` has regard to when a periodic one is due again, until it is put back.
+        Until :meth:`reschedule`, ``next_s`` includes the next time of a periodic call.
         """
         entries = self._entries
         call = entries.pop()[2]
@@ -77,10 +77,10 @@ class Timetable:
             self.next_s = -entries[-1][0]
         return call
 
-    def repeat(self, call: ScheduledCall) -> None:
-        """Put a periodic call back for its next multiple of the period that is still to come.
+    def reschedule(self, call: ScheduledCall) -> None:
+        """Add a periodic call again for the next multiple of its period in the future.
 
-        A late call does not shift the next one; periods missed altogether are skipped.
+        A late call does not shift the next one; missed periods are skipped.
         """
         period_s = call.period_s
         if period_s != inf and not call.cancelled:
@@ -97,7 +97,7 @@ class Timetable:
         entries = self._entries
         if len(entries) >= self._sweep_at:
             self._sweep()
-        entry = (-call.due_s, next(self._places), call)
+        entry = (-call.due_s, next(self._order), call)
         if not entries or entries[-1] < entry:
             entries.append(entry)
         else:
@@ -105,4 +105,4 @@ class Timetable:
 
     def _sweep(self) -> None:
         self._entries[:] = [entry for entry in self._entries if not entry[2].cancelled]
-        self._sweep_at = max(_MANY, 2 * len(self._entries))
+        self._sweep_at = max(_SWEEP_SIZE, 2 * len(self._entries))

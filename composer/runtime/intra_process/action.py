@@ -1,7 +1,7 @@
-"""An action server as the clients of its own process see it.
+"""An action server as clients of the same process see it.
 
-A goal of theirs is one of rclpy's server like any other: outsiders see its status, hear its
-feedback and may cancel it. Only what its client is told comes straight.
+Their goals are goals of rclpy's server like any other: external nodes see their status, receive
+their feedback and may cancel them. Only what the client itself receives bypasses DDS.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from rclpy.action.server import ActionServer
 from unique_identifier_msgs.msg import UUID
 
 from composer.model import Isolation, Port
-from composer.runtime.executors import actions
-from composer.runtime.executors.tasks import Future
+from composer.runtime.executors.entities import actions
+from composer.runtime.executors.futures import Future
 from composer.runtime.intra_process.copying import copy_of
 
 Spawn = Callable[[Coroutine[Any, Any, Any]], Future[Any]]
@@ -24,90 +24,90 @@ OnFeedback = Callable[[Any], None]
 
 
 class LocalActionServer:
-    """Takes goals and cancellations to the server's loop, and brings back what becomes of them."""
+    """Passes goals and cancel requests to the server's loop, and feedback and results back."""
 
     def __init__(self, port: Port, server: ActionServer, spawn: Spawn) -> None:
-        """``spawn`` runs a coroutine on the loop of the server."""
+        """``spawn`` runs a coroutine on the server's loop."""
         self._server = server
         self._spawn = spawn
-        self._passed: Callable[[Any], Any] = _as_it_is
+        self._passed: Callable[[Any], Any] = _itself
         if port.isolation is Isolation.COPY:
             self._passed = copy_of
         self._listeners: dict[bytes, OnFeedback] = {}
 
     def send_goal(self, goal: Any, on_feedback: OnFeedback) -> Future[LocalGoal]:
-        """Send a goal, from any thread; the future is its handle, accepted or not.
+        """Send a goal, from any thread; return the future of its handle, accepted or not.
 
         ``on_feedback`` is called on the server's loop.
         """
         goal_id = UUID(uuid=list(uuid4().bytes))
         handle = LocalGoal(goal_id, self)
-        answer: Future[LocalGoal] = Future()
-        self._spawn(self._take_goal(handle, self._passed(goal), on_feedback, answer))
-        return answer
+        sent: Future[LocalGoal] = Future()
+        self._spawn(self._on_goal(handle, self._passed(goal), on_feedback, sent))
+        return sent
 
-    def give_feedback(self, goal_id: bytes, feedback: Any) -> None:
-        """Tell the client of the process whose goal it is, if it is one's."""
+    def publish_feedback(self, goal_id: bytes, feedback: Any) -> None:
+        """Pass feedback to the client of this process that has sent the goal, if any."""
         listener = self._listeners.get(goal_id)
         if listener is not None:
             listener(self._passed(feedback))
 
     def result(self, handle: LocalGoal) -> Future[Any]:
-        """Return the future result, with its status, as by DDS."""
-        answer: Future[Any] = Future()
-        self._spawn(self._take_result_request(handle, answer))
-        return answer
+        """Return the future of the result response, as by DDS."""
+        response: Future[Any] = Future()
+        self._spawn(self._on_result_request(handle, response))
+        return response
 
     def cancel(self, handle: LocalGoal) -> Future[Any]:
-        """Ask for the goal's end; the future is the response to a cancellation, as by DDS."""
-        answer: Future[Any] = Future()
-        self._spawn(self._take_cancellation(handle, answer))
-        return answer
+        """Request cancellation; return the future of the cancel response, as by DDS."""
+        response: Future[Any] = Future()
+        self._spawn(self._on_cancel_request(handle, response))
+        return response
 
-    async def _take_goal(
-        self, handle: LocalGoal, goal: Any, on_feedback: OnFeedback, answer: Future[LocalGoal]
+    async def _on_goal(
+        self, handle: LocalGoal, goal: Any, on_feedback: OnFeedback, sent: Future[LocalGoal]
     ) -> None:
         identity = bytes(handle.goal_id.uuid)
         self._listeners[identity] = on_feedback
 
-        def tell(accepted: bool) -> None:
+        def respond(accepted: bool) -> None:
             if not accepted:
                 del self._listeners[identity]
             handle.accepted = accepted
-            answer.set_result(handle)
+            sent.set_result(handle)
 
-        await actions.take_goal(self._server, handle.goal_id, goal, tell)
+        await actions.execute_goal_request(self._server, handle.goal_id, goal, respond)
 
-    async def _take_result_request(self, handle: LocalGoal, answer: Future[Any]) -> None:
+    async def _on_result_request(self, handle: LocalGoal, response: Future[Any]) -> None:
         identity = bytes(handle.goal_id.uuid)
 
-        def end(response: Any) -> None:
+        def respond(result: Any) -> None:
             self._listeners.pop(identity, None)
-            response.result = self._passed(response.result)
-            answer.set_result(response)
+            result.result = self._passed(result.result)
+            response.set_result(result)
 
-        actions.when_ended(self._server, identity, end)
+        actions.add_result_callback(self._server, identity, respond)
 
-    async def _take_cancellation(self, handle: LocalGoal, answer: Future[Any]) -> None:
-        answer.set_result(await actions.cancel_goal(self._server, handle.goal_id))
+    async def _on_cancel_request(self, handle: LocalGoal, response: Future[Any]) -> None:
+        response.set_result(await actions.execute_cancel_request(self._server, handle.goal_id))
 
 
 @dataclass(slots=True, eq=False)
 class LocalGoal:
-    """A goal as its sender holds it; the part of ``rclpy.action.client.ClientGoalHandle`` used."""
+    """A goal as its client holds it: what is used of ``rclpy.action.client.ClientGoalHandle``."""
 
     goal_id: UUID
     server: LocalActionServer
     accepted: bool = False
 
     def get_result_async(self) -> Future[Any]:
-        """Return the future result."""
+        """Return the future of the result."""
         return self.server.result(self)
 
     def cancel_goal_async(self) -> Future[Any]:
-        """Ask for the end of it."""
+        """Request cancellation."""
         return self.server.cancel(self)
 
 
-def _as_it_is(value: Any) -> Any:
+def _itself(value: Any) -> Any:
     return value

@@ -1,7 +1,7 @@
-"""Copies of messages, as deep as these are.
+"""Deep copies of messages.
 
-Several times as quick as ``copy.deepcopy``: nothing in a message refers to itself, and what is of
-numbers is copied at once.
+Several times faster than ``copy.deepcopy``: a message has no cycles, and arrays of numbers are
+copied as a whole.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from typing import Any
 
 from numpy import ndarray
 
-_WHOLE = frozenset({int, float, bool, str, bytes})
+_IMMUTABLE = frozenset({int, float, bool, str, bytes})
 _COPIES: dict[type, Callable[[Any], Any]] = {array: lambda value: value[:], ndarray: ndarray.copy}
 
 
 def copy_of(message: Any) -> Any:
-    """Return a message that shares nothing that can be changed with ``message``."""
+    """Return a copy that shares nothing mutable with ``message``."""
     kind = type(message)
     copy: Any = object.__new__(kind)
     for slot in kind.__slots__:
@@ -28,13 +28,13 @@ def copy_of(message: Any) -> Any:
 
 def _copy_of_value(value: Any) -> Any:
     kind = type(value)
-    if kind in _WHOLE:
+    if kind in _IMMUTABLE:
         return value
     if kind in _COPIES:
         return _COPIES[kind](value)
     if kind is list:
-        of_whole = value and type(value[0]) in _WHOLE
-        return value[:] if of_whole else [_copy_of_value(item) for item in value]
+        of_immutable = value and type(value[0]) in _IMMUTABLE
+        return value[:] if of_immutable else [_copy_of_value(item) for item in value]
     if hasattr(kind, "get_fields_and_field_types"):
         return copy_of(value)
-    return deepcopy(value)  # what somebody has put there
+    return deepcopy(value)  # assigned by user code; no type of ROS

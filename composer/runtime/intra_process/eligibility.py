@@ -1,4 +1,4 @@
-"""Which topics, services and actions stay in the process: decided once, from the model alone."""
+"""Which topics, services and actions stay in the process: decided from the model alone."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from composer.model import Channel, ChannelKind, Delivery, Port, System, channel
 from composer.qos import Liveliness, QosProfile, incompatibilities
 from composer.runtime.ros.manager_protocol import CALLBACKS_TOPIC, NAME, STATE_TOPIC
 
-#: What the runtime and rclpy publish themselves, not through ports.
+#: Topics that the runtime and rclpy publish themselves, not through ports.
 _NOT_BY_PORTS = frozenset({"/rosout", "/parameter_events", "/diagnostics"})
 _ENDINGS_NOT_BY_PORTS = (
     "/transition_event",
@@ -18,54 +18,54 @@ _ENDINGS_NOT_BY_PORTS = (
 )
 
 
-#: What ports meet on.
+#: A topic, service or action by kind and full name.
 ChannelKey: TypeAlias = tuple[ChannelKind, str]
 
 
 def channel_of(port: Port) -> ChannelKey:
-    """Return what the port meets others on."""
+    """Return the channel of the port."""
     return port.kind.channel, port.full_name
 
 
 def shared_channels(system: System) -> Mapping[ChannelKey, str | None]:
-    """Return what has ports at both ends, and why DDS has to do, where it has to.
+    """Return the channels with local ports at both endpoints, each with the reason it needs DDS.
 
-    A subscription ignores all of its process's DDS publications or none, so what one port of a
-    topic cannot do, the topic does not do.
+    The reason is None for channels that stay in the process. A subscription ignores either all or
+    none of the publications of its process, so one port that needs DDS decides for the topic.
     """
     return {
-        (channel.kind, channel.name): _objection(channel, system.delivery)
+        (channel.kind, channel.name): _dds_reason(channel, system.delivery)
         for channel in channels(system.nodes)
         if channel.sources and channel.sinks
     }
 
 
-def _objection(channel: Channel, unless_said: Delivery) -> str | None:
-    if any((end.port.delivery or unless_said) is Delivery.DDS for end in channel.ends):
-        return "'delivery: dds' says so"
+def _dds_reason(channel: Channel, default: Delivery) -> str | None:
+    if any((end.port.delivery or default) is Delivery.DDS for end in channel.ends):
+        return "'delivery: dds' is set"
     if channel.kind is ChannelKind.TOPIC:
-        return _objection_to_topic(channel)
-    return _objection_to_server(channel)
+        return _topic_reason(channel)
+    return _server_reason(channel)
 
 
-def _objection_to_server(channel: Channel) -> str | None:
+def _server_reason(channel: Channel) -> str | None:
     if len(channel.sources) > 1:
         return "it has several servers"
     server = channel.sources[0].port
     for client in (sink.port for sink in channel.sinks):
         if client.interface.value != server.interface.value:
-            return "its ends have different types"
-        ends = client.qos.profile, server.qos.profile
-        if incompatibilities(*ends) or incompatibilities(*reversed(ends)):
-            return "the QoS of its ends keeps them apart"
+            return "its endpoints have different types"
+        profiles = client.qos.profile, server.qos.profile
+        if incompatibilities(*profiles) or incompatibilities(*reversed(profiles)):
+            return "its endpoints have incompatible QoS"
     return None
 
 
-def _objection_to_topic(channel: Channel) -> str | None:
+def _topic_reason(channel: Channel) -> str | None:
     if channel.name in _NOT_BY_PORTS or channel.name.endswith(_ENDINGS_NOT_BY_PORTS):
-        return "not only ports publish it"
+        return "the runtime publishes it too"
     if _is_timed(end.port.qos.profile for end in channel.ends):
-        return "its QoS has a deadline, a lifespan or a liveliness that the middleware watches"
+        return "its QoS has a deadline, lifespan or liveliness, which only the middleware monitors"
     return None
 
 

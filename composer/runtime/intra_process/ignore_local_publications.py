@@ -1,9 +1,8 @@
-"""Keeps what this process publishes from coming back to its own subscriptions by DDS.
+"""Keeps the publications of this process from reaching its own subscriptions by DDS.
 
-rmw knows ``ignore_local_publications``, rclpy has no word for it. The flag is set where rmw looks
-at it for each message: in the options of ``rmw_subscription_t``. Where its fields lie is an
-assumption about ROS 2 Jazzy's ABI, so it is tried once per process, with real endpoints, before
-anything relies on it.
+rmw has ``ignore_local_publications``; rclpy does not expose it. The flag is set where rmw reads it
+for each message: in the options of ``rmw_subscription_t``. The offsets are an assumption about the
+ABI of ROS 2 Jazzy, so a self-test with real endpoints runs once per process before it is used.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import Empty
 
 _MIDDLEWARES = ("rmw_fastrtps_cpp", "rmw_fastrtps_dynamic_cpp")
-_PATIENCE_S = 1.0
-_LOOK_EVERY_S = 0.0005
-_TRIAL = "_compose_trial"
+_TIMEOUT_S = 1.0
+_POLL_PERIOD_S = 0.0005
+_TEST_NODE = "_compose_trial"
 
 
 class _Options(ctypes.Structure):
@@ -51,8 +50,8 @@ class _Subscription(ctypes.Structure):
     )
 
 
-class NotIgnored(Exception):
-    """Own publications cannot be kept from coming back; the text says why."""
+class NotSupported(Exception):
+    """Local publications cannot be ignored; the text is the reason."""
 
 
 _RCL = ctypes.CDLL("librcl.so")
@@ -60,70 +59,70 @@ _RCL.rcl_subscription_get_rmw_handle.restype = ctypes.c_void_p
 _RCL.rcl_subscription_get_rmw_handle.argtypes = (ctypes.c_void_p,)
 
 
-def ignore_own_publications(subscription: Subscription) -> None:
-    """Have ``subscription`` take nothing that was published in this process. Raises NotIgnored."""
+def ignore_local(subscription: Subscription) -> None:
+    """Make ``subscription`` ignore the publications of this process. Raises NotSupported."""
     with subscription.handle:
         address = _RCL.rcl_subscription_get_rmw_handle(subscription.handle.pointer)
         if not address:
-            raise NotIgnored("rcl gives no rmw handle")
-        inside = _Subscription.from_address(address)
-        topic = inside.topic_name.decode()
+            raise NotSupported("rcl has no rmw handle of the subscription")
+        rmw_subscription = _Subscription.from_address(address)
+        topic = rmw_subscription.topic_name.decode()
         if topic != subscription.topic_name:
-            raise NotIgnored(f"rmw's subscription of '{subscription.topic_name}' has '{topic}'")
-        inside.options.ignore_local_publications = True
+            raise NotSupported(f"rmw's subscription of '{subscription.topic_name}' has '{topic}'")
+        rmw_subscription.options.ignore_local_publications = True
 
 
 @cache
-def why_not_ignored(context: Context | None = None) -> str | None:
-    """Try it, once per process. Return why it does not work here, or None when it does.
+def unsupported_reason(context: Context | None = None) -> str | None:
+    """Run the self-test, once per process; return why it fails, or None if it passes.
 
-    ``context`` is the one of rclpy's that is tried with, its default unless given.
+    ``context`` is rclpy's context for the test, by default the default one.
     """
     middleware = get_rmw_implementation_identifier()
     if middleware not in _MIDDLEWARES:
-        return f"nothing is known of {middleware}"
+        return f"{middleware} is not supported"
     node = Node(
-        _TRIAL,
+        _TEST_NODE,
         context=context,
         enable_rosout=False,
         start_parameter_services=False,
         use_global_arguments=False,
     )
     try:
-        _try_with(node)
-    except NotIgnored as error:
+        _self_test(node)
+    except NotSupported as error:
         return str(error)
     finally:
         node.destroy_node()
     return None
 
 
-def _try_with(node: Node) -> None:
-    """Publish to two subscriptions, one of which ignores it. Raises NotIgnored."""
+def _self_test(node: Node) -> None:
+    """Publish to two subscriptions, one of which ignores it. Raises NotSupported."""
     profile = QoSProfile(depth=2, reliability=ReliabilityPolicy.RELIABLE)
-    topic = f"{_TRIAL}/t{uuid4().hex}"
+    topic = f"{_TEST_NODE}/t{uuid4().hex}"
     ignoring = node.create_subscription(Empty, topic, lambda _: None, profile)
     publisher = node.create_publisher(Empty, topic, profile)
-    hearing = node.create_subscription(Empty, topic, lambda _: None, profile)
-    # Outsiders are counted by what has matched: own subscriptions have to be in there at once.
+    receiving = node.create_subscription(Empty, topic, lambda _: None, profile)
+    # External subscriptions are counted as matches minus local ones: those must match at once.
     matched = publisher.get_subscription_count()
     if matched != 2:
-        raise NotIgnored(f"{matched} of 2 subscriptions of the process have matched at once")
+        raise NotSupported(f"{matched} of 2 subscriptions of the process matched at once")
     publisher.publish(Empty())
-    if not (_comes(ignoring) and _comes(hearing)):
-        raise NotIgnored("a publication of the process does not come back anyway")
-    ignore_own_publications(ignoring)
+    if not (_receives(ignoring) and _receives(receiving)):
+        raise NotSupported("local publications are not received by default")
+    ignore_local(ignoring)
     publisher.publish(Empty())
-    if not _comes(hearing):
-        raise NotIgnored("a subscription that ignores nothing hears nothing")
+    if not _receives(receiving):
+        raise NotSupported("a subscription without the flag received nothing")
     if _take(ignoring):
-        raise NotIgnored("a publication of the process came back")
+        raise NotSupported("a local publication was received despite the flag")
 
 
-def _comes(subscription: Subscription) -> bool:
-    until_s = time.monotonic() + _PATIENCE_S
+def _receives(subscription: Subscription) -> bool:
+    until_s = time.monotonic() + _TIMEOUT_S
     while not (taken := _take(subscription)) and time.monotonic() < until_s:
-        time.sleep(_LOOK_EVERY_S)
+        time.sleep(_POLL_PERIOD_S)
     return taken
 
 

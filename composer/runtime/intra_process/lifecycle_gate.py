@@ -1,72 +1,132 @@
-"""What a node may do right now, as its lifecycle state allows."""
+"""What a node may do in its lifecycle state, and the futures that it waits for meanwhile."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import inf
+from time import monotonic
+from typing import Any, TypeVar
+
 from composer.behavior import CallCancelled
-from composer.runtime.intra_process.pending import Pending
+from composer.runtime.executors.futures import Future
+
+T = TypeVar("T")
+
+CallLater = Callable[[float, Callable[[], object]], object]
 
 
-class Gate:
-    """Three doors of one node, and what waits for something to come back through them.
+class PendingFutures:
+    """Futures that a node waits for, each with a deadline, all on one timer.
 
-    ``incoming`` is open in *active* alone: messages, requests, goals and timers get in.
-    ``outgoing`` is open from the start of *activating* to the end of *deactivating*, so that a
-    node may say a first and a last word: publish, call, send goals. ``waiting`` is open as well
-    while any other transition is on its way: a lifecycle handler may sleep.
+    Nearly every call is answered long before its deadline: a timer per call would cost more than
+    the call. Methods may be called from any thread.
+    """
+
+    __slots__ = ("_call_later", "_discard", "_futures", "_next_check_s")
+
+    def __init__(self, call_later: CallLater) -> None:
+        self._call_later = call_later
+        self._futures: dict[Future[Any], tuple[float, Callable[[], BaseException]]] = {}
+        self._discard: Callable[[Future[Any]], object] = lambda done: self._futures.pop(done, None)
+        self._next_check_s = inf  # the timer fires no later
+
+    def add(
+        self,
+        future: Future[T],
+        until_s: float = inf,
+        timeout_error: Callable[[], BaseException] = TimeoutError,
+    ) -> Future[T]:
+        """Fail ``future`` with ``timeout_error()`` unless it is done by ``until_s``; return it.
+
+        ``until_s`` is a time of ``time.monotonic()``.
+        """
+        self._futures[future] = until_s, timeout_error
+        future.add_done_callback(self._discard)
+        if until_s < self._next_check_s:
+            self._check_at(until_s)
+        return future
+
+    def fail_all(self, reason: Callable[[], BaseException]) -> None:
+        """Fail every pending future with ``reason()``."""
+        for future in self._futures.copy():
+            future.set_exception(reason())
+
+    def _check_at(self, when_s: float) -> None:
+        self._next_check_s = when_s
+        self._call_later(when_s - monotonic(), self._check)
+
+    def _check(self) -> None:
+        self._next_check_s = inf
+        now_s = monotonic()
+        for future, (until_s, timeout_error) in self._futures.copy().items():
+            if until_s <= now_s:
+                future.set_exception(timeout_error())
+        next_s = min((until_s for until_s, _ in self._futures.copy().values()), default=inf)
+        if next_s < self._next_check_s:
+            self._check_at(next_s)
+
+
+class LifecycleGate:
+    """Three flags that say what a node may do, and the futures that end with them.
+
+    ``incoming`` is true only in *active*: messages, requests, goals and timer calls are handled.
+    ``outgoing`` is true from the start of *activating* to the end of *deactivating*, so lifecycle
+    handlers may publish, call and send goals. ``waiting`` is also true during any other
+    transition: a lifecycle handler may sleep.
     """
 
     __slots__ = (
-        "_had_outgoing",
         "_node",
+        "_unblocked_outgoing",
+        "generation",
         "incoming",
         "outgoing",
         "pending",
-        "period",
         "state",
         "waiting",
     )
 
-    def __init__(self, node: str, pending: Pending) -> None:
-        """``pending`` is what somebody waits for: it ends when the node leaves *active*."""
+    def __init__(self, node: str, pending: PendingFutures) -> None:
+        """``pending`` holds the futures that fail when the node leaves *active*."""
         self._node = node
-        self._had_outgoing: bool | None = None  # before it was hushed
+        self._unblocked_outgoing: bool | None = None  # None unless blocked
         self.pending = pending
         self.incoming = False
         self.outgoing = False
         self.waiting = False
         self.state = "unconfigured"
-        self.period = 0  # counts how often what waits was ended
+        self.generation = 0  # how often the pending futures were canceled
 
     @property
     def refusal(self) -> str:
-        """Why nothing gets through now."""
-        if self._had_outgoing is not None:
+        """Why nothing passes now."""
+        if self._unblocked_outgoing is not None:
             return f"{self._node} has failed"
         return f"{self._node} is {self.state}, not active"
 
-    def hush(self) -> None:
-        """Let nothing through until the next transition, from any thread: the node hangs."""
-        self._had_outgoing = self.outgoing
+    def block(self) -> None:
+        """Let nothing pass until the next transition: the node has failed. From any thread."""
+        self._unblocked_outgoing = self.outgoing
         self.incoming = self.outgoing = False
 
-    def end_hush(self) -> None:
-        """Let out again what was let out before, for a last word; nothing comes in."""
-        if self._had_outgoing is not None:
-            self.outgoing = self._had_outgoing
-            self._had_outgoing = None
+    def unblock_outgoing(self) -> None:
+        """Restore ``outgoing`` for the handlers of the next transition; nothing comes in."""
+        if self._unblocked_outgoing is not None:
+            self.outgoing = self._unblocked_outgoing
+            self._unblocked_outgoing = None
 
     def open(self) -> None:
-        """Open every door."""
-        self._had_outgoing = None
+        """Let everything pass."""
+        self._unblocked_outgoing = None
         self.incoming = self.outgoing = self.waiting = True
 
     def close(self) -> None:
-        """Shut every door and end what waits."""
-        self._had_outgoing = None
+        """Let nothing pass and cancel the pending futures."""
+        self._unblocked_outgoing = None
         self.incoming = self.outgoing = self.waiting = False
-        self.end_pending()
+        self.cancel_pending()
 
-    def end_pending(self) -> None:
-        """End all calls, goals and sleeps that somebody in the node waits for."""
-        self.period += 1
-        self.pending.end(lambda: CallCancelled(self.refusal))
+    def cancel_pending(self) -> None:
+        """Fail all calls, goals and sleeps that the node waits for with CallCancelled."""
+        self.generation += 1
+        self.pending.fail_all(lambda: CallCancelled(self.refusal))

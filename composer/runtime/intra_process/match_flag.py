@@ -1,8 +1,9 @@
-"""A byte that the middleware zeroes when something has changed: looking costs next to nothing.
+"""A byte that the middleware zeroes when a match changes, so that publishers can poll it.
 
-As with ``readiness``, what rcl calls back may not be Python. Here it is libc's
-``bzero``, whose two arguments (an address, a count) travel as those of ``void (*)(const void *
-user_data, size_t count)`` do. It zeroes ``count`` bytes, for which there has to be room.
+As in ``readiness``, rcl must not call Python on the middleware's threads. The callback handed to
+rcl is libc's ``bzero``, whose two arguments (an address, a count) have the calling convention of
+``void (*)(const void * user_data, size_t count)``. It zeroes ``count`` bytes, so the buffer has
+room for as many events as can be reported together.
 """
 
 from __future__ import annotations
@@ -14,51 +15,51 @@ from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.publisher import Publisher
 
-from composer.runtime.executors.readiness import EVENT
+from composer.runtime.executors.entities.readiness import EVENT
 
-_ROOM = 1 << 20  # more than events can come together; Linux gives memory when it is used
+_SIZE = 1 << 20  # more events than can be reported together; Linux commits pages on first use
 
-#: The first byte is zero when a subscription has matched a publisher of this process, or left it.
-MARK: Final = bytearray(_ROOM)
+#: The first byte is zero once a subscription has matched or unmatched a publisher of this process.
+MATCH_FLAG: Final = bytearray(_SIZE)
 
-_ADDRESS = ctypes.addressof(ctypes.c_char.from_buffer(MARK))
+_ADDRESS = ctypes.addressof(ctypes.c_char.from_buffer(MATCH_FLAG))
 _ZERO = ctypes.cast(ctypes.CDLL(None).bzero, ctypes.c_void_p)
 
 
-class Matches:
-    """Who has matched whom, in periods that end whenever that changes.
+class Matching:
+    """The current generation of matches, which is replaced whenever a match changes.
 
-    A publisher that has looked in this ``period`` need not look again. One mark and one period
-    serve all of them: they are near, and something of each would have to be fetched from memory
-    for each message.
+    A publisher that has counted its matches in this ``generation`` need not count again. One flag
+    and one generation serve all publishers: they stay in the cache, while an object per publisher
+    would be fetched from memory for each message.
     """
 
-    __slots__ = ("period",)
+    __slots__ = ("generation",)
 
     def __init__(self) -> None:
-        #: An object like no other.
-        self.period = object()
+        #: A unique object.
+        self.generation = object()
 
-    def begin_period(self) -> None:
-        """To be called when the mark is zero."""
-        # Before the mark, for other threads: they see it at once, and this one may have to wait for
-        # the interpreter in between. After it, for a change that came before the mark was made.
-        self.period = object()
-        MARK[0] = 1
-        self.period = object()
-
-
-MATCHES: Final = Matches()
+    def begin_generation(self) -> None:
+        """Begin a generation. Call it when the flag is zero."""
+        # Replaced before the flag is set, so that other threads see the change even if this one
+        # loses the interpreter's lock in between; and after, for a change in that moment.
+        self.generation = object()
+        MATCH_FLAG[0] = 1
+        self.generation = object()
 
 
-class MatchEvent:
-    """Zeroes the mark whenever a subscription matches the publisher, or leaves it."""
+MATCHING: Final = Matching()
 
-    __slots__ = ("_event", "is_told")
+
+class MatchListener:
+    """Zeroes the flag whenever a subscription matches or unmatches the publisher."""
+
+    __slots__ = ("_event", "is_supported")
 
     def __init__(self, publisher: Publisher) -> None:
-        #: False where the middleware does not tell.
-        self.is_told = False
+        #: False if the middleware does not report matches.
+        self.is_supported = False
         try:
             with publisher.handle:
                 self._event = rclpy_implementation.EventHandle(
@@ -67,13 +68,13 @@ class MatchEvent:
         except UnsupportedEventTypeError:
             return
         with self._event:
-            self.is_told = EVENT(self._event.pointer, _ZERO, _ADDRESS) == 0
+            self.is_supported = EVENT(self._event.pointer, _ZERO, _ADDRESS) == 0
 
     def close(self) -> None:
-        """Leave the mark alone from now on. To be called before the publisher is destroyed."""
-        if not self.is_told:
+        """Stop zeroing the flag. Call it before the publisher is destroyed."""
+        if not self.is_supported:
             return
         with self._event:
             EVENT(self._event.pointer, None, 0)
         self._event.destroy_when_not_in_use()
-        self.is_told = False
+        self.is_supported = False

@@ -1,4 +1,4 @@
-"""What a node publishes with."""
+"""Publishers as nodes use them: gated by the lifecycle, with in-process targets."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import Any, Protocol
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
-from composer.runtime.intra_process.lifecycle_gate import Gate
-from composer.runtime.intra_process.match_flag import MARK, MATCHES
+from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
+from composer.runtime.intra_process.match_flag import MATCH_FLAG, MATCHING
 
 
 class Target(Protocol):
-    """Where messages are put."""
+    """Receives messages in this process."""
 
     def put(self, message: Any) -> None:
-        """Take in the message, from any thread."""
+        """Receive the message, from any thread."""
 
 
 class FanOut:
-    """Puts messages to each of some targets."""
+    """Puts each message to several targets."""
 
     __slots__ = ("_targets",)
 
@@ -29,43 +29,42 @@ class FanOut:
         self._targets = targets
 
     def put(self, message: Any) -> None:
-        """Put it to each of them."""
+        """Put the message to each target."""
         for target in self._targets:
             target.put(message)
 
 
-def as_one(targets: Sequence[Target]) -> Target | None:
-    """Return what puts messages to all of ``targets``: where there is one, as most often, that."""
+def combined(targets: Sequence[Target]) -> Target | None:
+    """Return one target for all of ``targets``; None for none, a single one itself."""
     if not targets:
         return None
     return targets[0] if len(targets) == 1 else FanOut(targets)
 
 
 @dataclass(frozen=True, slots=True)
-class Origin:
-    """The node of a publisher, as far as messages have to do with it.
+class PublisherContext:
+    """What a publisher needs of its node.
 
-    ``refuse`` is told that a message comes while the gate is shut; ``watchers`` get each message
-    before everybody else.
+    ``on_refused`` is called for each message that is published while the gate is closed.
+    ``observers`` receive each message before any other target.
     """
 
-    gate: Gate
-    refuse: Callable[[], None]
-    watchers: tuple[Target, ...] = ()
+    gate: LifecycleGate
+    on_refused: Callable[[], None]
+    observers: tuple[Target, ...] = ()
 
 
-class Sender:
-    """Hands messages to its targets, and to DDS where somebody outside listens.
+class GatedPublisher:
+    """Publishes by DDS while the gate is open; a ``LocalPublisher`` also in the process.
 
-    This is what users know as a publisher (:class:`composer.behavior.Publisher`). Everything that a
-    message needs is in this one object: in a large system what it costs is to fetch objects from
-    far away in memory. As it is, messages go by DDS alone.
+    Users know it as :class:`composer.behavior.Publisher`. One object per publisher holds everything
+    that a message needs, for cache locality.
     """
 
     __slots__ = (
         "_gate",
-        "_has_outsiders",
-        "_period",
+        "_generation",
+        "_has_external",
         "_publish",
         "_refuse",
         "_target",
@@ -73,22 +72,22 @@ class Sender:
         "message_type",
     )
 
-    def __init__(self, publisher: Publisher, origin: Origin) -> None:
-        self._gate = origin.gate
-        self._refuse = origin.refuse
-        # Not rclpy's own ``publish``, which looks at the type once more. The interpreter's lock is
-        # held all along, so nobody destroys the publisher meanwhile.
+    def __init__(self, publisher: Publisher, context: PublisherContext) -> None:
+        self._gate = context.gate
+        self._refuse = context.on_refused
+        # Not rclpy's own ``publish``, which checks the type again. The interpreter's lock is held
+        # throughout, so no other thread destroys the publisher meanwhile.
         self._publish: Callable[[Any], None] = publisher.handle.publish
-        #: How many messages were sent.
+        #: Number of messages published.
         self.count = 0
         #: The message class of the topic.
         self.message_type: Any = publisher.msg_type
-        self._target = as_one(origin.watchers)
-        self._has_outsiders = True  # whether there are is for DDS to know
-        self._period: object = None  # in which it was last looked who is there
+        self._target = combined(context.observers)
+        self._has_external = True  # without local subscriptions, DDS knows best
+        self._generation: object = None  # of the matches, when last counted
 
     def publish(self, message: Any) -> None:
-        """Send ``message``, from any thread. Raises TypeError when it is not of the topic's type.
+        """Publish ``message``, from any thread. Raises TypeError if it has another type.
 
         It is dropped and counted while the node is not active.
         """
@@ -99,20 +98,20 @@ class Sender:
             message = self._converted(message)
         if self._target is not None:
             self._target.put(message)
-        if not MARK[0]:
-            MATCHES.begin_period()
-        if self._period is not MATCHES.period:
-            self._look_outside()
-        if self._has_outsiders:
+        if not MATCH_FLAG[0]:
+            MATCHING.begin_generation()
+        if self._generation is not MATCHING.generation:
+            self._check_external()
+        if self._has_external:
             self._publish(message)
         self.count += 1
 
-    def _look_outside(self) -> None:
-        """See whether somebody outside listens: once, and when something has matched or left."""
-        self._period = MATCHES.period
+    def _check_external(self) -> None:
+        """Check for external subscriptions: first, and after each change of matches."""
+        self._generation = MATCHING.generation
 
     def _converted(self, message: Any) -> Any:
-        """Return what rclpy would publish. Raises TypeError where it would."""
+        """Return what rclpy would publish. Raises TypeError where rclpy would."""
         if isinstance(message, self.message_type):
             return message
         if isinstance(message, bytes):

@@ -1,4 +1,4 @@
-"""Where the ports of a system meet within the process."""
+"""Connects the ports of a system within the process."""
 
 from __future__ import annotations
 
@@ -13,98 +13,105 @@ from composer.model import ChannelKind, Port
 from composer.runtime.intra_process.action import LocalActionServer
 from composer.runtime.intra_process.eligibility import ChannelKey, channel_of
 from composer.runtime.intra_process.ignore_local_publications import (
-    ignore_own_publications,
-    why_not_ignored,
+    ignore_local,
+    unsupported_reason,
 )
-from composer.runtime.intra_process.publisher import Origin, Sender
-from composer.runtime.intra_process.service import Server
-from composer.runtime.intra_process.topic import LocalSubscription, Receiver, Topic, outlet_for
+from composer.runtime.intra_process.publisher import GatedPublisher, PublisherContext
+from composer.runtime.intra_process.service import LocalService
+from composer.runtime.intra_process.topic import (
+    LocalSubscription,
+    Receiver,
+    Topic,
+    local_publisher_for,
+)
 
 S = TypeVar("S")
 
-Leave = Callable[[], None]
+Remove = Callable[[], None]
 
 
-class Delivery:
+class Router:
     """The topics, services and actions of one system that stay in the process.
 
-    Ports join with their DDS endpoint, which they have all the same, and leave before they destroy
-    it: own endpoints that have matched are known at any time, so the others are outsiders.
+    Ports join with their DDS endpoint, which exists in any case, and leave before they destroy it.
+    So the local endpoints among the matched ones are always known, and the others are external.
     """
 
     def __init__(self, shared: Mapping[ChannelKey, str | None]) -> None:
-        """``shared`` tells what has ports at both ends, and why DDS has to do, where it has to.
+        """``shared`` has the channels with ports at both endpoints, and why they need DDS, if any.
 
         rclpy must be initialized.
         """
-        self._objections = dict(shared)
-        #: Why topics go by DDS that the system would have stay; None where none do.
+        self._dds_reasons = dict(shared)
+        #: Why eligible topics use DDS nevertheless; None if they do not.
         self.refusal: str | None = None
         self._topics: dict[ChannelKey, Topic] = {}
-        self._servers: dict[ChannelKey, Server] = {}
+        self._services: dict[ChannelKey, LocalService] = {}
         self._action_servers: dict[ChannelKey, LocalActionServer] = {}
-        for key in [key for key, objection in shared.items() if objection is None]:
+        for key in [key for key, reason in shared.items() if reason is None]:
             if key[0] is not ChannelKind.TOPIC:
                 continue
-            self.refusal = why_not_ignored()
+            self.refusal = unsupported_reason()
             if self.refusal is None:
                 self._topics[key] = Topic()
             else:
-                self._objections[key] = self.refusal
+                self._dds_reasons[key] = self.refusal
 
-    def objection(self, port: Port) -> str | None:
-        """Return why DDS has to do although the other end is in the process, or None."""
-        return self._objections.get(channel_of(port))
+    def dds_reason(self, port: Port) -> str | None:
+        """Return why the port uses DDS although the other endpoint is in-process, or None."""
+        return self._dds_reasons.get(channel_of(port))
 
     def add_publisher(
-        self, port: Port, publisher: Publisher, origin: Origin
-    ) -> tuple[Sender, Leave]:
-        """Return what sends the messages of the port, and what ends that."""
+        self, port: Port, publisher: Publisher, context: PublisherContext
+    ) -> tuple[GatedPublisher, Remove]:
+        """Return the publisher that a node uses for the port, and a function that removes it."""
         topic = self._topics.get(channel_of(port))
         if topic is None:
-            return Sender(publisher, origin), _nothing
-        outlet = outlet_for(publisher, origin, port)
-        topic.add_outlet(outlet)
-        return outlet, lambda: topic.remove_outlet(outlet)
+            return GatedPublisher(publisher, context), _do_nothing
+        local = local_publisher_for(publisher, context, port)
+        topic.add_publisher(local)
+        return local, lambda: topic.remove_publisher(local)
 
-    def add_subscription(self, port: Port, subscription: Subscription, receiver: Receiver) -> Leave:
-        """Hand ``receiver`` what is published in the process; return what ends that."""
+    def add_subscription(
+        self, port: Port, subscription: Subscription, receiver: Receiver
+    ) -> Remove:
+        """Pass local publications to ``receiver``; return a function that stops that."""
         topic = self._topics.get(channel_of(port))
         if topic is None:
             return receiver.close
-        ignore_own_publications(subscription)
-        inlet = LocalSubscription(subscription.msg_type, port, receiver)
-        topic.add_inlet(inlet)
-        return lambda: topic.remove_inlet(inlet)
+        ignore_local(subscription)
+        local = LocalSubscription(subscription.msg_type, port, receiver)
+        topic.add_subscription(local)
+        return lambda: topic.remove_subscription(local)
 
-    def add_server(self, port: Port, server: Server) -> Leave:
-        """Let clients of the process find ``server``; return what ends that."""
-        return self._add(self._servers, port, server)
+    def add_service(self, port: Port, service: LocalService) -> Remove:
+        """Offer ``service`` to clients of the process; return a function that stops that."""
+        return self._add(self._services, port, service)
 
-    def find_server(self, port: Port) -> Callable[[], Server | None]:
-        """Return what finds the server in the process that the client port reaches now, if any."""
-        return partial(self._servers.get, channel_of(port))
+    def service_lookup(self, port: Port) -> Callable[[], LocalService | None]:
+        """Return a function that returns the local service of a client port now, if any."""
+        return partial(self._services.get, channel_of(port))
 
-    def add_action_server(self, port: Port, server: LocalActionServer) -> Leave:
-        """Let action clients of the process find ``server``; return what ends that."""
+    def add_action_server(self, port: Port, server: LocalActionServer) -> Remove:
+        """Offer ``server`` to action clients of the process; return a function that stops that."""
         return self._add(self._action_servers, port, server)
 
-    def find_action_server(self, port: Port) -> Callable[[], LocalActionServer | None]:
-        """Return what finds the server in the process that the action client port reaches now."""
+    def action_server_lookup(self, port: Port) -> Callable[[], LocalActionServer | None]:
+        """Return a function that returns the local server of an action client port now, if any."""
         return partial(self._action_servers.get, channel_of(port))
 
-    def _add(self, servers: dict[ChannelKey, S], port: Port, server: S) -> Leave:
+    def _add(self, servers: dict[ChannelKey, S], port: Port, server: S) -> Remove:
         key = channel_of(port)
-        if key not in self._objections or self._objections[key] is not None:
-            return _nothing
+        if key not in self._dds_reasons or self._dds_reasons[key] is not None:
+            return _do_nothing
         servers[key] = server
 
-        def leave() -> None:
+        def remove() -> None:
             if servers.get(key) is server:
                 del servers[key]
 
-        return leave
+        return remove
 
 
-def _nothing() -> None:
-    """Leave what was never joined."""
+def _do_nothing() -> None:
+    """Remove nothing: the channel is not shared."""

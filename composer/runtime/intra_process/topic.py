@@ -1,4 +1,4 @@
-"""One topic within the process: who publishes, who listens, and what goes out by DDS as well."""
+"""One topic within the process: its local publishers and subscriptions, and who needs DDS."""
 
 from __future__ import annotations
 
@@ -12,15 +12,20 @@ from rclpy.publisher import Publisher
 from composer.model import Isolation, Port
 from composer.qos import Durability, incompatibilities
 from composer.runtime.intra_process.copying import copy_of
-from composer.runtime.intra_process.match_flag import MATCHES, MatchEvent
-from composer.runtime.intra_process.publisher import Origin, Sender, Target, as_one
+from composer.runtime.intra_process.match_flag import MATCHING, MatchListener
+from composer.runtime.intra_process.publisher import (
+    GatedPublisher,
+    PublisherContext,
+    Target,
+    combined,
+)
 
 
 class Receiver(Target, Protocol):
-    """What a subscription gets its messages by."""
+    """The receiving side of a subscription."""
 
     def close(self) -> None:
-        """Take nothing more."""
+        """Receive nothing more."""
 
 
 class LocalSubscription:
@@ -35,8 +40,8 @@ class LocalSubscription:
         self.receiver = receiver
 
 
-class Copies:
-    """Puts copies."""
+class CopyingTarget:
+    """Puts a copy of each message."""
 
     __slots__ = ("_receiver",)
 
@@ -44,12 +49,12 @@ class Copies:
         self._receiver = receiver
 
     def put(self, message: Any) -> None:
-        """Have a copy of the message received."""
+        """Put a copy of the message."""
         self._receiver.put(copy_of(message))
 
 
-class Latched:
-    """Keeps what was sent last; of messages that nobody is to share, copies."""
+class LatchedMessages:
+    """Keeps the last messages of a transient-local topic; copies, if they are isolated."""
 
     __slots__ = ("_isolated", "messages")
 
@@ -62,145 +67,150 @@ class Latched:
         self.messages.append(copy_of(message) if self._isolated else message)
 
 
-class LocalPublisher(Sender):
-    """A publisher that hands each message to the inlets it matches as well.
+class LocalPublisher(GatedPublisher):
+    """A publisher that also passes each message to the local subscriptions it matches.
 
-    Whether somebody outside listens is asked of the middleware when something has matched or left
-    (``Matches``): asking takes half a microsecond, of a message that
-    takes less than one.
+    External subscriptions are counted only after a change of matches (``Matching``): the call
+    takes half a microsecond, while a whole message takes less than one.
     """
 
     __slots__ = (
+        "_checking",
         "_count_matched",
-        "_inlets",
         "_isolated",
-        "_looking",
-        "_match_event",
-        "_watchers",
+        "_match_listener",
+        "_observers",
+        "_subscriptions",
         "profile",
     )
 
-    def __init__(self, publisher: Publisher, origin: Origin, port: Port) -> None:
-        super().__init__(publisher, origin)
+    def __init__(self, publisher: Publisher, context: PublisherContext, port: Port) -> None:
+        super().__init__(publisher, context)
         self.profile = port.qos.profile
         self._isolated = port.isolation is Isolation.COPY
         self._count_matched: Callable[[], int] = publisher.handle.get_subscription_count
-        self._match_event = MatchEvent(publisher)
-        self._has_outsiders = False
-        self._looking = threading.Lock()  # the last look is what counts, not the slowest
-        self._inlets: tuple[LocalSubscription, ...] = ()
-        self._watchers = origin.watchers
+        self._match_listener = MatchListener(publisher)
+        self._has_external = False
+        self._checking = threading.Lock()  # the latest check counts, not the slowest
+        self._subscriptions: tuple[LocalSubscription, ...] = ()
+        self._observers = context.observers
 
-    def join(self, inlet: LocalSubscription) -> None:
-        """Hand messages to ``inlet`` from now on, if they match."""
-        if self._matches(inlet):
-            self._reach((*self._inlets, inlet))
+    def join(self, subscription: LocalSubscription) -> None:
+        """Pass messages to ``subscription`` from now on, if it matches."""
+        if self._matches(subscription):
+            self._set_subscriptions((*self._subscriptions, subscription))
 
-    def leave(self, inlet: LocalSubscription) -> None:
-        """Hand it no more."""
-        self._reach(tuple(kept for kept in self._inlets if kept is not inlet))
+    def leave(self, subscription: LocalSubscription) -> None:
+        """Stop passing messages to ``subscription``."""
+        self._set_subscriptions(
+            tuple(kept for kept in self._subscriptions if kept is not subscription)
+        )
 
     def close(self) -> None:
-        """Send nothing any more. To be called before the publisher is destroyed."""
-        self._match_event.close()
+        """Release the match listener. Call it before the publisher is destroyed."""
+        self._match_listener.close()
 
-    def _matches(self, inlet: LocalSubscription) -> bool:
-        is_of_the_type = inlet.message_type is self.message_type
-        return is_of_the_type and not incompatibilities(self.profile, inlet.profile)
+    def _matches(self, subscription: LocalSubscription) -> bool:
+        has_type = subscription.message_type is self.message_type
+        return has_type and not incompatibilities(self.profile, subscription.profile)
 
-    def _reach(self, inlets: tuple[LocalSubscription, ...]) -> None:
-        self._inlets = inlets
-        self._target = as_one((*self._watchers, *map(self._target_of, inlets)))
-        self._look_outside()
+    def _set_subscriptions(self, subscriptions: tuple[LocalSubscription, ...]) -> None:
+        self._subscriptions = subscriptions
+        self._target = combined((*self._observers, *map(self._target_of, subscriptions)))
+        self._check_external()
 
-    def _target_of(self, inlet: LocalSubscription) -> Target:
-        return Copies(inlet.receiver) if self._isolated or inlet.isolated else inlet.receiver
+    def _target_of(self, subscription: LocalSubscription) -> Target:
+        isolated = self._isolated or subscription.isolated
+        return CopyingTarget(subscription.receiver) if isolated else subscription.receiver
 
-    def _look_outside(self) -> None:
-        with self._looking:
-            # Before the look: who matches in between is seen next time.
-            self._period = MATCHES.period if self._match_event.is_told else None
-            inlets = self._inlets
-            has_others = self._count_matched() > len(inlets)
-            # Whoever joins or leaves at this very moment may be counted on one side only; he has it
-            # looked again, and until then nobody outside is to miss anything.
-            self._has_outsiders = has_others or inlets is not self._inlets
+    def _check_external(self) -> None:
+        with self._checking:
+            # Before counting: a match that comes in between is seen by the next check.
+            is_supported = self._match_listener.is_supported
+            self._generation = MATCHING.generation if is_supported else None
+            subscriptions = self._subscriptions
+            has_external = self._count_matched() > len(subscriptions)
+            # A subscription that joins or leaves right now may be in only one of the two numbers.
+            # It triggers another check; until then, publish rather than lose a message.
+            self._has_external = has_external or subscriptions is not self._subscriptions
 
 
-class LatchingOutlet(LocalPublisher):
-    """An outlet of a transient-local topic: who joins later gets what was sent before."""
+class LatchingPublisher(LocalPublisher):
+    """A local publisher of a transient-local topic: late joiners get the latched messages."""
 
     __slots__ = ("_latched", "_lock")
 
-    def __init__(self, publisher: Publisher, origin: Origin, port: Port) -> None:
-        super().__init__(publisher, origin, port)
-        self._latched = Latched(self.profile.queue_depth, isolated=self._isolated)
-        self._watchers = (*origin.watchers, self._latched)
-        self._target = as_one(self._watchers)
-        self._has_outsiders = True  # somebody who is not here yet may want what is sent
-        self._lock = threading.Lock()  # who joins gets each message once
+    def __init__(self, publisher: Publisher, context: PublisherContext, port: Port) -> None:
+        super().__init__(publisher, context, port)
+        self._latched = LatchedMessages(self.profile.queue_depth, isolated=self._isolated)
+        self._observers = (*context.observers, self._latched)
+        self._target = combined(self._observers)
+        self._has_external = True  # an external subscription that joins later needs the messages
+        self._lock = threading.Lock()  # a joining subscription gets each message once
 
     def publish(self, message: Any) -> None:
-        """Send ``message``, from any thread. Raises TypeError when it is not of the topic's type.
+        """Publish ``message``, from any thread. Raises TypeError if it has another type.
 
         It is dropped and counted while the node is not active.
         """
         with self._lock:
             super().publish(message)
 
-    def join(self, inlet: LocalSubscription) -> None:
-        """Hand messages to ``inlet`` from now on, if they match; what is latched first."""
-        if not self._matches(inlet):
+    def join(self, subscription: LocalSubscription) -> None:
+        """Pass messages to ``subscription`` from now on, if it matches; the latched ones first."""
+        if not self._matches(subscription):
             return
         with self._lock:
-            if inlet.profile.durability is Durability.TRANSIENT_LOCAL:
+            if subscription.profile.durability is Durability.TRANSIENT_LOCAL:
                 for message in self._latched.messages:
-                    self._target_of(inlet).put(message)
-            self._reach((*self._inlets, inlet))
+                    self._target_of(subscription).put(message)
+            self._set_subscriptions((*self._subscriptions, subscription))
 
-    def _look_outside(self) -> None:
-        """Send to DDS whoever is there."""
-        self._period = MATCHES.period
+    def _check_external(self) -> None:
+        """Publish by DDS in any case."""
+        self._generation = MATCHING.generation
 
 
-def outlet_for(publisher: Publisher, origin: Origin, port: Port) -> LocalPublisher:
-    """Return the outlet of a publisher port."""
+def local_publisher_for(
+    publisher: Publisher, context: PublisherContext, port: Port
+) -> LocalPublisher:
+    """Return the local publisher of a publisher port."""
     latches = port.qos.profile.durability is Durability.TRANSIENT_LOCAL
-    return (LatchingOutlet if latches else LocalPublisher)(publisher, origin, port)
+    return (LatchingPublisher if latches else LocalPublisher)(publisher, context, port)
 
 
 class Topic:
-    """Everybody of the process who has joined the topic now."""
+    """The local endpoints of one topic."""
 
     def __init__(self) -> None:
-        self._outlets: list[LocalPublisher] = []
-        self._inlets: list[LocalSubscription] = []
+        self._publishers: list[LocalPublisher] = []
+        self._subscriptions: list[LocalSubscription] = []
         self._lock = threading.Lock()
 
-    def add_outlet(self, outlet: LocalPublisher) -> None:
-        """Have it meet everybody who listens."""
+    def add_publisher(self, publisher: LocalPublisher) -> None:
+        """Connect it to all subscriptions."""
         with self._lock:
-            self._outlets.append(outlet)
-            for inlet in self._inlets:
-                outlet.join(inlet)
+            self._publishers.append(publisher)
+            for subscription in self._subscriptions:
+                publisher.join(subscription)
 
-    def remove_outlet(self, outlet: LocalPublisher) -> None:
-        """Forget it, and what is latched in it."""
+    def remove_publisher(self, publisher: LocalPublisher) -> None:
+        """Disconnect it, and discard what it has latched."""
         with self._lock:
-            self._outlets.remove(outlet)
-            outlet.close()
+            self._publishers.remove(publisher)
+            publisher.close()
 
-    def add_inlet(self, inlet: LocalSubscription) -> None:
-        """Have it meet everybody who publishes."""
+    def add_subscription(self, subscription: LocalSubscription) -> None:
+        """Connect it to all publishers."""
         with self._lock:
-            self._inlets.append(inlet)
-            for outlet in self._outlets:
-                outlet.join(inlet)
+            self._subscriptions.append(subscription)
+            for publisher in self._publishers:
+                publisher.join(subscription)
 
-    def remove_inlet(self, inlet: LocalSubscription) -> None:
-        """Have nothing more received."""
+    def remove_subscription(self, subscription: LocalSubscription) -> None:
+        """Disconnect it and close its receiver."""
         with self._lock:
-            self._inlets.remove(inlet)
-            for outlet in self._outlets:
-                outlet.leave(inlet)
-        inlet.receiver.close()
+            self._subscriptions.remove(subscription)
+            for publisher in self._publishers:
+                publisher.leave(subscription)
+        subscription.receiver.close()

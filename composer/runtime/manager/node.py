@@ -27,12 +27,12 @@ from rclpy.qos import QoSProfile
 from rclpy.time_source import USE_SIM_TIME_NAME
 from std_srvs.srv import Trigger
 
-from composer.runtime.clock.clock import Clock
-from composer.runtime.clock.sim_time import SimulatedTime
-from composer.runtime.executors.event_counts import AnnouncedEvents
+from composer.runtime.clock.clock import NodeTime
+from composer.runtime.clock.sim_time import SimTimeSource
+from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.factory import log_exception
-from composer.runtime.executors.loop import Reply, Taken, never_called
+from composer.runtime.executors.loop import Reply, Taken, unused_callback
 from composer.runtime.manager.proxy_services import ProxyServices
 from composer.runtime.manager.status_messages import status_message
 from composer.runtime.metrics.diagnostics import Figures, to_message
@@ -109,9 +109,9 @@ class ManagerNode:
             start_parameter_services=False,
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
-        simulated_time = SimulatedTime(self._node, self._loop)
-        self.process_context = ProcessContext(simulated_time, AnnouncedEvents(self._loop))
-        self._clock = Clock(self._node, self._loop, simulated_time)
+        simulated_time = SimTimeSource(self._node, self._loop)
+        self.process_context = ProcessContext(simulated_time, EventCounts(self._loop))
+        self._clock = NodeTime(self._node, self._loop, simulated_time)
         self._node.set_parameters([Parameter(USE_SIM_TIME_NAME, value=use_sim_time)])
         self._diagnostics = self._publisher(_DIAGNOSTICS, 10, self._publish)
         self._state = self._publisher(f"~/{STATE_TOPIC}", STATE_QOS, self._publish)
@@ -166,7 +166,7 @@ class ManagerNode:
         return publisher
 
     def _add_service(self, name: str, callback: Callable[[Any, Reply], None]) -> None:
-        service = self._node.create_service(Trigger, f"~/{name}", never_called)
+        service = self._node.create_service(Trigger, f"~/{name}", unused_callback)
         self._loop.add_service(service, callback)
 
     def _on_command(self, name: str, _: Trigger.Request, reply: Reply) -> None:

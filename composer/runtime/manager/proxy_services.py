@@ -36,7 +36,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from composer.runtime.executors.event_loop import EventLoop
-from composer.runtime.executors.loop import Reply, never_called
+from composer.runtime.executors.loop import Reply, unused_callback
 from composer.runtime.node.node import RunningNode
 from composer.runtime.ros.manager_protocol import CHANGE_STATE, full_parameter_name
 
@@ -79,7 +79,7 @@ class ProxyServices:
         def on_request(request: Any, reply: Reply) -> None:
             self._loop.run_task(reply_to(request, reply))
 
-        service = self._node.create_service(kind, f"~/{name}", never_called)
+        service = self._node.create_service(kind, f"~/{name}", unused_callback)
         self._loop.add_service(service, on_request)
 
     async def _change_state(self, request: Any) -> Any:

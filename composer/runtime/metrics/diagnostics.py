@@ -1,4 +1,4 @@
-"""Figures of callbacks and chains as managers tell them: diagnostic_msgs/msg/DiagnosticArray."""
+"""Converts figures of callbacks and chains to and from diagnostic_msgs/msg/DiagnosticArray."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 
 Figures = CallbackFigures | ChainFigures
-#: Which type each field has, for the way back from text.
+#: The type of each field, to convert it back from text.
 _TYPES = {
     field.name: {"int": int, "float": float}.get(str(field.type), str)
     for kind in (CallbackFigures, ChainFigures)
@@ -19,14 +19,14 @@ _TYPES = {
 
 
 def to_message(system: str, figures: Iterable[Figures]) -> DiagnosticArray:
-    """Return a message with a status for each; what took longer than it may warns."""
+    """Return a message with one status for each; overruns, drops and late data are warnings."""
     return DiagnosticArray(status=[_status(system, item) for item in figures])
 
 
 def from_message(
     message: DiagnosticArray,
 ) -> tuple[tuple[CallbackFigures, ...], tuple[ChainFigures, ...]]:
-    """Return the callbacks and the chains that :func:`to_message` was given."""
+    """Return the callbacks and chains of a message of :func:`to_message`."""
     values = [
         {item.key: _TYPES[item.key](item.value) for item in status.values}
         for status in message.status
@@ -39,14 +39,14 @@ def from_message(
 
 def _status(system: str, figures: Figures) -> DiagnosticStatus:
     if isinstance(figures, ChainFigures):
-        name, is_well, text = f"chain {figures.chain}", not figures.late, figures.text
+        name, is_ok, text = f"chain {figures.chain}", not figures.late, figures.text
     else:
         name = f"{figures.node} {figures.callback}"
-        is_well = not (figures.overruns or figures.dropped)
+        is_ok = not (figures.overruns or figures.dropped)
         text = f"{figures.overruns} over budget, {figures.dropped} dropped"
     values = {field.name: getattr(figures, field.name) for field in fields(figures)}
     return DiagnosticStatus(
-        level=DiagnosticStatus.OK if is_well else DiagnosticStatus.WARN,
+        level=DiagnosticStatus.OK if is_ok else DiagnosticStatus.WARN,
         name=f"{system}: {name}",
         message=text,
         hardware_id=system,

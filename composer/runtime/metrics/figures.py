@@ -1,4 +1,4 @@
-"""What is told of callbacks: their figures since the start, and their rates between two looks."""
+"""Snapshots of the statistics of callbacks and chains, and rates between two of them."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ _MS = 1e3
 
 @dataclass(frozen=True, slots=True)
 class CallbackFigures:
-    """The callbacks of one port or timer of one node, since the node was made.
+    """The callbacks of one port or timer of a node, since the node was created.
 
-    ``total_ms`` is how long they kept their thread, all together; ``late_...`` is how long after
-    their time the calls of a timer began. ``p99_ms`` is right within 10 %. ``kind``, ``overruns``
-    and ``dropped`` are those of :class:`composer.runtime.metrics.statistics.CallbackStatistics`.
+    ``total_ms`` is the time that they kept a thread; ``late_...`` the time from when a timer call
+    was due to its start. ``p99_ms`` is right within 10 %. ``kind``, ``overruns`` and ``dropped``
+    are those of :class:`composer.runtime.metrics.statistics.CallbackStatistics`.
     """
 
     node: str
@@ -34,17 +34,17 @@ class CallbackFigures:
 
     @property
     def callback(self) -> str:
-        """What people call it: ``timer 'tick'``."""
+        """The kind and name: ``timer 'tick'``."""
         return f"{self.kind} '{self.name}'"
 
 
-def figures(node: str, counted: CallbackStatistics) -> CallbackFigures:
-    """Return what is known of a callback of the node with that full name."""
-    times, lateness = counted.times, counted.lateness
+def figures(node: str, statistics: CallbackStatistics) -> CallbackFigures:
+    """Return the figures of a callback; ``node`` is the full name of its node."""
+    times, lateness = statistics.times, statistics.lateness
     return CallbackFigures(
         node=node,
-        kind=counted.kind,
-        name=counted.name,
+        kind=statistics.kind,
+        name=statistics.name,
         count=times.count,
         total_ms=times.total_s * _MS,
         mean_ms=times.mean_s * _MS,
@@ -52,16 +52,16 @@ def figures(node: str, counted: CallbackStatistics) -> CallbackFigures:
         longest_ms=times.longest_s * _MS,
         late_p99_ms=lateness.percentile_s(0.99) * _MS,
         late_longest_ms=lateness.longest_s * _MS,
-        overruns=counted.overruns,
-        dropped=counted.dropped,
+        overruns=statistics.overruns,
+        dropped=statistics.dropped,
     )
 
 
 @dataclass(frozen=True, slots=True)
 class ChainFigures:
-    """A chain: how long data took from its first publisher to its last, and how long it may.
+    """The latencies of a chain, from its first publisher to its last.
 
-    ``late`` counts what took longer than ``latency_ms``.
+    ``late`` counts latencies above ``latency_ms``.
     """
 
     chain: str
@@ -82,23 +82,23 @@ class ChainFigures:
         )
 
 
-def chain_figures(counted: ChainStatistics) -> ChainFigures:
-    """Return what is known of a chain."""
-    times = counted.times
+def chain_figures(statistics: ChainStatistics) -> ChainFigures:
+    """Return the figures of a chain."""
+    times = statistics.times
     return ChainFigures(
-        chain=counted.name,
-        latency_ms=counted.latency_ms,
+        chain=statistics.name,
+        latency_ms=statistics.latency_ms,
         count=times.count,
         mean_ms=times.mean_s * _MS,
         p99_ms=times.percentile_s(0.99) * _MS,
         longest_ms=times.longest_s * _MS,
-        late=counted.late,
+        late=statistics.late,
     )
 
 
 @dataclass(frozen=True, slots=True)
 class CallbackRates:
-    """A callback between two looks: calls a second, and the share of one thread that it keeps."""
+    """A callback between two snapshots: calls per second, and the share of one thread in use."""
 
     figures: CallbackFigures
     calls_hz: float
@@ -106,16 +106,16 @@ class CallbackRates:
 
 
 def rates(
-    before: Iterable[CallbackFigures], now: Iterable[CallbackFigures], passed_s: float
+    before: Iterable[CallbackFigures], now: Iterable[CallbackFigures], elapsed_s: float
 ) -> list[CallbackRates]:
-    """Return the callbacks as they are now, with what happened in the ``passed_s`` before."""
+    """Return the current figures with the rates over the ``elapsed_s`` since ``before``."""
     known = {(item.node, item.kind, item.name): item for item in before}
-    return [_rates(known.get((item.node, item.kind, item.name)), item, passed_s) for item in now]
+    return [_rates(known.get((item.node, item.kind, item.name)), item, elapsed_s) for item in now]
 
 
-def _rates(before: CallbackFigures | None, now: CallbackFigures, passed_s: float) -> CallbackRates:
-    if before is None or passed_s <= 0.0:
+def _rates(before: CallbackFigures | None, now: CallbackFigures, elapsed_s: float) -> CallbackRates:
+    if before is None or elapsed_s <= 0.0:
         return CallbackRates(now, 0.0, 0.0)
     calls = max(0, now.count - before.count)
     busy_ms = max(0.0, now.total_ms - before.total_ms)
-    return CallbackRates(now, calls / passed_s, busy_ms / (_MS * passed_s))
+    return CallbackRates(now, calls / elapsed_s, busy_ms / (_MS * elapsed_s))

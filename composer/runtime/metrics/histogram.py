@@ -1,4 +1,4 @@
-"""How long something took, counted for ever in a fixed amount of memory."""
+"""A histogram of durations, in constant memory."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from itertools import accumulate, pairwise
 
 _SHORTEST_S = 1e-7
 _LONGEST_S = 100.0
-#: Each bucket reaches a fifth further than the one before: a percentile is right within 10 %.
+#: Each bucket is a fifth longer than the one before: a percentile is right within 10 %.
 _GROWTH = 1.2
 
 
@@ -20,90 +20,90 @@ def _bounds() -> Iterable[float]:
         bound_s *= _GROWTH
 
 
-#: The limits between buckets, in seconds: bucket ``i`` ends at ``BOUNDS_S[i]``, the last nowhere.
+#: The bounds of buckets, in seconds: bucket ``i`` ends at ``BOUNDS_S[i]``; the last is unbounded.
 BOUNDS_S = tuple(_bounds())
 
-#: So many times are put into the histogram together.
-TOGETHER = 256
+#: How many durations are added to the buckets together.
+BATCH_SIZE = 256
 
 
-class Durations:
-    """A histogram of times in seconds.
+class Histogram:
+    """A histogram of durations in seconds. Any thread may add and read.
 
-    Who counts a million a second appends to ``waiting`` by itself, and calls :meth:`settle` at
-    every :data:`TOGETHER`: a list is a place in memory that is near, buckets are not. Any thread
-    may count and ask.
+    Code that counts a million durations per second appends to ``batch`` itself, and calls
+    :meth:`flush` every :data:`BATCH_SIZE`: a list stays in the cache, buckets do not.
     """
 
-    __slots__ = ("_buckets", "_lock", "_longest_s", "_total_s", "_weight", "waiting")
+    __slots__ = ("_buckets", "_lock", "_longest_s", "_total_s", "_weight", "batch")
 
     def __init__(self) -> None:
-        self.waiting: list[float] = []
+        self.batch: list[float] = []
         self._weight = 1
         self._buckets = [0] * (len(BOUNDS_S) + 1)
         self._total_s = 0.0
         self._longest_s = 0.0
         self._lock = threading.Lock()
 
-    def take(self, took_s: float) -> None:
-        """Count one."""
-        self.waiting.append(took_s)
-        if len(self.waiting) >= TOGETHER:
-            self.settle()
+    def add(self, duration_s: float) -> None:
+        """Add a duration."""
+        self.batch.append(duration_s)
+        if len(self.batch) >= BATCH_SIZE:
+            self.flush()
 
-    def settle(self) -> None:
-        """Put what waits into the histogram."""
+    def flush(self) -> None:
+        """Add the batch to the buckets."""
         with self._lock:
-            settled = sorted(self.waiting)
-            if not settled:
+            added = sorted(self.batch)
+            if not added:
                 return
-            # Appended meanwhile, by others, is what comes behind them.
-            del self.waiting[: len(settled)]
-            self._count(settled)
-            self._total_s += sum(settled) * self._weight
-            self._longest_s = max(self._longest_s, settled[-1])
+            # Other threads may append meanwhile, behind these.
+            del self.batch[: len(added)]
+            self._count(added)
+            self._total_s += sum(added) * self._weight
+            self._longest_s = max(self._longest_s, added[-1])
 
-    def _count(self, settled: list[float]) -> None:
-        """Count what is sorted: to look for the ends of buckets is quicker than for each time."""
+    def _count(self, durations: list[float]) -> None:
+        """Count sorted durations: one search per bucket is faster than one per duration."""
         counted = 0
-        for bucket in range(bisect(BOUNDS_S, settled[0]), bisect(BOUNDS_S, settled[-1])):
-            below = bisect_left(settled, BOUNDS_S[bucket])
+        for bucket in range(bisect(BOUNDS_S, durations[0]), bisect(BOUNDS_S, durations[-1])):
+            below = bisect_left(durations, BOUNDS_S[bucket])
             self._buckets[bucket] += (below - counted) * self._weight
             counted = below
-        self._buckets[bisect(BOUNDS_S, settled[-1])] += (len(settled) - counted) * self._weight
+        last = bisect(BOUNDS_S, durations[-1])
+        self._buckets[last] += (len(durations) - counted) * self._weight
 
-    def stand_for(self, weight: int) -> None:
-        """Let each time that comes from now on count as ``weight`` of them."""
+    def set_weight(self, weight: int) -> None:
+        """Count each duration that is added from now on ``weight`` times."""
         if weight != self._weight:
-            self.settle()
+            self.flush()
             self._weight = weight
 
     @property
     def total_s(self) -> float:
-        """All of them together."""
-        with self._lock:  # without settling: this is asked each second
-            return self._total_s + sum(self.waiting) * self._weight
+        """The sum of all durations."""
+        with self._lock:  # without flushing: this is read every second
+            return self._total_s + sum(self.batch) * self._weight
 
     @property
     def longest_s(self) -> float:
-        """The longest; 0 when there were none."""
-        self.settle()
+        """The longest duration; 0 without any."""
+        self.flush()
         return self._longest_s
 
     @property
     def count(self) -> int:
-        """How many there were."""
-        self.settle()
+        """The number of durations."""
+        self.flush()
         return sum(self._buckets)
 
     @property
     def mean_s(self) -> float:
-        """The mean; 0 when there were none."""
+        """The mean; 0 without any."""
         return self.total_s / max(1, self.count)
 
     def percentile_s(self, share: float) -> float:
-        """Return what ``share`` (0 to 1) of them do not exceed, within 10 %; 0 without any."""
-        self.settle()
+        """Return the duration that ``share`` (0 to 1) of them do not exceed, within 10 %; or 0."""
+        self.flush()
         counted = list(accumulate(self._buckets))
         if not counted[-1]:
             return 0.0

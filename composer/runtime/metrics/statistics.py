@@ -1,4 +1,4 @@
-"""What a node has done so far, counted where it happens."""
+"""Counters of a node, updated where the events happen."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from composer.runtime.metrics.histogram import Durations
+from composer.runtime.metrics.histogram import Histogram
 
 
 @dataclass(slots=True)
 class CallbackStatistics:
-    """What is counted of the callbacks of one port or timer.
+    """The counters of the callbacks of one port or timer.
 
-    ``kind`` is the word for what it is: ``timer``, or that of a :class:`composer.model.PortKind`.
-    ``lateness`` is for timers: how long after its time a call begins. ``overruns`` are calls that
-    took longer than their ``budget_ms``; ``dropped`` is what a full queue pushed out, of a timer
-    the calls left out because the one before was not through.
+    ``kind`` is ``timer`` or the value of a :class:`composer.model.PortKind`. ``lateness`` is for
+    timers: the time from when a call is due to its start. ``overruns`` counts calls that took
+    longer than their ``budget_ms``. ``dropped`` counts messages that a full queue dropped, or calls
+    of a timer that were skipped because the previous one was still running.
     """
 
     kind: str
     name: str
-    times: Durations = field(default_factory=Durations)
-    lateness: Durations = field(default_factory=Durations)
+    times: Histogram = field(default_factory=Histogram)
+    lateness: Histogram = field(default_factory=Histogram)
     overruns: int = 0
     dropped: int = 0
 
@@ -30,57 +30,57 @@ class CallbackStatistics:
         return f"{self.kind} '{self.name}'"
 
 
-class Counting(Protocol):
-    """Counts the messages that pass through it: in itself, where that costs least."""
+class HasCount(Protocol):
+    """Counts the messages that pass through it, in an attribute because that costs least."""
 
     count: int
 
 
-class Tally:
-    """How many messages have passed through a port, which is another each time it is configured."""
+class MessageCount:
+    """The messages of a port, across its configurations, each of which creates new endpoints."""
 
-    __slots__ = ("_before", "_now")
+    __slots__ = ("_before", "_current")
 
     def __init__(self) -> None:
         self._before = 0
-        self._now: Counting | None = None
+        self._current: HasCount | None = None
 
     @property
     def count(self) -> int:
-        """All of them."""
-        return self._before + (0 if self._now is None else self._now.count)
+        """The number of messages so far."""
+        return self._before + (0 if self._current is None else self._current.count)
 
-    def begin(self, counting: Counting) -> None:
-        """Add what ``counting`` counts, from now on."""
-        self._now = counting
+    def begin(self, current: HasCount) -> None:
+        """Include the messages that ``current`` counts from now on."""
+        self._current = current
 
     def end(self) -> None:
-        """Keep what was counted, and nothing of who did."""
+        """Keep the count and release the current endpoint."""
         self._before = self.count
-        self._now = None
+        self._current = None
 
 
 @dataclass(slots=True)
 class ChainStatistics:
-    """What is counted of a chain: how long data took, and how often longer than it may."""
+    """The latencies of a chain, and how many exceeded its ``latency_ms``."""
 
     name: str
     latency_ms: float
-    times: Durations = field(default_factory=Durations)
+    times: Histogram = field(default_factory=Histogram)
     late: int = 0
 
-    def take(self, took_s: float) -> None:
-        """Count data that has come to the end."""
-        self.times.take(took_s)
-        self.late += took_s * 1e3 > self.latency_ms
+    def add(self, latency_s: float) -> None:
+        """Add the latency of data that reached the end of the chain."""
+        self.times.add(latency_s)
+        self.late += latency_s * 1e3 > self.latency_ms
 
 
 @dataclass(slots=True)
 class Statistics:
-    """Counters of one node. See ``NodeSummary`` for their meaning.
+    """The counters of one node. See ``NodeSummary`` for their meaning.
 
-    ``qos_events`` counts what :mod:`composer.runtime.ports.qos_events` tells of, by the name of the
-    event. With ``tracing`` false, the times of callbacks are not taken.
+    ``qos_events`` counts the events of :mod:`composer.runtime.ports.qos_events` by name. Without
+    ``tracing``, callbacks are not timed.
     """
 
     tracing: bool = True
@@ -90,39 +90,39 @@ class Statistics:
     errors: int = 0
     qos_events: Counter[str] = field(default_factory=Counter)
     callbacks: dict[tuple[str, str], CallbackStatistics] = field(default_factory=dict)
-    publishers: dict[str, Tally] = field(default_factory=dict)
-    subscriptions: dict[str, Tally] = field(default_factory=dict)
+    publishers: dict[str, MessageCount] = field(default_factory=dict)
+    subscriptions: dict[str, MessageCount] = field(default_factory=dict)
 
-    def publisher(self, name: str) -> Tally:
-        """Return the tally of a publisher, from now on or as before."""
-        return self.publishers.setdefault(name, Tally())
+    def publisher(self, name: str) -> MessageCount:
+        """Return the message count of a publisher, a new one the first time."""
+        return self.publishers.setdefault(name, MessageCount())
 
-    def subscription(self, name: str) -> Tally:
-        """Return the tally of a subscription, from now on or as before."""
-        return self.subscriptions.setdefault(name, Tally())
+    def subscription(self, name: str) -> MessageCount:
+        """Return the message count of a subscription, a new one the first time."""
+        return self.subscriptions.setdefault(name, MessageCount())
 
     def callback(self, kind: str, name: str) -> CallbackStatistics:
-        """Return where the callbacks of a port or timer are counted, from now on or as before."""
+        """Return the counters of a port or timer, new ones the first time."""
         return self.callbacks.setdefault((kind, name), CallbackStatistics(kind, name))
 
     @property
     def sent(self) -> int:
-        """How many messages went through all publishers."""
+        """The number of messages that all publishers have sent."""
         return sum(publisher.count for publisher in tuple(self.publishers.values()))
 
     @property
     def received(self) -> int:
-        """How many messages came to all subscriptions while the node was active."""
+        """The number of messages that all subscriptions received while the node was active."""
         return sum(subscription.count for subscription in tuple(self.subscriptions.values()))
 
     @property
     def busy_s(self) -> float:
-        """For how long callbacks kept their thread, all together."""
+        """The total time that callbacks kept a thread."""
         return sum(callback.times.total_s for callback in tuple(self.callbacks.values()))
 
     @property
     def slowest(self) -> str:
-        """The callback that took longest at once, and how long: ``timer 'tick' 12.3 ms``."""
+        """The callback with the longest call, and its duration: ``timer 'tick' 12.3 ms``."""
         known = tuple(self.callbacks.values())
         callback = max(known, key=lambda item: item.times.longest_s, default=None)
         if callback is None or not callback.times.longest_s:
@@ -131,10 +131,10 @@ class Statistics:
 
     @property
     def overruns(self) -> int:
-        """How many calls took longer than their ``budget_ms``."""
+        """The number of calls that took longer than their ``budget_ms``."""
         return sum(callback.overruns for callback in tuple(self.callbacks.values()))
 
     @property
     def queue_drops(self) -> int:
-        """How much full queues pushed out, left out calls of timers included."""
+        """The number of messages that full queues dropped, including skipped timer calls."""
         return sum(callback.dropped for callback in tuple(self.callbacks.values()))

@@ -16,8 +16,9 @@ from typing import Any
 from composer.behavior import CallCancelled
 from composer.model import BehaviorReference
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.executors.tasks import Future, sleep
-from composer.runtime.executors.user_code import calls_user_code, may_be_interrupted
+from composer.runtime.executors.futures import Future
+from composer.runtime.executors.stacks import calls_user_code, interruptible
+from composer.runtime.executors.tasks import sleep
 
 #: A method of a behavior.
 Method = Callable[..., Any]
@@ -99,7 +100,7 @@ class Named:
         self.__kind = kind
         self.__entries = entries
 
-    @may_be_interrupted
+    @interruptible
     def __getattr__(self, name: str) -> Any:
         try:
             return self.__entries[name]
@@ -154,7 +155,7 @@ class NodeClock:
         """
         for gate in (self._context.gate, self._always_on_context.gate):
             if gate.waiting:
-                return gate.pending.hold(sleep(self._context.clock, max(0.0, seconds)))
+                return gate.pending.add(sleep(self._context.clock, max(0.0, seconds)))
         canceled: Future[None] = Future()
         canceled.set_exception(CallCancelled(self._context.gate.refusal))
         return canceled

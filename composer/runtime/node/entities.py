@@ -4,22 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 from composer.model import Event, Node, Port, PortKind, Reaction, Timer
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.reactions import Caller, RunningReaction
-from composer.runtime.intra_process.publisher import Sender
+from composer.runtime.callbacks.reactions import ReactionClient, RunningReaction
+from composer.runtime.intra_process.publisher import GatedPublisher
 from composer.runtime.node.behavior_loader import method
 from composer.runtime.ports.action_client import ActionClientPort
 from composer.runtime.ports.action_server import ActionServerPort, Handlers
 from composer.runtime.ports.client import ClientPort
-from composer.runtime.ports.port import RunningPort
 from composer.runtime.ports.publisher import PublisherPort
 from composer.runtime.ports.service import ServicePort
 from composer.runtime.ports.subscription import SubscriptionPort
 from composer.runtime.ports.timer import TimerPort
 from composer.runtime.ros.messages import interface_class
+
+
+class RunningPort(Protocol):
+    """A port or timer between the configuration and the cleanup of its node."""
+
+    def activate(self) -> None:
+        """Begin: the node is active now."""
+
+    def deactivate(self) -> None:
+        """Stop and discard what waits: the node is leaving *active*."""
+
+    def destroy(self) -> None:
+        """Destroy the ROS entity."""
 
 
 @dataclass(slots=True)
@@ -42,9 +54,9 @@ class NodeEntities:
     always_on: list[RunningPort] = field(default_factory=list)
 
     @property
-    def senders(self) -> dict[str, Sender]:
+    def senders(self) -> dict[str, GatedPublisher]:
         """What reactions and behaviors publish with, by the name of the publisher."""
-        return {name: port.sender for name, port in self.publishers.items()}
+        return {name: port.gated for name, port in self.publishers.items()}
 
     @property
     def ports(self) -> Iterator[RunningPort]:
@@ -88,7 +100,7 @@ class NodeEntities:
 
     def _log_dds_ports(self, model: Node) -> None:
         for port in model.ports:
-            objection = self.context.delivery.objection(port)
+            objection = self.context.router.dds_reason(port)
             if objection is not None:
                 self.context.log.debug(f"{port.kind} '{port.name}' uses DDS only: {objection}")
 
@@ -142,5 +154,5 @@ class NodeEntities:
         return None if declared is None else self._compile(declared, response_type)
 
     def _compile(self, declared: Reaction, response_type: Any = None) -> RunningReaction:
-        callers: dict[str, Caller] = {**self.clients, **self.action_clients}
+        callers: dict[str, ReactionClient] = {**self.clients, **self.action_clients}
         return RunningReaction(self.context, declared, self.senders, callers, response_type)

@@ -26,8 +26,9 @@ from rclpy.type_support import check_is_valid_srv_type
 from composer.behavior import TransitionFailed
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import describe, traceback_of
-from composer.runtime.executors.loop import Reply, never_called
-from composer.runtime.executors.tasks import Cancelled, Future, within
+from composer.runtime.executors.futures import Cancelled, Future
+from composer.runtime.executors.loop import Reply, unused_callback
+from composer.runtime.executors.tasks import within
 
 _NAMES = {
     Transition.TRANSITION_CONFIGURE: "configure",
@@ -82,16 +83,16 @@ class Lifecycle:
     """
 
     def __init__(
-        self, core: NodeContext, hooks: Hooks, *, timeout_s: float, services: bool = True
+        self, context: NodeContext, hooks: Hooks, *, timeout_s: float, services: bool = True
     ) -> None:
         """Join the graph. Without ``services`` there is only the topic ``transition_event``."""
-        node = core.node
-        loop = core.loop
+        node = context.node
+        loop = context.loop
         self._node = node
         self._loop = loop
-        self._strand = core.strand
+        self._strand = context.strand
         self._hooks = hooks
-        self._log = core.log
+        self._log = context.log
         self._timeout_s = timeout_s
         self._lock = threading.Lock()
         self._current: Future[None] | None = None  # the transition that runs now
@@ -331,7 +332,7 @@ def _services(node: Node, machine: Any) -> list[Service]:
     """Wrap the services that rcl created, so that the node owns and destroys them."""
     group = node.default_callback_group
     services = [
-        Service(handle, kind, handle.name, never_called, group, QoSProfile(**handle.qos))
+        Service(handle, kind, handle.name, unused_callback, group, QoSProfile(**handle.qos))
         for handle, kind in (
             (machine.service_change_state, ChangeState),
             (machine.service_get_state, GetState),

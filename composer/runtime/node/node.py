@@ -19,14 +19,13 @@ from composer.behavior import TransitionFailed
 from composer.model import BehaviorReference, Event, LogLevel, Node, PeriodError
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log, describe
-from composer.runtime.callbacks.mutation_check import MutationCheck, SeenMessages
-from composer.runtime.clock.clock import Clock
+from composer.runtime.callbacks.mutation_check import MessageSnapshots, MutationCheck
+from composer.runtime.clock.clock import NodeTime
+from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.strand import InlineStrand, SerialStrand
-from composer.runtime.executors.tasks import Future
-from composer.runtime.executors.user_code import calls_user_code
-from composer.runtime.intra_process.lifecycle_gate import Gate
-from composer.runtime.intra_process.pending import Pending
+from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import (
     Named,
@@ -35,12 +34,11 @@ from composer.runtime.node.behavior_loader import (
     method,
     named_ports,
 )
-from composer.runtime.node.entities import NodeEntities
+from composer.runtime.node.entities import NodeEntities, RunningPort
 from composer.runtime.node.lifecycle import FINALIZED, Lifecycle, TransitionResult
 from composer.runtime.node.options import NodeOptions
 from composer.runtime.node.parameters import NodeParameters
 from composer.runtime.node.ros_node import make_ros_node
-from composer.runtime.ports.port import RunningPort
 
 T = TypeVar("T")
 
@@ -100,20 +98,20 @@ class RunningNode:
         self._context = NodeContext(
             node=self._ros,
             loop=loop,
-            clock=Clock(self._ros, loop, options.process.simulated_time, self._time_switched),
-            gate=Gate(model.full_name, Pending(loop.call_later)),
+            clock=NodeTime(self._ros, loop, options.process.simulated_time, self._time_switched),
+            gate=LifecycleGate(model.full_name, PendingFutures(loop.call_later)),
             strand=SerialStrand(loop.call_soon) if options.parallel else InlineStrand(),
             log=log,
             error_log=error_log,
             statistics=self.statistics,
             names={"parameters": {}, "state": {}, "node": model.full_name},
-            delivery=options.delivery,
+            router=options.router,
             chains=options.chains.of(model),
             events=options.process.events,
             mutations=_mutation_check(options.seen_messages, error_log),
         )
         # Ports that are always on have a gate of their own and share the rest.
-        always_on_gate = Gate(model.full_name, Pending(loop.call_later))
+        always_on_gate = LifecycleGate(model.full_name, PendingFutures(loop.call_later))
         self._always_on_context = replace(self._context, gate=always_on_gate)
         self._behavior: Any = None
         self._entities = NodeEntities(self._context, self._always_on_context)
@@ -158,7 +156,7 @@ class RunningNode:
         if self._error_limit is not None:
             self._error_limit.paused = True  # it has failed already
         for context in self.contexts:
-            context.gate.hush()
+            context.gate.block()
 
     def sent(self, publisher: str) -> int:
         """Return how many messages a publisher has sent."""
@@ -237,7 +235,7 @@ class RunningNode:
         if self._error_limit is not None:
             self._error_limit.paused = True
         for context in self.contexts:
-            context.gate.end_hush()
+            context.gate.unblock_outgoing()
 
     def _resume_error_limit(self, *, restart: bool) -> None:
         if self._error_limit is None or not self._system_is_up:
@@ -279,7 +277,7 @@ class RunningNode:
         self._set_used(behavior, behavior.publishers, *entities.senders.values())
 
     def _set_used(self, *used: object) -> None:
-        self._context.used = self._always_on_context.used = used
+        self._context.hot_objects = self._always_on_context.hot_objects = used
 
     async def _deactivate(self, context: NodeContext, ports: Iterable[RunningPort]) -> None:
         """Stop receiving and cancel what is pending. Publishers stay open for last messages."""
@@ -287,7 +285,7 @@ class RunningNode:
         deactivated = tuple(ports)
         for port in deactivated:
             port.deactivate()
-        context.gate.end_pending()
+        context.gate.cancel_pending()
         for server in self._entities.action_servers.values():
             if server in deactivated:
                 await server.drain()
@@ -306,7 +304,7 @@ class RunningNode:
         if isinstance(result, Awaitable):
             result = await result
         if self._context.mutations is not None:
-            self._context.mutations.look(name)
+            self._context.mutations.check(name)
         if result is None or result is True:
             return
         if result is False:
@@ -357,7 +355,7 @@ class RunningNode:
                 self._context.spawn(self._context.strand.wrap(rest))
 
 
-def _settle(gate: Gate, state: str, is_open: bool, ports: Iterable[RunningPort]) -> None:
+def _settle(gate: LifecycleGate, state: str, is_open: bool, ports: Iterable[RunningPort]) -> None:
     """Open or close a gate, and the ports behind it, in the primary state ``state``."""
     gate.state = state
     if is_open:
@@ -379,5 +377,5 @@ def _error_limit(model: Node, listener: NodeListener) -> ErrorLimit | None:
     return ErrorLimit(max_errors.value, window_s, listener.on_error_limit)
 
 
-def _mutation_check(seen: SeenMessages | None, error_log: ErrorLog) -> MutationCheck | None:
+def _mutation_check(seen: MessageSnapshots | None, error_log: ErrorLog) -> MutationCheck | None:
     return None if seen is None else MutationCheck(seen, error_log.error)

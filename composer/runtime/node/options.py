@@ -6,34 +6,34 @@ from dataclasses import dataclass
 
 from composer.model import LogLevel
 from composer.runtime.callbacks.chains import Chains
-from composer.runtime.callbacks.mutation_check import SeenMessages
-from composer.runtime.clock.sim_time import SimulatedTime
-from composer.runtime.executors.event_counts import AnnouncedEvents
-from composer.runtime.intra_process.router import Delivery
+from composer.runtime.callbacks.mutation_check import MessageSnapshots
+from composer.runtime.clock.sim_time import SimTimeSource
+from composer.runtime.executors.event_counts import EventCounts
+from composer.runtime.intra_process.router import Router
 
 
 @dataclass(frozen=True, slots=True)
 class ProcessContext:
     """What all nodes of the process share, on the loop of the manager node."""
 
-    simulated_time: SimulatedTime
-    events: AnnouncedEvents
+    simulated_time: SimTimeSource
+    events: EventCounts
 
 
 @dataclass(frozen=True, slots=True)
 class NodeOptions:
     """How a node is run.
 
-    ``delivery`` connects its ports with those of the other nodes of the process; ``chains`` are
+    ``router`` connects its ports with those of the other nodes of the process; ``chains`` are
     those of the system; ``seen_messages`` is set if messages are checked for changes by callbacks;
     ``parallel`` is true if its loop has several threads; ``system_is_up`` is false during the
     bring-up, when errors do not count as faults: some nodes wait for others.
     """
 
-    delivery: Delivery
+    router: Router
     chains: Chains
     process: ProcessContext
-    seen_messages: SeenMessages | None = None
+    seen_messages: MessageSnapshots | None = None
     parallel: bool = False
     log_level: LogLevel = LogLevel.INFO
     transition_timeout_s: float = 10.0

@@ -1,1 +1,1 @@
-"""The ports of a running node, one kind a file. All are gated by the node's lifecycle state."""
+"""The ports of a running node, one kind per file. The node's lifecycle state gates all of them."""

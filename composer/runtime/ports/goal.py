@@ -1,4 +1,4 @@
-"""One goal at an action server, from its acceptance to its end."""
+"""One goal at an action server, from its acceptance until it has ended."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from rclpy.action.server import GoalEvent, ServerGoalHandle
 
-from composer.runtime.executors.tasks import Future
+from composer.runtime.executors.futures import Future
 
 
 class RunningGoal:
-    """What an action handler gets; see :class:`composer.behavior.Goal`.
+    """The goal that an action handler gets; see :class:`composer.behavior.Goal`.
 
-    rclpy lets a goal end as canceled only when a client asked for it. Here the node may end one
-    too, because it leaves *active* or because its handler says so.
+    In rclpy a goal can only be canceled on a client's request. Here the node may cancel it too,
+    because it leaves *active* or because the handler does so.
     """
 
     def __init__(
-        self, handle: ServerGoalHandle, give_feedback: Callable[[bytes, Any], None]
+        self, handle: ServerGoalHandle, publish_local: Callable[[bytes, Any], None]
     ) -> None:
-        """``give_feedback`` takes the goal's identity, and feedback for who is in the process."""
+        """``publish_local`` gets the goal's identity and feedback for clients of the process."""
         self._handle = handle
-        self._give_feedback = give_feedback
-        self._leaving = False
+        self._publish_local = publish_local
+        self._is_node_leaving = False
         self.task: Future[Any] | None = None
         self.ended: Future[None] = Future()
 
@@ -40,33 +40,33 @@ class RunningGoal:
 
     @property
     def is_open(self) -> bool:
-        """True until the goal has ended in one of the three ways."""
+        """Whether the goal has not succeeded, aborted or been canceled yet."""
         return bool(self._handle.is_active)
 
     @property
     def status(self) -> int:
-        """The status as action_msgs/msg/GoalStatus numbers it."""
+        """The status, a constant of action_msgs/msg/GoalStatus."""
         return int(self._handle.status)
 
     @property
     def is_cancel_requested(self) -> bool:
-        """True once the client asked for the end, or the node is leaving the active state."""
-        return self._leaving or bool(self._handle.is_cancel_requested)
+        """Whether a client requested cancellation, or the node is leaving the active state."""
+        return self._is_node_leaving or bool(self._handle.is_cancel_requested)
 
     def execute(self) -> None:
-        """Say that work on the goal begins, unless it is to be canceled already."""
+        """Set the status to executing, unless the goal is being canceled."""
         if self.status == GoalStatus.STATUS_ACCEPTED:
             self._handle._update_state(GoalEvent.EXECUTE)
 
-    def leave(self) -> None:
-        """Tell the handler that the node is leaving the active state."""
-        self._leaving = True
+    def request_cancel(self) -> None:
+        """Notify the handler that the node is leaving the active state."""
+        self._is_node_leaving = True
 
     def publish_feedback(self, feedback: Any) -> None:
-        """Send feedback to the client. Raises TypeError when it is not the action's Feedback."""
+        """Send feedback to the client. Raises TypeError for another type than the Feedback."""
         if self.is_open:
             self._handle.publish_feedback(feedback)
-            self._give_feedback(self.identity, feedback)
+            self._publish_local(self.identity, feedback)
 
     def succeed(self) -> None:
         """End the goal as succeeded."""

@@ -1,4 +1,4 @@
-"""Ends of a topic that do not meet because their types or their QoS do not go together."""
+"""Reports endpoints that do not match a port because of their type or QoS."""
 
 from __future__ import annotations
 
@@ -7,66 +7,66 @@ from collections.abc import Iterator
 from composer.model import Port, PortKind
 from composer.qos import incompatibilities
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.ros.endpoints import End, topic_info
+from composer.runtime.ros.endpoints import Endpoint, topic_info
 
-_LOOK_EVERY_S = 0.1
-_LOOKS = 20
+_CHECK_PERIOD_S = 0.1
+_CHECKS = 20
 
 
-class Misfits:
-    """Tells of each node at the other end of a port that the port does not meet, once."""
+class IncompatibleQos:
+    """Warns once of each node whose endpoint does not match a port."""
 
-    def __init__(self, core: NodeContext, port: Port) -> None:
-        self._core = core
+    def __init__(self, context: NodeContext, port: Port) -> None:
+        self._context = context
         self._port = port
-        self._told: set[str] = set()
-        self._looks_left = 0
+        self._reported: set[str] = set()
+        self._checks_left = 0
         self._closed = False
 
-    def look(self) -> None:
-        """Look for them now. The middleware may know of an end before it knows whose it is."""
-        is_looking = self._looks_left > 0
-        self._looks_left = _LOOKS
-        if not is_looking:
-            self._look()
+    def check(self) -> None:
+        """Check now, and again until the middleware knows the endpoint and its node."""
+        is_checking = self._checks_left > 0
+        self._checks_left = _CHECKS
+        if not is_checking:
+            self._check()
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop checking."""
         self._closed = True
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         if self._closed:
             return
-        self._looks_left -= 1
-        others = self._others()
-        if self._looks_left and (not others or any(other.is_nameless for other in others)):
-            self._core.loop.call_later(_LOOK_EVERY_S, self._look)
+        self._checks_left -= 1
+        others = self._incompatible()
+        if self._checks_left and (not others or any(other.is_nameless for other in others)):
+            self._context.loop.call_later(_CHECK_PERIOD_S, self._check)
             return
-        self._looks_left = 0
-        for text in (text for other in others for text in self._objections(other)):
-            if text not in self._told:
-                self._told.add(text)
-                self._core.log.warn(f"{self._port.kind} '{self._port.name}' {text}")
+        self._checks_left = 0
+        for text in (text for other in others for text in self._reasons(other)):
+            if text not in self._reported:
+                self._reported.add(text)
+                self._context.log.warn(f"{self._port.kind} '{self._port.name}' {text}")
 
-    def _others(self) -> tuple[End, ...]:
-        info = topic_info(self._core.node, self._port.full_name, ())
-        found = info.subscriptions if self._is_publisher else info.publishers
-        return tuple(other for other in found if any(self._objections(other)))
+    def _incompatible(self) -> tuple[Endpoint, ...]:
+        info = topic_info(self._context.node, self._port.full_name, ())
+        others = info.subscriptions if self._is_publisher else info.publishers
+        return tuple(other for other in others if any(self._reasons(other)))
 
     @property
     def _is_publisher(self) -> bool:
         return self._port.kind is PortKind.PUBLISHER
 
-    def _objections(self, other: End) -> Iterator[str]:
+    def _reasons(self, other: Endpoint) -> Iterator[str]:
         port = self._port
-        meets = "reaches nothing of" if self._is_publisher else "hears nothing of"
-        topic = f"{meets} {other.name} on {port.full_name}"
+        topic = f"is incompatible with {other.name} on {port.full_name}"
         if other.type != port.interface.value:
-            yield f"{topic}: the type there is {other.type}, here {port.interface.value}"
+            yield f"{topic}: its type is {other.type}, not {port.interface.value}"
             return
         own = port.qos.profile
-        ends = (own, other.qos) if self._is_publisher else (other.qos, own)
-        for found in incompatibilities(*ends):
-            offered, requested = found.offered, found.requested
+        profiles = (own, other.qos) if self._is_publisher else (other.qos, own)
+        for incompatibility in incompatibilities(*profiles):
+            offered, requested = incompatibility.offered, incompatibility.requested
             here, there = (offered, requested) if self._is_publisher else (requested, offered)
-            yield f"{topic}: {found.policy} is {there} there, {here} here; {found.reason}"
+            policy, reason = incompatibility.policy, incompatibility.reason
+            yield f"{topic}: {policy} is {there} there, {here} here; {reason}"

@@ -1,7 +1,8 @@
-"""What a subscription has received and works on in turn."""
+"""The mailbox of a subscription: the messages that it received and has not handled yet."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Coroutine
 from functools import partial
 from math import inf
@@ -13,45 +14,84 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.loop import Taken
 from composer.runtime.executors.strand import InlineStrand
 from composer.runtime.metrics.statistics import CallbackStatistics
-from composer.runtime.ports.queue import Queue, queue_of
 
-#: The queue and the turn of a mailbox, and objects that are used when a message is handled.
-Needed = tuple[Queue, Callable[[], object], object, object, object, object, object, object, object]
+#: From this depth on, popping the first item of a list is slow: it moves all others.
+_DEEP = 256
 
 
-class Keeper(Protocol):
-    """Takes what nobody works on."""
+class MessageQueue(Protocol):
+    """Messages, the oldest first. Every method is atomic."""
+
+    def append(self, message: Any, /) -> None:
+        """Add a message."""
+
+    def pop(self, first: int, /) -> Any:
+        """Remove and return a message; ``first`` must be 0. Raises IndexError if empty."""
+
+    def clear(self) -> None:
+        """Remove all messages."""
+
+    def __len__(self) -> int:
+        """Return the number of messages."""
+
+
+class _DeepQueue(deque[Any]):
+    """A deque that pops its first item as a list does."""
+
+    def pop(self, _first: int = 0, /) -> Any:
+        """Remove and return the oldest message."""
+        return self.popleft()
+
+
+def message_queue(depth: float) -> MessageQueue:
+    """Return a queue for up to about ``depth`` messages.
+
+    A shallow one is a list. An empty list is a single object in memory, while a deque has a
+    separate block for 64 messages: one more cache miss per message in a large system.
+    """
+    return [] if depth < _DEEP else _DeepQueue()
+
+
+#: The queue and turn of a mailbox, and other objects that are used when a message is handled.
+Prefetched = tuple[
+    MessageQueue, Callable[[], object], object, object, object, object, object, object, object
+]
+
+
+class MailboxOwner(Protocol):
+    """Receives the messages that the mailbox does not handle."""
 
     def hold(self, message: Any) -> None:
-        """Keep or drop a message that comes while the gate is shut."""
+        """Keep or drop a message that arrives while the gate is closed."""
 
     def count_drop(self) -> None:
-        """Count the oldest message, which made room."""
+        """Count a message that was dropped from a full queue."""
 
 
 class Mailbox(Callback):
-    """The messages of one subscription, in the order in which they were put, as deep as its QoS.
+    """The messages of one subscription, in order, up to the depth of its QoS.
 
-    They are handled on its loop, one per turn of it, so that a flood holds nobody up, and one at a
-    time: what a handler awaits, the next message waits for as well. Everything that a message needs
-    is in this one object, as in :class:`~composer.runtime.intra_process.publisher.Sender`.
+    They are handled on its loop, one per turn of the loop, so that a flood does not block others,
+    and one at a time: while a handler awaits, the next message waits too. One object per endpoint
+    holds everything that a message needs, as in
+    :class:`~composer.runtime.intra_process.publisher.GatedPublisher`.
 
-    Each message brings a turn along. One that pushes another out does not, or a flood would fill
-    the loop; there, and after a handler that awaited, an extra turn takes one message and sees to
-    it that whatever is left is taken.
+    Each message schedules a turn, except one that drops another, or a flood would fill the loop.
+    Then, and after a handler that awaited, an extra turn handles one message and schedules another
+    one if messages are left.
     """
 
     __slots__ = (
         "_depth",
         "_extra_turn",
         "_gate",
-        "_has_no_extra",
         "_is_awaiting",
-        "_is_direct",
-        "_keeper",
+        "_is_inline",
         "_loop",
+        "_may_schedule_extra",
         "_messages",
-        "_needed",
+        "_owner",
+        "_prefetched",
         "_turn",
         "count",
     )
@@ -59,55 +99,55 @@ class Mailbox(Callback):
 
     def __init__(
         self,
-        core: NodeContext,
+        context: NodeContext,
         port: Port,
         handle: Callable[[Any], Any],
         statistics: CallbackStatistics,
-        keeper: Keeper,
+        owner: MailboxOwner,
     ) -> None:
-        """Without a depth it keeps everything. What ``handle`` raises is a fault of the handler's.
+        """Without a depth, the queue is unlimited. Exceptions of ``handle`` are its faults.
 
-        What ``handle`` returns is awaited, where it can be.
+        The result of ``handle`` is awaited if it is awaitable.
         """
         depth = port.qos.profile.queue_depth
-        super().__init__(core, f"on_{port.name.value}", handle, statistics, port.budget_ms)
-        self._loop = core.loop
-        self._gate = core.gate
-        #: How many messages were given to the handler.
+        super().__init__(context, f"on_{port.name.value}", handle, statistics, port.budget_ms)
+        self._loop = context.loop
+        self._gate = context.gate
+        #: Number of messages passed to the handler.
         self.count = 0
         self._depth = inf if depth is None else depth
-        self._keeper = keeper
-        self._messages = queue_of(self._depth)
-        # Popping is atomic: there is one extra turn at a time, whichever thread wants it.
-        self._has_no_extra = [True]
+        self._owner = owner
+        self._messages = message_queue(self._depth)
+        # Popping is atomic: only one extra turn is scheduled, whichever threads try.
+        self._may_schedule_extra = [True]
         self._is_awaiting = False
-        # On a loop of one thread one is at a time anyway.
-        self._is_direct = self._overlaps or isinstance(core.strand, InlineStrand)
-        self._turn = self._one_at_a_time(self._take_turn)
-        self._extra_turn = self._one_at_a_time(self._take_extra_turn)
-        self._needed = self._what_is_needed()
+        # A loop of one thread runs one callback at a time in any case.
+        self._is_inline = self._overlaps or isinstance(context.strand, InlineStrand)
+        self._turn = self._on_strand(self._take_turn)
+        self._extra_turn = self._on_strand(self._take_extra_turn)
+        self._prefetched = self._objects_to_prefetch()
 
     def put(self, message: Any) -> None:
-        """Have the message worked on soon, from any thread."""
-        # Most of these are used later only. What was not used for some milliseconds has to be
-        # fetched from far away; when it is asked for all at once, the fetching overlaps.
-        messages, turn, _, _, _, _, _, _, _ = self._needed
+        """Handle the message soon, from any thread."""
+        # Most of these objects are only used later. After some idle milliseconds each is a cache
+        # miss; referring to all of them at once lets the misses overlap.
+        messages, turn, _, _, _, _, _, _, _ = self._prefetched
         if len(messages) >= self._depth:
             self._make_room()
             messages.append(message)
-            self._ask_for_extra()
+            self._schedule_extra()
         else:
             messages.append(message)
             self._loop.call_soon(turn)
 
     def receive(self, taken: Taken) -> None:
-        """Have the message worked on, at once where nothing waits. To be called on the loop."""
+        """Handle the message, at once if no other one waits. Call it on the loop."""
         message, _ = taken
         if not self._gate.incoming:
-            self._keeper.hold(message)
+            self._owner.hold(message)
         elif self._messages or self._is_awaiting:
             self.put(message)
-        elif self._is_direct:  # as in _take_turn: nobody else can take it out of turn
+        elif self._is_inline:  # as in _take_turn: no other thread can take it
             self.count += 1
             rest = self._call(message)
             if rest is not None:
@@ -116,25 +156,25 @@ class Mailbox(Callback):
             self._messages.append(message)
             self._turn()
 
-    def begin_anew(self) -> None:
-        """Let go of what has come since the gate was shut, and waits for what was begun before."""
-        self._needed = self._what_is_needed()
+    def restart(self) -> None:
+        """Prepare for activation: drop what arrived since the gate closed, while one awaits."""
+        self._prefetched = self._objects_to_prefetch()
         if self._is_awaiting:
             self.clear()
 
     def clear(self) -> None:
-        """Let go of everything that waits."""
+        """Pass all waiting messages to the owner."""
         while self._messages:
             try:
                 message = self._messages.pop(0)
             except IndexError:
                 return  # a turn was faster
-            self._keeper.hold(message)
+            self._owner.hold(message)
 
     def close(self) -> None:
-        """Take nothing more."""
+        """Handle nothing more."""
         self._handle = _ignore
-        self._keeper = _Nobody()
+        self._owner = _NoOwner()
         self._messages.clear()
 
     def _make_room(self) -> None:
@@ -142,26 +182,26 @@ class Mailbox(Callback):
             try:
                 self._messages.pop(0)
             except IndexError:
-                return  # a turn was faster, or another thread
-            self._keeper.count_drop()
+                return  # a turn or another thread was faster
+            self._owner.count_drop()
 
-    def _what_is_needed(self) -> Needed:
-        first, second, third, fourth, *_ = (*self._core.used, None, None, None, None)
-        mine = (self._messages, self._turn, self._gate, self._handle, self._waiting)
-        return (*mine, first, second, third, fourth)
+    def _objects_to_prefetch(self) -> Prefetched:
+        first, second, third, fourth, *_ = (*self._context.hot_objects, None, None, None, None)
+        own = (self._messages, self._turn, self._gate, self._handle, self._batch)
+        return (*own, first, second, third, fourth)
 
-    def _one_at_a_time(self, take: Callable[[], object]) -> Callable[[], object]:
-        return take if self._is_direct else partial(self._core.strand.post, take)
+    def _on_strand(self, turn: Callable[[], object]) -> Callable[[], object]:
+        return turn if self._is_inline else partial(self._context.strand.post, turn)
 
     def _take_turn(self) -> None:
         if self._is_awaiting:
-            return  # an extra turn comes after it
+            return  # an extra turn follows
         try:
             message = self._messages.pop(0)
         except IndexError:
-            return  # cleared meanwhile, or pushed out
+            return  # cleared or dropped meanwhile
         if not self._gate.incoming:
-            self._keeper.hold(message)
+            self._owner.hold(message)
             return
         self.count += 1
         rest = self._call(message)
@@ -170,50 +210,50 @@ class Mailbox(Callback):
 
     def _wait_for(self, rest: Coroutine[Any, Any, None]) -> None:
         self._is_awaiting = True
-        task = self._core.spawn(self._core.strand.wrap(rest))
+        task = self._context.spawn(self._context.strand.wrap(rest))
         task.add_done_callback(self._resume)
 
     def _resume(self, _: object) -> None:
         self._is_awaiting = False
         if self._messages:
-            self._ask_for_extra()
+            self._schedule_extra()
 
-    def _ask_for_extra(self) -> None:
+    def _schedule_extra(self) -> None:
         try:
-            self._has_no_extra.pop()
+            self._may_schedule_extra.pop()
         except IndexError:
-            return  # it is on its way, and has not begun
+            return  # one is scheduled and has not begun
         self._loop.call_soon(self._extra_turn)
 
     def _take_extra_turn(self) -> None:
-        self._has_no_extra.append(True)  # first: what comes from now on may ask for the next
+        self._may_schedule_extra.append(True)  # first, so that new messages can schedule the next
         try:
             self._take_turn()
         finally:
             if self._messages and not self._is_awaiting:
-                self._ask_for_extra()
+                self._schedule_extra()
 
 
 class OverlappingMailbox(Mailbox):
-    """The messages of a reentrant subscription: none waits for the one before."""
+    """The mailbox of a reentrant subscription: no message waits for the previous one."""
 
     __slots__ = ()
 
     _overlaps = True
 
     def _wait_for(self, rest: Coroutine[Any, Any, None]) -> None:
-        self._core.spawn(rest)
+        self._context.spawn(rest)
 
 
-class _Nobody:
-    """Keeps nothing of what comes after the end."""
+class _NoOwner:
+    """Ignores the messages of a closed mailbox."""
 
     def hold(self, message: Any) -> None:
-        """Let go of it."""
+        """Drop the message."""
 
     def count_drop(self) -> None:
         """Count nothing."""
 
 
 def _ignore(_: Any) -> None:
-    """Do nothing with what comes after the end."""
+    """Do nothing with a message that arrives after the mailbox was closed."""

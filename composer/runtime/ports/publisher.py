@@ -9,43 +9,43 @@ from rclpy.event_handler import PublisherEventCallbacks
 
 from composer.model import Port
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.mutation_check import Remembered
-from composer.runtime.intra_process.publisher import Origin, Target
+from composer.runtime.callbacks.mutation_check import RememberingTarget
+from composer.runtime.intra_process.publisher import PublisherContext, Target
 from composer.runtime.ports.qos_events import QosEvents
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
 
 class PublisherPort:
-    """Publishes while the node is active; drops, counts and says so once while it is not."""
+    """Publishes while the node is active; otherwise drops and counts messages, and warns once."""
 
     __slots__ = (
-        "_core",
-        "_leave",
+        "_context",
+        "_count",
         "_name",
         "_publisher",
         "_qos_events",
-        "_tally",
+        "_remove",
         "_warned",
-        "sender",
+        "gated",
     )
 
-    def __init__(self, core: NodeContext, port: Port) -> None:
-        self._core = core
+    def __init__(self, context: NodeContext, port: Port) -> None:
+        self._context = context
         self._name = port.name.value
-        self._qos_events = QosEvents(core, port)
-        self._publisher = core.node.create_publisher(
+        self._qos_events = QosEvents(context, port)
+        self._publisher = context.node.create_publisher(
             interface_class(port.interface.value),
             port.full_name,
             rclpy_profile(port.qos.profile),
-            callback_group=core.group,
+            callback_group=context.group,
             event_callbacks=cast(PublisherEventCallbacks, self._qos_events),
         )
-        origin = Origin(core.gate, self._drop, tuple(self._watchers(port)))
-        #: What the node publishes with.
-        self.sender, self._leave = core.delivery.add_publisher(port, self._publisher, origin)
-        self._tally = core.statistics.publisher(self._name)
-        self._tally.begin(self.sender)
+        origin = PublisherContext(context.gate, self._drop, tuple(self._observers(port)))
+        #: The publisher that the node's behavior and reactions use.
+        self.gated, self._remove = context.router.add_publisher(port, self._publisher, origin)
+        self._count = context.statistics.publisher(self._name)
+        self._count.begin(self.gated)
         self._warned = False
 
     def activate(self) -> None:
@@ -53,23 +53,23 @@ class PublisherPort:
         self._warned = False
 
     def deactivate(self) -> None:
-        """Nothing waits in a publisher."""
+        """Do nothing: no message waits in a publisher."""
 
     def destroy(self) -> None:
-        """Leave the topic."""
+        """Destroy the publisher."""
         self._qos_events.close()
-        self._leave()
-        self._tally.end()
-        self._core.node.destroy_publisher(self._publisher)
+        self._remove()
+        self._count.end()
+        self._context.node.destroy_publisher(self._publisher)
 
-    def _watchers(self, port: Port) -> Iterator[Target]:
-        yield from self._core.chains.watching(port)
-        if self._core.mutations is not None:
-            yield Remembered(self._core.mutations, f"published by '{self._name}'")
+    def _observers(self, port: Port) -> Iterator[Target]:
+        yield from self._context.chains.published_by(port)
+        if self._context.mutations is not None:
+            yield RememberingTarget(self._context.mutations, f"published by '{self._name}'")
 
     def _drop(self) -> None:
-        self._core.statistics.dropped += 1
+        self._context.statistics.dropped += 1
         if not self._warned:
             self._warned = True
-            reason = self._core.gate.refusal
-            self._core.log.warn(f"publisher '{self._name}' drops its messages: {reason}")
+            reason = self._context.gate.refusal
+            self._context.log.warn(f"publisher '{self._name}' drops its messages: {reason}")

@@ -8,141 +8,140 @@ from typing import Any
 from composer.model import Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import describe
-from composer.runtime.callbacks.queue import line_for
+from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.callbacks.timing import CallbackTimer
-from composer.runtime.executors.loop import Reply
-from composer.runtime.executors.tasks import Cancelled
-from composer.runtime.executors.user_code import calls_user_code
-from composer.runtime.intra_process.service import Server
-from composer.runtime.ports.port import callback_group
+from composer.runtime.executors.futures import Cancelled
+from composer.runtime.executors.loop import Reply, unused_callback
+from composer.runtime.executors.stacks import calls_user_code
+from composer.runtime.intra_process.service import LocalService
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
 Handler = Callable[[Any, Any], Any]
 
 
-class Request:
-    """A request that has come, and the way back to whoever asked. Answered once."""
+class PendingRequest:
+    """A request without a response. It is answered once."""
 
-    __slots__ = ("_open", "_reply", "content")
+    __slots__ = ("_pending", "_reply", "content")
 
-    def __init__(self, content: Any, reply: Reply, still_open: set[Request]) -> None:
+    def __init__(self, content: Any, reply: Reply, pending: set[PendingRequest]) -> None:
         self.content = content
         self._reply = reply
-        self._open = still_open
-        still_open.add(self)
+        self._pending = pending
+        pending.add(self)
 
-    def answer(self, response: Any) -> None:
-        """Send ``response``, unless there was an answer already."""
-        if self in self._open:
-            self._open.discard(self)
+    def respond(self, response: Any) -> None:
+        """Send ``response``, unless there was one already."""
+        if self in self._pending:
+            self._pending.discard(self)
             self._reply(response)
 
 
 class ServicePort:
-    """Answers every request, so that nobody waits for an answer that never comes.
+    """Responds to every request, so that no client waits in vain.
 
-    While the node is active the port's reaction and handler answer, otherwise a refusal does.
-    A refusal, and what is answered for a handler that failed, has ``success`` false and the reason
-    in ``message`` where the response has such fields; otherwise the fields keep their defaults and
-    the log alone has the reason.
+    While the node is active, the port's reaction and handler respond; otherwise the request is
+    refused. If a request is refused or its handler fails, the response has ``success`` false and
+    the reason in ``message``, if it has such fields. Otherwise its fields keep their defaults, and
+    only the log has the reason.
     """
 
     def __init__(
         self,
-        core: NodeContext,
+        context: NodeContext,
         port: Port,
         reaction: RunningReaction | None,
         handler: Handler | None,
     ) -> None:
-        self._core = core
+        self._context = context
         self._name = port.name.value
         self._type = interface_class(port.interface.value)
         self._response_type: Any = self._type.Response
-        self._explains = _explains(self._response_type)
+        self._has_reason = _has_reason(self._response_type)
         self._reaction = reaction
         self._handler = handler
-        self._open: set[Request] = set()
-        # Whoever asks waits for an answer and gives up in time, so none is pushed out.
-        traced = core.statistics.callback(port.kind.value, self._name)
-        self._line = line_for(
-            core,
-            self._work,
-            CallbackTimer(core, traced, port.budget_ms),
+        self._pending: set[PendingRequest] = set()
+        # Clients wait for a response and time out by themselves, so no request is dropped.
+        statistics = context.statistics.callback(port.kind.value, self._name)
+        self._queue = queue_for(
+            context,
+            self._handle,
+            CallbackTimer(context, statistics, port.budget_ms),
             depth=None,
             reentrant=port.reentrant,
         )
-        self._service = core.node.create_service(
+        self._service = context.node.create_service(
             self._type,
             port.full_name,
-            _never_called,
+            unused_callback,
             qos_profile=rclpy_profile(port.qos.profile),
-            callback_group=callback_group(core, port),
+            callback_group=context.group_of(port),
         )
-        core.loop.add_service(self._service, self.receive)
-        server = Server(port, self._type, core.loop.call_soon, self.receive)
-        self._leave = core.delivery.add_server(port, server)
+        context.loop.add_service(self._service, self.on_request)
+        local = LocalService(port, self._type, context.loop.call_soon, self.on_request)
+        self._remove = context.router.add_service(port, local)
 
-    def receive(self, content: Any, reply: Reply) -> None:
-        """Take a request that has come."""
-        request = Request(content, reply, self._open)
-        if not self._core.gate.incoming:
+    def on_request(self, content: Any, reply: Reply) -> None:
+        """Handle a request."""
+        request = PendingRequest(content, reply, self._pending)
+        if not self._context.gate.incoming:
             self._refuse(request)
             return
-        self._core.statistics.calls += 1
-        self._line.put(request)
+        self._context.statistics.calls += 1
+        self._queue.put(request)
 
     def activate(self) -> None:
-        """Do nothing: requests get in as soon as the gate is open."""
+        """Do nothing: the gate lets requests in."""
 
     def deactivate(self) -> None:
-        """Refuse what waits."""
-        for request in self._line.clear():
+        """Refuse the waiting requests."""
+        for request in self._queue.clear():
             self._refuse(request)
 
     def destroy(self) -> None:
-        """Answer what is still open and leave."""
-        self._leave()
-        for request in tuple(self._open):
+        """Refuse the pending requests and destroy the service."""
+        self._remove()
+        for request in tuple(self._pending):
             self._refuse(request)
-        self._core.loop.remove(self._service)
-        self._core.node.destroy_service(self._service)
+        self._context.loop.remove(self._service)
+        self._context.node.destroy_service(self._service)
 
-    def _refuse(self, request: Request) -> None:
-        reason = self._core.gate.refusal
-        if not self._explains:
-            self._core.log.warn(f"service '{self._name}' refuses a request: {reason}")
-        request.answer(self._failure(reason))
+    def _refuse(self, request: PendingRequest) -> None:
+        reason = self._context.gate.refusal
+        if not self._has_reason:
+            self._context.log.warn(f"service '{self._name}' refuses a request: {reason}")
+        request.respond(self._failure(reason))
 
     def _failure(self, reason: str) -> Any:
         response = self._response_type()
-        if self._explains:
+        if self._has_reason:
             response.message = reason
         return response
 
     @calls_user_code
-    def _work(self, request: Request) -> Coroutine[Any, Any, None] | None:
+    def _handle(self, request: PendingRequest) -> Coroutine[Any, Any, None] | None:
         response = None
         if self._reaction is not None:
             try:
                 response = self._reaction.run(request=request.content)
             except Exception as error:
-                self._failed(request, f"service '{self._name}'", error)
+                self._fail(request, f"service '{self._name}'", error)
                 return None
         if response is None:
             response = self._response_type()
         if self._handler is None:
-            request.answer(response)
+            request.respond(response)
             return None
         try:
             result = self._handler(request.content, response)
         except BaseException as error:
-            self._failed(request, self._callback, error)
+            self._fail(request, self._callback, error)
             return None
         if not isinstance(result, self._response_type) and isinstance(result, Awaitable):
-            return self._answer_later(request, result)
-        self._answer(request, result)
+            return self._respond_later(request, result)
+        self._respond(request, result)
         return None
 
     @property
@@ -150,36 +149,30 @@ class ServicePort:
         return f"on_{self._name}"
 
     @calls_user_code
-    async def _answer_later(self, request: Request, result: Awaitable[Any]) -> None:
+    async def _respond_later(self, request: PendingRequest, result: Awaitable[Any]) -> None:
         try:
-            self._answer(request, await result)
+            self._respond(request, await result)
         except (Cancelled, GeneratorExit):
             self._refuse(request)
             raise
         except BaseException as error:
-            request.answer(self._failure(f"{self._callback}: {describe(error)}"))
-            self._core.take(self._callback, error)
+            request.respond(self._failure(f"{self._callback}: {describe(error)}"))
+            self._context.on_exception(self._callback, error)
 
-    def _answer(self, request: Request, result: Any) -> None:
+    def _respond(self, request: PendingRequest, result: Any) -> None:
         if isinstance(result, self._response_type):
-            request.answer(result)
+            request.respond(result)
             return
-        wanted = f"{self._type.__name__}.Response"
-        text = f"returned {result!r:.80}, not a {wanted}"
-        self._core.error_log.error(self._callback, text)
-        request.answer(self._failure(f"{self._callback} {text}"))
+        text = f"returned {result!r:.80}, not a {self._type.__name__}.Response"
+        self._context.error_log.error(self._callback, text)
+        request.respond(self._failure(f"{self._callback} {text}"))
 
-    def _failed(self, request: Request, callback: str, error: BaseException) -> None:
-        self._core.error_log.exception(callback, error)
-        request.answer(self._failure(f"{callback}: {describe(error)}"))
+    def _fail(self, request: PendingRequest, callback: str, error: BaseException) -> None:
+        self._context.error_log.exception(callback, error)
+        request.respond(self._failure(f"{callback}: {describe(error)}"))
 
 
-def _explains(response_type: Any) -> bool:
-    """Say whether the response has the usual fields to say that and why it failed."""
+def _has_reason(response_type: Any) -> bool:
+    """Return whether the response has the usual fields for failures and their reasons."""
     fields = response_type.get_fields_and_field_types()
     return bool(fields.get("success") == "boolean" and fields.get("message") == "string")
-
-
-def _never_called(_: Any, response: Any) -> Any:
-    """Stand where rclpy wants a callback; the loop calls ``receive`` instead."""
-    return response

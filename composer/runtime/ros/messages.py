@@ -1,8 +1,8 @@
-"""From template values to ROS messages.
+"""Builds ROS messages from templates.
 
-A template is compiled once for the message it fills; constants are converted then. Conversions
-follow the rule of parameters: an integer is fine where a floating-point number is wanted, nothing
-else is converted, except that a number put into a Time or a Duration means seconds.
+A template is compiled once for its message type, and constants are converted then. Conversions
+follow the rule of parameters: an integer is accepted for a floating-point number, and nothing else
+is converted, except that a number for a Time or a Duration means seconds.
 """
 
 from __future__ import annotations
@@ -64,15 +64,15 @@ _NOT_INSTALLED = (
     NoTypeSupportImportedException,
     UnsupportedTypeSupport,
 )
-#: A class notes down its own type support first and that of its parts after it. Who uses it on
-#: another thread in between meets parts without any, and rclpy can neither take nor send.
+#: A class loads its own type support first and that of its fields after it. If another thread
+#: uses the class in between, its fields have none, and rclpy can neither take nor send.
 _LOADING = threading.Lock()
 
 
 class MessageError(Exception):
-    """A value does not fit the field it is put into; the text names both.
+    """A value does not fit its field; the text names both.
 
-    ``hint`` names what may have been meant.
+    ``hint`` suggests a similar name.
     """
 
     def __init__(self, message: str, hint: str | None = None) -> None:
@@ -82,32 +82,32 @@ class MessageError(Exception):
 
 @cache
 def interface_class(name: str) -> Any:
-    """Return the class of ``package/folder/Name``, ready to be used on any thread.
+    """Return the class of ``package/folder/Name``, ready for use on any thread.
 
     Raises MessageError when it is not installed.
     """
     module, _, class_name = name.rpartition("/")
     try:
-        found = getattr(import_module(module.replace("/", ".")), class_name)
+        message_class = getattr(import_module(module.replace("/", ".")), class_name)
         with _LOADING:
-            check_for_type_support(found)
+            check_for_type_support(message_class)
     except _NOT_INSTALLED as error:
         raise MessageError(f"interface '{name}' is not installed for Python: {error}") from error
-    return found
+    return message_class
 
 
 def compile_message(template: Template, message_type: Any, what: str) -> Build:
-    """Return a function that makes a ``message_type`` from a scope.
+    """Return a function that builds a ``message_type`` from a scope.
 
-    ``what`` names the message in errors, for example ``publish to 'chatter'``. Raises
-    MessageError, now for what is wrong in any case, and from the function for values that turn
-    out not to fit; the function raises EvaluationError as well.
+    ``what`` names the message in errors, for example ``publish to 'chatter'``. Raises MessageError
+    for errors that do not depend on the scope. The function raises MessageError and
+    EvaluationError.
     """
     return _message(template, message_type, what)
 
 
 def convert_message(value: Any, message_type: Any, what: str) -> Any:
-    """Return a ``message_type`` made of plain data: a map of fields, or seconds for a time.
+    """Return a ``message_type`` from plain data: a map of fields, or seconds for a time.
 
     Raises MessageError.
     """
@@ -131,7 +131,7 @@ def _record(template: Record, message_type: Any, where: str) -> Build:
     for name, content in template.fields:
         if name.value not in types:
             raise _no_field(where, message_type, name.value)
-        build = _field(content, types[name.value], _inside(where, name.value))
+        build = _field(content, types[name.value], _field_path(where, name.value))
         (constants if isinstance(content, Constant) else setters).append((name.value, build))
     values = [(name, build({})) for name, build in constants]
 
@@ -151,11 +151,11 @@ def _field(template: Template, field_type: Any, where: str) -> Build:
         case Record() if isinstance(field_type, NamespacedType):
             return _record(template, _message_class(field_type), where)
         case Record():
-            raise MessageError(f"{where} is {_described(field_type)}, not a map of fields")
+            raise MessageError(f"{where} is {_kind_of(field_type)}, not a map of fields")
         case Items() if isinstance(field_type, AbstractNestedType):
             return _items(template, field_type, where)
         case Items():
-            raise MessageError(f"{where} is {_described(field_type)}, not a list")
+            raise MessageError(f"{where} is {_kind_of(field_type)}, not a list")
         case Constant():
             constant = _converter(field_type, where)(template.value)
             return lambda _: constant
@@ -209,7 +209,7 @@ def _basic_converter(type_name: str, where: str) -> Convert:
 def _exactly(kind: type, described: str, where: str) -> Convert:
     def convert_value(value: Any) -> Any:
         if not isinstance(value, kind):
-            raise MessageError(f"{where} takes {described}, not {_shown(value)}")
+            raise MessageError(f"{where} takes {described}, not {_format(value)}")
         return value
 
     return convert_value
@@ -217,16 +217,16 @@ def _exactly(kind: type, described: str, where: str) -> Convert:
 
 def _float(value: Any, where: str) -> float:
     if isinstance(value, bool) or not hasattr(value, "__float__") or isinstance(value, str):
-        raise MessageError(f"{where} takes a number, not {_shown(value)}")
+        raise MessageError(f"{where} takes a number, not {_format(value)}")
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise MessageError(f"{where} takes a number, not {_shown(value)}") from error
+        raise MessageError(f"{where} takes a number, not {_format(value)}") from error
 
 
 def _integer(value: Any, low: int, high: int, where: str) -> int:
     if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise MessageError(f"{where} takes an integer, not {_shown(value)}")
+        raise MessageError(f"{where} takes an integer, not {_format(value)}")
     number = int(value)
     if not low <= number <= high:
         raise MessageError(f"{where} takes an integer from {low} to {high}, not {number}")
@@ -245,8 +245,8 @@ def _text_converter(field_type: Any, where: str) -> Convert:
 
     def convert_value(value: Any) -> str:
         if not isinstance(value, str) or len(value) > field_type.maximum_size:
-            wanted = f"a text of up to {field_type.maximum_size} letters"
-            raise MessageError(f"{where} takes {wanted}, not {_shown(value)}")
+            expected = f"a text of up to {field_type.maximum_size} letters"
+            raise MessageError(f"{where} takes {expected}, not {_format(value)}")
         return value
 
     return convert_value
@@ -262,7 +262,7 @@ def _message_converter(message_type: Any, where: str) -> Convert:
             return _from_mapping(value, message_type, where)
         if name in _SECONDS_TYPES and isinstance(value, (int, float)):
             return _from_seconds(value, message_type, where)
-        raise MessageError(f"{where} takes a {name}, not {_shown(value)}")
+        raise MessageError(f"{where} takes a {name}, not {_format(value)}")
 
     return convert_value
 
@@ -273,7 +273,7 @@ def _from_mapping(value: Mapping[str, Any], message_type: Any, where: str) -> An
     for name, content in value.items():
         if name not in types:
             raise _no_field(where, message_type, name)
-        setattr(message, name, _converter(types[name], _inside(where, name))(content))
+        setattr(message, name, _converter(types[name], _field_path(where, name))(content))
     return message
 
 
@@ -281,10 +281,10 @@ def _from_seconds(value: float, message_type: Any, where: str) -> Any:
     try:
         seconds, nanoseconds = divmod(round(value * _NANOSECONDS), _NANOSECONDS)
     except (ValueError, OverflowError) as error:
-        raise MessageError(f"{where} takes seconds, not {_shown(value)}") from error
+        raise MessageError(f"{where} takes seconds, not {_format(value)}") from error
     low, high = _INTEGER_RANGES["int32"]
     if isinstance(value, bool) or not low <= seconds <= high:
-        raise MessageError(f"{where} takes seconds from {low} to {high}, not {_shown(value)}")
+        raise MessageError(f"{where} takes seconds from {low} to {high}, not {_format(value)}")
     return message_type(sec=seconds, nanosec=nanoseconds)
 
 
@@ -296,9 +296,9 @@ def _list_converter(field_type: Any, where: str) -> Convert:
 
     def convert_value(value: Any) -> Any:
         if of_any_length and isinstance(value, array) and value.typecode == typecode:
-            return value  # an image's data is not looked at byte by byte
+            return value  # do not check the data of an image byte by byte
         if isinstance(value, (str, Mapping)) or not hasattr(value, "__iter__"):
-            raise MessageError(f"{where} takes a list, not {_shown(value)}")
+            raise MessageError(f"{where} takes a list, not {_format(value)}")
         items = [convert_item(item) for item in value]
         if isinstance(field_type, Array) and len(items) != field_type.size:
             raise MessageError(f"{where} takes {field_type.size} items, not {len(items)}")
@@ -331,12 +331,12 @@ def _type_name(message_type: Any) -> str:
     return f"{package}/{message_type.__name__}"
 
 
-def _inside(where: str, name: str) -> str:
-    """Name a field of ``where``, which is the message itself or one of its fields already."""
+def _field_path(where: str, name: str) -> str:
+    """Return the path of a field of ``where``, a message or one of its fields."""
     return f"{where} field {name}" if where.endswith("'") else f"{where}.{name}"
 
 
-def _described(field_type: Any) -> str:
+def _kind_of(field_type: Any) -> str:
     match field_type:
         case BasicType():
             return f"a {field_type.typename}"
@@ -348,6 +348,6 @@ def _described(field_type: Any) -> str:
             return "a list"
 
 
-def _shown(value: Any) -> str:
+def _format(value: Any) -> str:
     text = repr(value)
     return f"{type(value).__name__} {text if len(text) <= 80 else text[:77] + '...'}"

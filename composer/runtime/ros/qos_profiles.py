@@ -1,6 +1,9 @@
-"""QoS profiles as rclpy wants them."""
+"""Converts QoS profiles to and from rclpy's."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.qos import (
@@ -11,9 +14,11 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 
-from composer.qos import QosProfile
+from composer.qos import Durability, History, Liveliness, QosProfile, Reliability
 
-_NANOSECONDS = 1e6
+_NANOSECONDS = 1e6  # per millisecond
+#: Durations above are rmw's infinite duration: no limit.
+_NO_LIMIT_MS = 1e12
 
 
 def rclpy_profile(profile: QosProfile) -> QoSProfile:
@@ -30,6 +35,38 @@ def rclpy_profile(profile: QosProfile) -> QoSProfile:
     )
 
 
+def discovered_profile(profile: QoSProfile) -> QosProfile:
+    """Return the profile of a discovered endpoint. History and depth are usually not discovered."""
+    converted = QosProfile(
+        reliability=(
+            Reliability.BEST_EFFORT
+            if profile.reliability is ReliabilityPolicy.BEST_EFFORT
+            else Reliability.RELIABLE
+        ),
+        durability=(
+            Durability.TRANSIENT_LOCAL
+            if profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+            else Durability.VOLATILE
+        ),
+        deadline_ms=_milliseconds(profile.deadline),
+        lifespan_ms=_milliseconds(profile.lifespan),
+        liveliness=(
+            Liveliness.MANUAL_BY_TOPIC
+            if profile.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
+            else Liveliness.AUTOMATIC
+        ),
+        liveliness_lease_duration_ms=_milliseconds(profile.liveliness_lease_duration),
+    )
+    if profile.history is HistoryPolicy.KEEP_ALL:
+        return replace(converted, history=History.KEEP_ALL)
+    return converted
+
+
 def _duration(milliseconds: float | None) -> Duration:
-    """No limit is rmw's unspecified duration, zero, which the middleware takes for infinite."""
+    """Return a duration; zero, which is rmw's unspecified duration, for no limit."""
     return Duration(nanoseconds=round((milliseconds or 0.0) * _NANOSECONDS))
+
+
+def _milliseconds(duration: Any) -> float | None:
+    milliseconds = duration.nanoseconds / _NANOSECONDS
+    return None if milliseconds >= _NO_LIMIT_MS else milliseconds

@@ -14,11 +14,16 @@ from pathlib import Path
 from time import sleep
 from types import FrameType
 
-from composer.runtime.callbacks.queue import Line
+from composer.runtime.callbacks.queue import CallbackQueue
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.stacks import shown, stacks_of, undisturbed
-from composer.runtime.executors.user_code import CALLERS, HARMLESS
+from composer.runtime.executors.stacks import (
+    INTERRUPTIBLE,
+    USER_CODE_CALLERS,
+    format_stack,
+    gc_paused,
+    stacks_of,
+)
 from composer.runtime.node.node import RunningNode
 from composer.runtime.ports.mailbox import Mailbox
 
@@ -60,18 +65,20 @@ class RunningCallback:
         code while the frame is read.
         """
         owners = {id(part): node for node in nodes for part in (node, *node.contexts)}
-        with undisturbed():
+        with gc_paused():
             for frame in self._callers:
                 subject = frame.f_locals.get("self")
-                owner = owners.get(id(subject)) or owners.get(id(getattr(subject, "_core", None)))
-                if owner is not None or isinstance(subject, (Line, Mailbox)):
+                owner = owners.get(id(subject)) or owners.get(
+                    id(getattr(subject, "_context", None))
+                )
+                if owner is not None or isinstance(subject, (CallbackQueue, Mailbox)):
                     return owner
         return None
 
     def stack(self) -> str:
         """Return the Python stack of the callback; empty if it has returned."""
         stack = stacks_of((self.thread,)).get(self.thread, [])
-        return shown(stack[: stack.index(self.call)]) if self.call in stack else ""
+        return format_stack(stack[: stack.index(self.call)]) if self.call in stack else ""
 
     def interrupt(self) -> None:
         """Raise CallbackInterrupted in it, as soon as it runs Python code of the user.
@@ -100,7 +107,7 @@ def running_callbacks(loop: Loop) -> Iterator[list[RunningCallback]]:
 
     Delivery calls the callback of a receiver within that of the sender.
     """
-    for ident, stack in stacks_of(loop.threads()).items():
+    for ident, stack in stacks_of(loop.busy_threads()).items():
         if callbacks := [_callback(ident, stack, at) for at in _callers(stack)]:
             yield callbacks
 
@@ -109,7 +116,9 @@ def _callers(stack: Sequence[FrameType]) -> Iterator[int]:
     """Yield, for each callback on a stack, the index of the frame that calls it."""
     inner: FrameType | None = None
     for at, frame in enumerate(stack):
-        calls_user = id(frame.f_code) in CALLERS and (inner is None or not _is_composer(inner))
+        calls_user = id(frame.f_code) in USER_CODE_CALLERS and (
+            inner is None or not _is_composer(inner)
+        )
         if calls_user or frame.f_code is _REACTION:
             yield at
         inner = frame
@@ -130,4 +139,4 @@ def _plain_frame(callers: Sequence[FrameType]) -> FrameType:
 
 
 def _is_composer(frame: FrameType) -> bool:
-    return frame.f_code.co_filename.startswith(_COMPOSER) and id(frame.f_code) not in HARMLESS
+    return frame.f_code.co_filename.startswith(_COMPOSER) and id(frame.f_code) not in INTERRUPTIBLE

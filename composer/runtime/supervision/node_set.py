@@ -19,12 +19,11 @@ from composer.model import (
 )
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.log import describe
-from composer.runtime.callbacks.mutation_check import SeenMessages
-from composer.runtime.executors.factory import log_exception, make_loop
+from composer.runtime.callbacks.mutation_check import MessageSnapshots
+from composer.runtime.executors.factory import log_exception, make_loop, place_threads
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.thread_placement import place
 from composer.runtime.intra_process.eligibility import shared_channels
-from composer.runtime.intra_process.router import Delivery
+from composer.runtime.intra_process.router import Router
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, chain_figures, figures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import FINALIZED
@@ -75,9 +74,9 @@ class NodeSet:
         self._system = system
         self._make_listener = make_listener
         self._options = options
-        self._seen_messages = SeenMessages() if options.check_mutation else None
+        self._seen_messages = MessageSnapshots() if options.check_mutation else None
         self._executors = {executor.name.value: executor for executor in system.executors}
-        self._delivery = Delivery({})
+        self._router = Router({})
         self._chains = Chains(system, tracing=options.tracing)
         self._process: ProcessContext  # set by create()
         self.nodes: dict[str, RunningNode] = {}
@@ -98,11 +97,11 @@ class NodeSet:
         Raises CreationFailed. Then no loop runs, and the nodes created until then remain.
         """
         self._process = process
-        self._delivery = Delivery(shared_channels(self._system))
-        if self._delivery.refusal is not None:
+        self._router = Router(shared_channels(self._system))
+        if self._router.refusal is not None:
             self.warnings.append(
                 "topics within the process use DDS, which takes more CPU time:"
-                f" {self._delivery.refusal}; see 'compose doctor', or set 'delivery: dds'"
+                f" {self._router.refusal}; see 'compose doctor', or set 'delivery: dds'"
             )
         for node in self._system.nodes:
             before_each()
@@ -116,7 +115,7 @@ class NodeSet:
         for name, loop in self.loops.items():
             loop.start()
             if name in self._executors:
-                self.warnings += place(self._executors[name], loop.thread_ids())
+                self.warnings += place_threads(self._executors[name], loop.native_thread_ids())
 
     def timeout_s(self, name: str) -> float:
         """Return the time limit of a node's transitions."""
@@ -225,7 +224,7 @@ class NodeSet:
             self.loops[name] = make_loop(executor, _log_exception)
         options = NodeOptions(
             chains=self._chains,
-            delivery=self._delivery,
+            router=self._router,
             process=self._process,
             seen_messages=self._seen_messages,
             parallel=executor.kind is ExecutorKind.MULTI_THREADED,

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from composer.plan import Plan, Step
-from composer.runtime.executors.tasks import Future
+from composer.runtime.executors.futures import Future
 from composer.runtime.node.lifecycle import TransitionResult
 from composer.runtime.supervision.interruption import running_callbacks
 from composer.runtime.supervision.main_queue import Item, MainQueue
@@ -243,12 +243,12 @@ class PlanExecutor:
         """
         node = self._node_set.nodes[item.step.node]
         if self._node_set.is_lost(item.step.node):
-            return node.loop.where()
+            return node.loop.current_stack()
         running = [innermost for innermost, *_ in running_callbacks(node.loop)]
         own = [callback for callback in running if callback.node((node,)) is node]
         if not own and time.monotonic() < item.late_s:
             return ""
-        stack = node.loop.where()
+        stack = node.loop.current_stack()
         for callback in own or running:
             callback.interrupt()
         if running:

@@ -47,7 +47,7 @@ def wait_for_ticks(system: RunningSystem, *times_s: float) -> None:
 def wait_for_timer(system: RunningSystem) -> None:
     """Wait until the timer in simulated time waits: what jumps before that it does not see."""
     clock = system.node("a")._context.clock
-    wait_until(lambda: clock._calls._waiting, "a timer that waits")
+    wait_until(lambda: clock._sim_timers._waiting, "a timer that waits")
 
 
 def let_real_time_pass(system: RunningSystem) -> None:

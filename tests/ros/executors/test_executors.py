@@ -13,7 +13,8 @@ import rclpy
 
 from composer.model import ExecutorKind
 from composer.runtime.executors.factory import make_loop
-from composer.runtime.executors.tasks import Future, sleep
+from composer.runtime.executors.futures import Future
+from composer.runtime.executors.tasks import sleep
 from tests.ros.support.loops import KINDS, Bench, bench, executor_of, wait_until
 
 
@@ -207,8 +208,8 @@ class TestRun:
         seen: list[str] = []
         for _ in range(3):  # as many as there are threads
             on.loop.call_soon(release.wait)
-        wait_until(on.loop.where)
-        with pytest.raises(TimeoutError, match="was not begun"):
+        wait_until(on.loop.current_stack)
+        with pytest.raises(TimeoutError, match="was not started"):
             on.loop.run(lambda: seen.append("begun"), 0.1)
         release.set()
         assert on.loop.run(lambda: "after", 5.0) == "after"
@@ -223,9 +224,9 @@ class TestWhere:
             release.wait()
 
         on.loop.call_soon(hang_here)
-        wait_until(lambda: "hang_here" in on.loop.where())
+        wait_until(lambda: "hang_here" in on.loop.current_stack())
         release.set()
-        wait_until(lambda: on.loop.where() == "")
+        wait_until(lambda: on.loop.current_stack() == "")
 
 
 def used_s(on: Bench) -> float:
@@ -234,7 +235,7 @@ def used_s(on: Bench) -> float:
     In the process there may be what tests before have left. The clock of a thread is numbered as
     Linux does: see clock_getcpuclockid(3).
     """
-    return sum(time.clock_gettime(~thread_id << 3 | 6) for thread_id in on.loop.thread_ids())
+    return sum(time.clock_gettime(~thread_id << 3 | 6) for thread_id in on.loop.native_thread_ids())
 
 
 def test_idle_costs_nothing(on: Bench) -> None:
@@ -248,7 +249,7 @@ def test_waiting_for_a_busy_thread_costs_nothing(on: Bench) -> None:
     release = threading.Event()
     for _ in range(6):  # more than there are threads
         on.loop.call_soon(release.wait)
-    wait_until(on.loop.where)
+    wait_until(on.loop.current_stack)
     before_s = used_s(on)
     time.sleep(0.5)  # so long it is measured
     meanwhile_s = used_s(on) - before_s
@@ -293,11 +294,11 @@ class TestStopping:
             loop = make_loop(executor_of(kind))
             loop.start()
             loop.call_soon(release.wait)
-            wait_until(loop.where)
+            wait_until(loop.current_stack)
             begin = time.monotonic()
             assert not loop.stop(0.2)
             assert time.monotonic() - begin < 10.0  # it waits for ever
-            assert "wait" in loop.where()
+            assert "wait" in loop.current_stack()
             release.set()
             wait_until(lambda: loop.stop(0.2))
         finally:

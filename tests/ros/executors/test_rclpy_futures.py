@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 from rclpy.task import Future as RclpyFuture
 
+from composer.runtime.executors.futures import Future, wrap_future
 from composer.runtime.executors.strand import SerialStrand, Strand
-from composer.runtime.executors.tasks import Future, Task, wrap_future
+from composer.runtime.executors.tasks import Task
 
 
 class Calls:

@@ -17,11 +17,10 @@ from std_msgs.msg import Int64, String
 from std_srvs.srv import Trigger
 
 from composer.model import ExecutorKind
-from composer.runtime.executors import readiness
-from composer.runtime.executors.entity_sources import Source
+from composer.runtime.executors.entities import readiness
+from composer.runtime.executors.entities.source_group import EntitySource, SourceGroup
 from composer.runtime.executors.event_loop import EventLoop
-from composer.runtime.executors.source_group import Slot
-from composer.runtime.executors.tasks import Future
+from composer.runtime.executors.futures import Future
 from tests.ros.support.loops import Bench, bench, last_line, peer, wait_until
 
 
@@ -136,12 +135,12 @@ def test_an_answer_behind_those_for_others_is_found_at_once(on: Bench) -> None:
     on.node.destroy_client(probe)
 
 
-def slot_of(on: Bench, subscription: object) -> Slot:
+def slot_of(on: Bench, subscription: object) -> SourceGroup:
     assert isinstance(on.loop, EventLoop)
-    return on.loop._slots_of[subscription]
+    return on.loop._group_of[subscription]
 
 
-def takes_of(slot: Slot) -> list[bool]:
+def takes_of(slot: SourceGroup) -> list[bool]:
     """Return what says from now on, for each take of the slot's source, whether something came."""
     takes: list[bool] = []
     source: Any = slot.sources[0]
@@ -191,12 +190,12 @@ def test_a_message_is_taken_once_and_nothing_is_looked_for_after_it(on: Bench) -
     assert takes == [True] * 20
 
 
-class Striking(tuple[Source, ...]):
+class Striking(tuple[EntitySource, ...]):
     """Sources that cannot be gone through the first time, as if the thread were struck there."""
 
     struck = False
 
-    def __iter__(self) -> Iterator[Source]:
+    def __iter__(self) -> Iterator[EntitySource]:
         if not self.struck:
             self.struck = True
             raise SystemExit

@@ -18,7 +18,8 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from type_description_interfaces.srv import GetTypeDescription
 
-from composer.runtime.executors.tasks import Future, sleep, within, wrap_future
+from composer.runtime.executors.futures import Future, wrap_future
+from composer.runtime.executors.tasks import sleep, within
 from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
 
 ERRORS = [ValueError, SystemExit, KeyboardInterrupt]
@@ -76,7 +77,7 @@ def test_a_request_is_answered_once(on: Bench) -> None:
     with pytest.raises(TypeError):
         replies[0]("nonsense")
     replies[0](Trigger.Response(success=True))
-    with pytest.raises(RuntimeError, match="answered already"):
+    with pytest.raises(RuntimeError, match="already answered"):
         replies[0](Trigger.Response())
     wait_until(future.done)
     assert future.result().success

@@ -10,8 +10,7 @@ import pytest
 import rclpy
 
 from composer.model import Executor, ExecutorKind
-from composer.runtime.executors.factory import make_loop
-from composer.runtime.executors.thread_placement import place
+from composer.runtime.executors.factory import make_loop, place_threads
 from composer.source import Located, SourceFile, Span
 from tests.ros.support.in_process import running
 
@@ -46,8 +45,8 @@ def test_every_thread_of_an_executor_is_put_in_its_place(kind: ExecutorKind) -> 
     loop = make_loop(wanted)
     loop.start()
     try:
-        ids = loop.thread_ids()
-        refused = place(wanted, ids)
+        ids = loop.native_thread_ids()
+        refused = place_threads(wanted, ids)
         assert len(set(ids)) == {"events": 1, "single_threaded": 2, "multi_threaded": 5}[kind.value]
         assert [os.sched_getaffinity(thread_id) for thread_id in ids] == [{CPU}] * len(ids)
         if real_time_is_allowed():

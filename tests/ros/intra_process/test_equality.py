@@ -134,7 +134,7 @@ def test_a_connection_may_ask_for_copies_or_for_dds(tmp_path: Path) -> None:
         heard = {name: [item.data for item in sink.heard] for name, sink in sinks.items()}
     said = [line for line in system.log() if "uses DDS only" in line]
     assert said == [
-        f"{end} uses DDS only: 'delivery: dds' says so"
+        f"{end} uses DDS only: 'delivery: dds' is set"
         for end in ("publisher 'by_dds'", "subscription 'input'")
     ]
     assert heard == {"shared": [2], "copied": [1], "by_dds": [1]}

@@ -24,8 +24,8 @@ MIDDLEWARES = Path(__file__).with_name("middlewares")
 PER_WRITER, WRITERS, LATCHED = 400, 3, 3
 #: Each middleware, and why it is not relied on.
 REASONS = {
-    "returns_all": "a publication of the process came back",
-    "unheard_of": "nothing is known of rmw_unheard_of_cpp",
+    "returns_all": "a local publication was received despite the flag",
+    "unheard_of": "rmw_unheard_of_cpp is not supported",
 }
 SYSTEM = """
 system: fallback

@@ -19,7 +19,7 @@ from std_msgs.msg import Int64
 
 from composer.model import LogLevel
 from composer.runtime.host import HostOptions
-from composer.runtime.intra_process import match_flag as marks
+from composer.runtime.intra_process import match_flag
 from tests.ros.support.counting import MODULE, NUMBERS, numbers, send
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
@@ -41,20 +41,21 @@ def outsider() -> Iterator[Callable[[], Peer]]:
 
 
 def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -> None:
-    """Wait until as many subscriptions as that have matched the source, and it was told to look.
+    """Wait until the number of matched subscriptions fits and the source knows or will check.
 
-    The middleware counts first, and tells then.
+    The middleware counts a match before it reports it.
     """
     port = system.node("source")._entities.publishers["numbers"]
-    outlet = port.sender
+    publisher = port.gated
 
-    def knows() -> bool:
+    def is_counted() -> bool:
         matched = port._publisher.get_subscription_count()
-        has_outsiders = matched > len(outlet._inlets)
-        will_look = not marks.MARK[0] or outlet._period is not marks.MATCHES.period
-        return is_matched(matched) and (outlet._has_outsiders is has_outsiders or will_look)
+        has_external = matched > len(publisher._subscriptions)
+        is_current = publisher._generation is match_flag.MATCHING.generation
+        will_check = not match_flag.MATCH_FLAG[0] or not is_current
+        return is_matched(matched) and (publisher._has_external is has_external or will_check)
 
-    wait_until(knows, "so many subscriptions")
+    wait_until(is_counted, "the number of matched subscriptions")
 
 
 @pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
@@ -93,7 +94,7 @@ def test_every_outsider_is_seen_to_come(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tells: bool, level: str
 ) -> None:
     if not tells:  # then the middleware is asked at each message
-        monkeypatch.setattr(marks, "EVENT", lambda *_: 1)
+        monkeypatch.setattr(match_flag, "EVENT", lambda *_: 1)
     context = Context()
     context.init([])
     node = Node("outsider", context=context)
@@ -219,7 +220,7 @@ def test_dds_is_used_only_while_somebody_outside_has_matched(tmp_path: Path) -> 
         assert numbers(system.behavior("near").heard) == list(range(50))
 
 
-def test_a_publisher_that_is_not_active_reaches_nobody_inside(tmp_path: Path) -> None:
+def test_a_publisherthat_is_not_active_reaches_nobody_inside(tmp_path: Path) -> None:
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
         send(system, 2)
         system.change("source", "deactivate")
@@ -232,63 +233,68 @@ def test_a_publisher_that_is_not_active_reaches_nobody_inside(tmp_path: Path) ->
         assert system.node("source").statistics.sent == 3
 
 
-def test_a_look_that_is_overtaken_does_not_hide_who_has_come(tmp_path: Path) -> None:
-    """Two threads publish when somebody matches: the one looks before that, the other after it."""
+def test_an_overtaken_check_does_not_hide_an_external_subscription(tmp_path: Path) -> None:
+    """Two threads publish around a match: one counts before it, the other after it."""
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
         port = system.node("source")._entities.publishers["numbers"]
-        outlet = port.sender
-        overtaking = threading.Thread(target=outlet._look_outside)
+        publisher = port.gated
+        overtaking = threading.Thread(target=publisher._check_external)
 
         def count_matched() -> int:
             if threading.current_thread() is overtaking:
                 return 3
             overtaking.start()
-            overtaking.join(0.2)  # unless it has to wait
+            overtaking.join(0.2)  # unless it waits for the lock
             return 2
 
-        outlet._count_matched = count_matched
-        outlet._look_outside()
+        publisher._count_matched = count_matched
+        publisher._check_external()
         overtaking.join()
-        assert outlet._has_outsiders
+        assert publisher._has_external
 
 
-def test_who_joins_inside_during_a_look_is_not_taken_for_the_one_outside(tmp_path: Path) -> None:
-    """It is counted who has matched before somebody joins, and who is of the process after it."""
+def test_a_subscription_that_joins_during_a_check_is_not_an_external_one(tmp_path: Path) -> None:
+    """The matches are counted before a local subscription joins, the local ones after it."""
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
-        outlet = system.node("source")._entities.publishers["numbers"].sender
-        near, far = outlet._inlets
-        outlet.leave(far)
-        joining, is_checked = threading.Thread(target=outlet.join, args=(far,)), threading.Event()
+        publisher = system.node("source")._entities.publishers["numbers"].gated
+        near, far = publisher._subscriptions
+        publisher.leave(far)
+        joining, is_checked = (
+            threading.Thread(target=publisher.join, args=(far,)),
+            threading.Event(),
+        )
 
         def count_matched() -> int:
             if threading.current_thread() is joining:
-                is_checked.wait()  # what the look of before has led to
+                is_checked.wait()  # until the result of the first check is read
                 return 3
             joining.start()
-            wait_until(lambda: outlet._inlets == (near, far))
-            return 2  # near, and one outside
+            wait_until(lambda: publisher._subscriptions == (near, far))
+            return 2  # near, and an external one
 
-        outlet._count_matched = count_matched
-        outlet._look_outside()
-        has_outsiders = outlet._has_outsiders
+        publisher._count_matched = count_matched
+        publisher._check_external()
+        has_external = publisher._has_external
         is_checked.set()
         joining.join()
-        assert has_outsiders
-        assert outlet._has_outsiders
+        assert has_external
+        assert publisher._has_external
 
 
-def test_nobody_goes_by_a_period_that_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The mark says that all is seen to: from then on the old period must not be found."""
-    matches = marks.Matches()
-    periods = [matches.period]
+def test_the_generation_changes_before_and_after_the_flag_is_set(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Once the flag is set, no thread may see the old generation."""
+    matching = match_flag.Matching()
+    generations = [matching.generation]
 
-    class Mark(bytearray):
+    class Flag(bytearray):
         def __setitem__(self, *_: Any) -> None:
-            periods.append(matches.period)
+            generations.append(matching.generation)
 
-    monkeypatch.setattr(marks, "MARK", Mark(1))
-    matches.begin_period()
-    assert len({*periods, matches.period}) == 3
+    monkeypatch.setattr(match_flag, "MATCH_FLAG", Flag(1))
+    matching.begin_generation()
+    assert len({*generations, matching.generation}) == 3
 
 
 REMAPPED = """

@@ -242,7 +242,7 @@ def test_requests_during_a_transition_are_refused(tmp_path: Path, peer: Peer) ->
 def test_a_handler_that_never_ends_is_an_error(tmp_path: Path, peer: Peer) -> None:
     module = """
     from composer.behavior import Behavior
-    from composer.runtime.executors.tasks import Future
+    from composer.runtime.executors.futures import Future
 
     class Subject(Behavior):
         async def on_configure(self):

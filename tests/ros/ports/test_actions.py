@@ -90,7 +90,7 @@ def test_goals_are_rejected_by_accept_and_by_a_node_that_is_not_active(
     with running(SERVER.replace("KIND", "events"), tmp_path) as system:
         navigator = Navigator(peer)
         assert not navigator.send(max_velocity=0.0).accepted
-        system.wait_for_log("rejects a goal: it does not fulfil 'accept'")
+        system.wait_for_log("rejects a goal: it does not fulfill 'accept'")
         assert peer.change("/server", "deactivate")
         assert not navigator.send().accepted
         system.wait_for_log("rejects a goal: /server is inactive, not active")
@@ -195,7 +195,7 @@ def test_a_handler_that_does_not_end_its_goal_is_ended(tmp_path: Path, peer: Pee
                     await never(self)
 
     async def never(behavior):
-        from composer.runtime.executors.tasks import Future
+        from composer.runtime.executors.futures import Future
         await Future()
     """
     with running(handled(), tmp_path, handled=module) as system:
@@ -205,7 +205,7 @@ def test_a_handler_that_does_not_end_its_goal_is_ended(tmp_path: Path, peer: Pee
         assert peer.change("/handled", "deactivate")
         assert navigator.result(handle)[0] == GoalStatus.STATUS_CANCELED
         assert peer.change("/handled", "cleanup")
-    assert "action server 'navigate': a goal did not end, it is canceled now" in system.log()
+    assert "action server 'navigate': a goal did not end within 1 s, canceled" in system.log()
 
 
 @pytest.mark.parametrize(
@@ -267,7 +267,7 @@ nodes:
     [
         ("1.0", ["feedback 50.0 of 1.0", "succeeded: done"]),
         ("-1.0", ["feedback 50.0 of -1.0", "aborted: "]),
-        ("100.0", ["failed: action '/navigate' did not take the goal"]),
+        ("100.0", ["failed: action '/navigate' rejected the goal"]),
     ],
 )
 def test_the_reactions_of_an_action_client(

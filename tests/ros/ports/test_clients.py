@@ -52,14 +52,14 @@ def test_a_declared_call_is_answered(tmp_path: Path, peer: Peer) -> None:
 def test_a_server_that_is_not_there_is_told_of(tmp_path: Path) -> None:
     with running(declared(on_failure=True), tmp_path) as system:
         line = system.wait_for_log("failed")
-    assert line == "failed: no server of service '/trigger' was there within 200 ms"
+    assert line == "failed: no server of service '/trigger' was available within 200 ms"
 
 
 def test_a_failure_that_nothing_is_declared_for_is_logged_and_counted(tmp_path: Path) -> None:
     with running(ASKER, tmp_path) as system:
         line = system.wait_for_log("within 200 ms")
         counted = system.summary("/asker")
-    assert line == "client 'trigger': no server of service '/trigger' was there within 200 ms"
+    assert line == "client 'trigger': no server of service '/trigger' was available within 200 ms"
     assert counted.errors == 1
 
 
@@ -125,14 +125,14 @@ def test_calls_and_sleeps_end_when_the_node_leaves_active(
     with running(CALLER.replace("KIND", kind), tmp_path, caller=MODULE) as system:
         system.wait_for_log("asking")
         system.wait_for_log("resting")
-        core = system.node("caller")._context
-        wait_until(lambda: len(core.gate.pending._futures) == 2, "both wait")
+        context = system.node("caller")._context
+        wait_until(lambda: len(context.gate.pending._futures) == 2, "both wait")
         assert peer.change("/caller", "deactivate")
         assert peer.state("/caller") == "inactive"
-        wait_until(lambda: not core.tasks, "nothing runs any more")
+        wait_until(lambda: not context.tasks, "nothing runs any more")
         counted = system.summary("/caller")
     assert "cancelled: /caller is deactivating, not active" in system.log()
-    assert "last try: no server of service '/trigger' was there within 20 ms" in system.log(), (
+    assert "last try: no server of service '/trigger' was available within 20 ms" in system.log(), (
         "a node may make calls while it deactivates"
     )
     assert counted.errors == 0

@@ -13,7 +13,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from composer.model import ExecutorKind
-from composer.runtime.ports import repeated
+from composer.runtime.callbacks import log
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 KINDS = [str(kind) for kind in ExecutorKind]
@@ -49,14 +49,14 @@ nodes:
     subscriptions: {{beat: {{type: std_msgs/msg/String, qos: beat, log: "heard"}}}}
 """
 OF_PUBLISHER = "publisher 'beat' on /beat: nothing was published within its deadline of 200 ms"
-OF_SUBSCRIPTION = "subscription 'beat' on /beat: nothing came within its deadline of 200 ms"
+OF_SUBSCRIPTION = "subscription 'beat' on /beat: nothing was received within its deadline of 200 ms"
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_missed_deadline_within_the_process_is_told_at_once_and_then_summed_up(
     tmp_path: Path, peer: Peer, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(repeated, "AGAIN_AFTER_S", 1.0)
+    monkeypatch.setattr(log, "WARNING_PERIOD_S", 1.0)
     with running(TIMED.format(kind=kind, deadline_ms=200), tmp_path) as system:
         wait_until(lambda: len(lines(system, "heard")) > 10)
         assert peer.set_parameter("/talker", "period_ms", 1e6) == ""
@@ -142,7 +142,8 @@ nodes:
 def test_a_publisher_that_gives_no_sign_of_life_is_told(tmp_path: Path, peer: Peer) -> None:
     with running(MANUAL, tmp_path) as system:
         peer.publisher(String, "/go").publish(String())
-        assert system.wait_for_log("no sign of life") == (
-            "publisher 'alive' on /alive: it gave no sign of life within its lease of 300 ms"
+        assert system.wait_for_log("did not assert its liveliness") == (
+            "publisher 'alive' on /alive: "
+            "it did not assert its liveliness within its lease of 300 ms"
         )
         assert counts(system, "talker") == {"liveliness_lost": 1}

@@ -58,12 +58,12 @@ def test_outsiders_with_another_qos_are_named_with_the_policy(
         name = peer.node.get_fully_qualified_name()
         heard = system.wait_for_log("subscription 'input'")
         assert heard == (
-            f"subscription 'input' hears nothing of {name} on /input: reliability is best_effort "
-            "there, reliable here; the publisher does not send lost messages again"
+            f"subscription 'input' is incompatible with {name} on /input: reliability is "
+            "best_effort there, reliable here; the publisher does not send lost messages again"
         )
         reached = system.wait_for_log("publisher 'output'")
         assert reached == (
-            f"publisher 'output' reaches nothing of {name} on /output: durability is "
+            f"publisher 'output' is incompatible with {name} on /output: durability is "
             "transient_local there, volatile here; "
             "the publisher does not keep messages for late joiners"
         )
@@ -85,9 +85,9 @@ def test_an_outsider_with_another_type_is_named(tmp_path: Path, peer: Peer) -> N
             system.wait_for_log("reliability is best_effort")
         finally:
             other.close()
-        assert system.wait_for_log("the type there") == (
-            f"subscription 'input' hears nothing of {name} on /input: the type there is "
-            "std_msgs/msg/Int64, here std_msgs/msg/String"
+        assert system.wait_for_log("its type is") == (
+            f"subscription 'input' is incompatible with {name} on /input: its type is "
+            "std_msgs/msg/Int64, not std_msgs/msg/String"
         )
 
 

@@ -15,7 +15,7 @@ from rclpy.event_handler import QoSSubscriptionEventType
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from composer.runtime.executors.event_counts import AnnouncedEvents
+from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.event_loop import EventLoop
 from tests.ros.support.commands import hand_written
 from tests.ros.support.in_process import PATIENCE_S, Peer, RunningSystem, running, wait_until
@@ -63,7 +63,7 @@ def test_messages_that_are_lost_are_counted_one_by_one(tmp_path: Path) -> None:
 
         wait_until(three_floods_add_up)
         told = system.wait_for_log("lost")
-        assert told.startswith("subscription 'big' on /big: a message was lost on its way; it is ")
+        assert told.startswith("subscription 'big' on /big: a message was lost in transit; it is ")
 
 
 SILENCE = """
@@ -88,9 +88,9 @@ def test_a_publisher_that_falls_silent_is_told_and_one_that_leaves_is_not(
             wait_until(lambda: "flood" in node.get_node_names(), "its name")
             peer.node.destroy_publisher(leaving)
             flood.kill()
-            assert system.wait_for_log("no sign of life") == (
-                "subscription 'alive' on /alive: a publisher gave no sign of life within the lease "
-                "of 500 ms; it is published by /flood"
+            assert system.wait_for_log("did not assert its liveliness") == (
+                "subscription 'alive' on /alive: a publisher did not assert its liveliness "
+                "within the lease of 500 ms; it is published by /flood"
             )
         assert counts(system)["liveliness_changed"] == 1
 
@@ -143,7 +143,7 @@ def test_statuses_taken_all_the_time_freeze_nothing(peer: Peer) -> None:
     publisher.publish(String())
     told: list[int] = []
     kind = QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED
-    end = AnnouncedEvents(loop).watch_status(
+    end = EventCounts(loop).watch_status(
         subscription.handle, kind, lambda status: told.append(status.total_count)
     )
     try:

@@ -125,7 +125,7 @@ def test_requests_that_are_under_way_when_the_node_leaves_active_are_refused(
         system.wait_for_log("begun")
         waiting = client.call_async(Trigger.Request())
         port = system.node("handled")._entities.services["deferred"]
-        wait_until(lambda: len(port._open) == 2)
+        wait_until(lambda: len(port._pending) == 2)
         assert peer.change("/handled", "deactivate")
         answers = [finished(first), finished(waiting)]
     assert [answer.success for answer in answers] == [False, False]

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from composer.runtime.clock.sim_timers import NANOSECONDS, SimulatedCalls
+from composer.runtime.clock.sim_timers import NANOSECONDS, SimTimers
 
 
 class Loop:
@@ -30,7 +30,7 @@ class Bench:
 
     def __init__(self) -> None:
         self.loop = Loop()
-        self.calls = SimulatedCalls(self.loop)
+        self.calls = SimTimers(self.loop)
         self.called: list[float] = []
 
     def note(self) -> None:
@@ -40,7 +40,7 @@ class Bench:
         """Return when calls were made on the way."""
         self.called.clear()
         for time_s in times_s:
-            self.calls.take_time(round(time_s * NANOSECONDS))
+            self.calls.set_time(round(time_s * NANOSECONDS))
             self.loop.run()
         return list(self.called)
 
@@ -62,7 +62,7 @@ def test_a_period_is_met_exactly_however_many_there_were(bench: Bench) -> None:
     bench.calls.add(0.1, bench.note, repeats=True)
     start_ns = bench.calls.now_ns
     for step in range(1, 10_001):
-        bench.calls.take_time(start_ns + step * 100_000_000)
+        bench.calls.set_time(start_ns + step * 100_000_000)
         bench.loop.run()
     assert len(bench.called) == 10_000
 
@@ -93,7 +93,7 @@ def test_a_call_that_is_under_way_when_time_jumps_back_begins_anew(bench: Bench)
 
     def jump_back() -> None:
         bench.note()
-        bench.calls.take_time(5 * NANOSECONDS)
+        bench.calls.set_time(5 * NANOSECONDS)
 
     bench.calls.add(1.0, jump_back, repeats=True)
     assert bench.pass_to(101.0) == [101.0]
@@ -104,7 +104,7 @@ def test_a_busy_loop_gets_no_call_twice(bench: Bench) -> None:
     bench.pass_to(1.0)
     bench.calls.add(0.1, bench.note, repeats=True)
     for tenth in range(11, 21):
-        bench.calls.take_time(tenth * NANOSECONDS // 10)
+        bench.calls.set_time(tenth * NANOSECONDS // 10)
     assert len(bench.loop.soon) == 1
     bench.loop.run()
     assert bench.called == [2.0]
@@ -127,7 +127,7 @@ def test_a_cancelled_call_does_not_come(bench: Bench, repeats: bool) -> None:
     handed_over = bench.calls.add(0.1, bench.note, repeats=repeats)
     waiting.cancel()
     waiting.cancel()
-    bench.calls.take_time(2 * NANOSECONDS)
+    bench.calls.set_time(2 * NANOSECONDS)
     handed_over.cancel()
     bench.loop.run()
     assert bench.pass_to(3.0) == []

@@ -42,7 +42,7 @@ def test_waits_until_the_time_has_come(poller: Poller, wait_s: float) -> None:
 def test_a_wait_that_something_else_has_ended_goes_on_until_the_time_has_come(
     poller: Poller, written: int
 ) -> None:
-    poller.watch(written)
+    poller.register(written)
     for _ in range(2):  # for two times, each waited for more than once
         until_s = monotonic() + 0.05
         for _ in range(3):
@@ -60,7 +60,7 @@ def test_a_time_may_be_far_off(poller: Poller) -> None:
 
 
 def test_a_time_that_is_over_is_not_waited_for(poller: Poller, written: int) -> None:
-    poller.watch(written)
+    poller.register(written)
     assert [fd for fd, _ in poller.wait(monotonic() - 1.0)] == [written]
 
 
@@ -68,17 +68,17 @@ def test_a_time_that_is_over_is_not_waited_for(poller: Poller, written: int) -> 
 def test_tells_of_what_was_written_until_it_is_read(
     poller: Poller, written: int, until_s: float
 ) -> None:
-    poller.watch(written)
+    poller.register(written)
     for _ in range(2):
         assert [fd for fd, _ in poller.wait(monotonic() + until_s)] == [written]
     os.eventfd_read(written)
-    assert not poller.ready()
+    assert not poller.poll()
 
 
 def test_tells_no_more_of_what_is_forgotten(poller: Poller, written: int) -> None:
-    poller.watch(written)
-    poller.forget(written)
-    assert not poller.ready()
+    poller.register(written)
+    poller.unregister(written)
+    assert not poller.poll()
 
 
 @pytest.mark.parametrize("until_s", [_LONG_S, inf])

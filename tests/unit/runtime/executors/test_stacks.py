@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from composer.runtime.executors.stacks import shown, stacks_of, undisturbed
+from composer.runtime.executors.stacks import format_stack, gc_paused, stacks_of
 
 
 @pytest.fixture
@@ -39,9 +39,9 @@ def test_the_innermost_frame_is_first_and_shown_last(waiting: int) -> None:
     names = [frame.f_code.co_name for frame in stack]
     assert "wait_here" in names
     assert names[-1] == "_bootstrap"
-    lines = shown(stack).splitlines()
+    lines = format_stack(stack).splitlines()
     assert lines[0].endswith("in _bootstrap")
-    assert "may_go.wait()" in shown(stack)
+    assert "may_go.wait()" in format_stack(stack)
 
 
 def test_threads_that_are_no_more_are_left_out(waiting: int) -> None:
@@ -53,7 +53,7 @@ def test_garbage_is_collected_afterwards_as_before(collects: bool) -> None:
     before = gc.isenabled()
     try:
         (gc.enable if collects else gc.disable)()
-        with undisturbed(), undisturbed():
+        with gc_paused(), gc_paused():
             assert not gc.isenabled()
         assert gc.isenabled() is collects
     finally:
@@ -65,7 +65,7 @@ def test_who_looks_at_the_same_time_waits_so_that_nobody_turns_it_on_too_early()
 
     def look() -> None:
         for _ in range(2000):
-            with undisturbed():
+            with gc_paused():
                 seen.append(gc.isenabled())
 
     threads = [threading.Thread(target=look) for _ in range(4)]
@@ -89,7 +89,7 @@ def test_a_look_keeps_nothing_of_what_it_has_seen() -> None:
         may_go.wait()
 
     thread = threading.Thread(target=hold)
-    with undisturbed():
+    with gc_paused():
         thread.start()
         is_there.wait()
         assert stacks_of((thread.ident or 0,))

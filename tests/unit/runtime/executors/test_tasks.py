@@ -10,14 +10,8 @@ from typing import Any
 
 import pytest
 
-from composer.runtime.executors.tasks import (
-    Cancelled,
-    Future,
-    Task,
-    awaited_rclpy_future,
-    sleep,
-    within,
-)
+from composer.runtime.executors.futures import Cancelled, Future, awaited_rclpy_future
+from composer.runtime.executors.tasks import Task, sleep, within
 
 
 class Call:

@@ -18,14 +18,14 @@ from composer.cli.support.callback_tables import (
     top_table,
 )
 from composer.runtime.metrics.figures import CallbackFigures, figures, rates
-from composer.runtime.metrics.histogram import BOUNDS_S, TOGETHER, Durations
+from composer.runtime.metrics.histogram import BATCH_SIZE, BOUNDS_S, Histogram
 from composer.runtime.metrics.statistics import CallbackStatistics, Statistics
 
 
-def counted(*times_s: float) -> Durations:
-    durations = Durations()
+def counted(*times_s: float) -> Histogram:
+    durations = Histogram()
     for time_s in times_s:
-        durations.take(time_s)
+        durations.add(time_s)
     return durations
 
 
@@ -49,13 +49,13 @@ def test_times_that_settle_together_come_into_the_buckets_of_each() -> None:
         lambda: random.uniform(0.0, 1e-5),
         lambda: random.uniform(0.0, 200.0),
     )
-    durations, one_by_one = Durations(), [0] * (len(BOUNDS_S) + 1)
+    durations, one_by_one = Histogram(), [0] * (len(BOUNDS_S) + 1)
     for _ in range(100):
-        times_s = [random.choice(kinds)() for _ in range(random.randint(1, TOGETHER))]
+        times_s = [random.choice(kinds)() for _ in range(random.randint(1, BATCH_SIZE))]
         for time_s in times_s:
             one_by_one[bisect(BOUNDS_S, time_s)] += 1
-        durations.waiting.extend(times_s)
-        durations.settle()
+        durations.batch.extend(times_s)
+        durations.flush()
     assert durations._buckets == one_by_one
 
 
@@ -73,18 +73,18 @@ def test_nothing_counted_is_zero() -> None:
 
 def test_a_time_can_stand_for_several() -> None:
     durations = counted(0.5)
-    durations.stand_for(16)
-    durations.take(0.25)
+    durations.set_weight(16)
+    durations.add(0.25)
     assert (durations.count, durations.total_s, durations.longest_s) == (17, 4.5, 0.5)
-    durations.stand_for(1)
-    durations.take(0.25)
+    durations.set_weight(1)
+    durations.add(0.25)
     assert (durations.count, durations.total_s) == (18, 4.75)
 
 
 def test_who_asks_while_others_count_loses_nothing() -> None:
-    durations = Durations()
+    durations = Histogram()
     asked: list[int] = []
-    counting = threading.Thread(target=lambda: [durations.take(0.001) for _ in range(20_000)])
+    counting = threading.Thread(target=lambda: [durations.add(0.001) for _ in range(20_000)])
     counting.start()
     while counting.is_alive():
         asked.append(durations.count)
@@ -94,8 +94,8 @@ def test_who_asks_while_others_count_loses_nothing() -> None:
 
 def test_a_callback_is_counted_on_after_its_node_was_configured_anew() -> None:
     statistics = Statistics()
-    statistics.callback("timer", "tick").times.take(0.25)
-    statistics.callback("timer", "tick").times.take(0.5)
+    statistics.callback("timer", "tick").times.add(0.25)
+    statistics.callback("timer", "tick").times.add(0.5)
     statistics.callback("subscription", "tick").dropped += 3
     assert statistics.busy_s == 0.75
     assert statistics.slowest == "timer 'tick' 500.0 ms"

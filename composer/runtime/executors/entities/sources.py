@@ -1,8 +1,6 @@
-"""What a loop serves: one source an entity, each with how to take from it and whom to call.
+"""The sources of subscriptions, services, clients and QoS events.
 
-A source takes one item at a time, so that a loop can go round them all. Kept here, in
-``actions`` and in ``readiness``: everything that reaches
-into rclpy.
+Together with ``actions`` and ``readiness``, everything that uses rclpy's internals.
 """
 
 from __future__ import annotations
@@ -10,7 +8,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Coroutine
 from functools import partial, wraps
-from typing import Any, Protocol
+from typing import Any
 
 from rclpy.client import Client
 from rclpy.event_handler import EventHandler
@@ -18,53 +16,26 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.time_source import TimeSource
 
-from composer.runtime.executors import readiness
+from composer.runtime.executors.entities import readiness
+from composer.runtime.executors.entities.readiness import Signal
+from composer.runtime.executors.entities.source_group import EntitySource
 from composer.runtime.executors.loop import Reply, Taken
-from composer.runtime.executors.readiness import Signal
 from composer.runtime.executors.tasks import name_of
 
 RunTask = Callable[[Coroutine[Any, Any, Any]], object]
 
-# rclpy's own type hints are in part wrong (a service's type has no Request): hence Any below.
-
-
-class Source(Protocol):
-    """One entity that is served.
-
-    ``passes_over``: a take that brings nothing may be followed by one that does. A client is sent
-    all answers of its service, and passes over those for others.
-    """
-
-    @property
-    def passes_over(self) -> bool:
-        """See above."""
-
-    @property
-    def name(self) -> str:
-        """What people call it, for reports."""
-
-    def attach(self, signal: Signal) -> None:
-        """Have the entity announced by ``signal``."""
-
-    def detach(self, signal: Signal) -> None:
-        """End that."""
-
-    def take(self) -> Any:
-        """Return what is there next, or None."""
-
-    def call(self, taken: Any, /) -> object:
-        """Give what was taken to whom it is for."""
+# Some of rclpy's own type hints are wrong (a service's type has no Request): hence Any below.
 
 
 class SubscriptionSource:
     """Calls ``callback((message, information))`` for each message."""
 
     __slots__ = ("_subscription", "call", "take")
-    passes_over = False
+    may_skip = False
 
     def __init__(self, subscription: Subscription, callback: Callable[[Taken], object]) -> None:
         self._subscription = subscription
-        # Neither is a method: they are called for each message.
+        # Attributes, not methods: called per message, without a frame in between.
         self.call: Callable[[Taken], object] = callback
         self.take: Callable[[], Taken | None] = partial(
             subscription.handle.take_message, subscription.msg_type, subscription.raw
@@ -76,18 +47,18 @@ class SubscriptionSource:
         return f"subscription '{self._subscription.topic}' ({name_of(self.call)})"
 
     def attach(self, signal: Signal) -> None:
-        """Have messages announced."""
+        """Signal messages."""
         signal.attach(self._subscription.handle, readiness.MESSAGE)
 
     def detach(self, signal: Signal) -> None:
-        """End that."""
+        """Stop that."""
         signal.detach(self._subscription.handle)
 
 
 class ServiceSource:
     """Calls ``callback(request, reply)`` for each request."""
 
-    passes_over = False
+    may_skip = False
 
     def __init__(self, service: Any, callback: Callable[[Any, Reply], object]) -> None:
         self._service = service
@@ -99,11 +70,11 @@ class ServiceSource:
         return f"service '{self._service.srv_name}' ({name_of(self._callback)})"
 
     def attach(self, signal: Signal) -> None:
-        """Have requests announced."""
+        """Signal requests."""
         signal.attach(self._service.handle, readiness.REQUEST)
 
     def detach(self, signal: Signal) -> None:
-        """End that."""
+        """Stop that."""
         signal.detach(self._service.handle)
 
     def take(self) -> Any:
@@ -113,18 +84,18 @@ class ServiceSource:
         return None if header is None else (request, header)
 
     def call(self, taken: Any) -> None:
-        """Call with the request. When the callback raises, the caller gets an empty answer."""
+        """Call back with the request. If that raises, the client gets an empty response."""
         request, header = taken
-        reply = OneReply(self._service, header)
+        reply = SingleReply(self._service, header)
         try:
             self._callback(request, reply)
         except BaseException:
-            reply.give_up()
+            reply.send_empty()
             raise
 
 
-class OneReply:
-    """Answers one request, once."""
+class SingleReply:
+    """Responds to one request, once."""
 
     __slots__ = ("_header", "_service")
 
@@ -133,35 +104,35 @@ class OneReply:
         self._header: object = header
 
     def __call__(self, response: Any) -> None:
-        """Send the answer.
+        """Send the response.
 
-        Raises TypeError when it is not a response of the service, RuntimeError when the request
-        has been answered.
+        Raises TypeError for another type than the service's response, RuntimeError if there was a
+        response already.
         """
         if self._header is None:
-            raise RuntimeError(f"service '{self._service.srv_name}': answered already")
+            raise RuntimeError(f"service '{self._service.srv_name}': already answered")
         self._service.send_response(response, self._header)
         self._header = None
 
-    def give_up(self) -> None:
-        """Send an empty answer, unless there was one."""
+    def send_empty(self) -> None:
+        """Send an empty response, unless there was one."""
         if self._header is not None:
             self(self._service.srv_type.Response())
 
 
-def answer_with_own_callback(service: Any, run_task: RunTask) -> Callable[[Any, Reply], None]:
-    """Return what calls ``service.callback``, as ``node.create_service`` was given it."""
+def rclpy_callback(service: Any, run_task: RunTask) -> Callable[[Any, Reply], None]:
+    """Return a function that calls ``service.callback``, as given to ``node.create_service``."""
 
-    async def answer(request: Any, reply: Any) -> None:
+    async def respond(request: Any, reply: Any) -> None:
         try:
             reply(await service.callback(request, service.srv_type.Response()))
         except BaseException:
-            reply.give_up()
+            reply.send_empty()
             raise
 
     def call(request: Any, reply: Reply) -> None:
         if inspect.iscoroutinefunction(service.callback):
-            run_task(answer(request, reply))
+            run_task(respond(request, reply))
         else:
             reply(service.callback(request, service.srv_type.Response()))
 
@@ -171,7 +142,7 @@ def answer_with_own_callback(service: Any, run_task: RunTask) -> Callable[[Any, 
 class ClientSource:
     """Completes the futures of ``client.call_async``."""
 
-    passes_over = True
+    may_skip = True
 
     def __init__(self, client: Any, executor: object) -> None:
         self._client = client
@@ -183,11 +154,11 @@ class ClientSource:
         return f"client of '{self._client.srv_name}'"
 
     def attach(self, signal: Signal) -> None:
-        """Have responses announced."""
+        """Signal responses."""
         signal.attach(self._client.handle, readiness.RESPONSE)
 
     def detach(self, signal: Signal) -> None:
-        """End that."""
+        """Stop that."""
         signal.detach(self._client.handle)
 
     def take(self) -> Any:
@@ -196,20 +167,20 @@ class ClientSource:
         return None if header is None else (header, response)
 
     def call(self, taken: Any) -> None:
-        """Complete the future of the request, unless nobody waits for it any more."""
+        """Complete the future of the request, unless it was removed."""
         header, response = taken
         try:
             future = self._client.get_pending_request(header.request_id.sequence_number)
         except KeyError:
             return
-        future._set_executor(self._executor)  # exceptions of done callbacks come to the loop
+        future._set_executor(self._executor)  # the loop reports exceptions of done callbacks
         future.set_result(response)
 
 
 class EventSource:
-    """Calls what was registered for a QoS event of a publisher or a subscription."""
+    """Calls the callback of a QoS event of a publisher or a subscription."""
 
-    passes_over = False
+    may_skip = False
 
     def __init__(self, handler: Any) -> None:
         self._handler = handler
@@ -222,17 +193,17 @@ class EventSource:
         return f"event {self._handler.event_type.name} ({name_of(self._handler.callback)})"
 
     def attach(self, signal: Signal) -> None:
-        """Have the event announced."""
+        """Signal the event."""
         signal.attach(self._handle, readiness.EVENT)
 
     def detach(self, signal: Signal) -> None:
-        """End that."""
+        """Stop that."""
         signal.detach(self._handle)
 
     def take(self) -> Any:
-        """Return the status, unless nothing happened: rcl always has a status.
+        """Return the status if it has changed: rcl always returns one.
 
-        Its ``..._change`` fields do not tell: attaching sets them back to nothing.
+        Its ``..._change`` fields are not enough: attaching resets them to zero.
         """
         status = self._handle.take_event()
         fields = [name for name in dir(status) if name.endswith(("_count", "_count_change"))]
@@ -245,20 +216,20 @@ class EventSource:
         return status if happened else None
 
     def call(self, taken: Any) -> None:
-        """Call with the status."""
+        """Call back with the status."""
         self._handler.callback(taken)
 
 
-def source_of(entity: object, executor: object, run_task: RunTask) -> Source | None:
-    """Return what serves an entity by the callback it was created with.
+def source_of(entity: object, executor: object, run_task: RunTask) -> EntitySource | None:
+    """Return the source that serves an entity by the callback it was created with.
 
-    None for what is not served that way: timers, guard conditions and actions.
+    None for timers, guard conditions and actions, which are not served this way.
     """
     match entity:
         case Subscription():
-            return SubscriptionSource(entity, _with_message_alone(entity.callback))
+            return SubscriptionSource(entity, _with_message_only(entity.callback))
         case Service():
-            return ServiceSource(entity, answer_with_own_callback(entity, run_task))
+            return ServiceSource(entity, rclpy_callback(entity, run_task))
         case Client():
             return ClientSource(entity, executor)
         case EventHandler():
@@ -266,16 +237,16 @@ def source_of(entity: object, executor: object, run_task: RunTask) -> Source | N
     return None
 
 
-def _with_message_alone(callback: Callable[[Any], object]) -> Callable[[Taken], object]:
-    @wraps(callback)  # for the name
+def _with_message_only(callback: Callable[[Any], object]) -> Callable[[Taken], object]:
+    @wraps(callback)  # for its name
     def call(taken: Taken) -> object:
         return callback(taken[0])
 
     return call
 
 
-def comes_by_itself(entity: object) -> bool:
-    """Tell whether nobody adds the entity, though the node got it late: QoS events, the clock."""
+def is_implicit(entity: object) -> bool:
+    """Return whether rclpy adds such entities to a running node: QoS events and the clock."""
     callback = getattr(entity, "callback", None)
     return isinstance(entity, EventHandler) or isinstance(
         getattr(callback, "__self__", None), TimeSource

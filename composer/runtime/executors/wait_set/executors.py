@@ -1,12 +1,12 @@
-"""rclpy's executors, mended: what they serve and how, but nothing a callback does ends them.
+"""rclpy's wait-set executors, changed so that no callback can end or stall them.
 
-They stand on private parts of rclpy 7.1: ``_take_*`` (what is done with a ready entity) and
-``_tasks`` (the handlers that are not done yet). What rclpy does by itself, and these do not:
+They depend on private parts of rclpy 7.1: ``_take_*``, which handle a ready entity, and ``_tasks``,
+the handlers that are not done yet. They fix three problems of rclpy:
 
-- an exception in a callback leaves ``spin``;
-- MultiThreadedExecutor hands a handler to its pool again and again until a thread begins it, so
-  that all threads busy means one more at full load, and a flood means a standstill;
-- its pool's threads keep the interpreter from exiting while a callback hangs.
+- An exception in a callback leaves ``spin``.
+- MultiThreadedExecutor submits a handler to its pool again and again until a thread starts it. With
+  all threads busy, that keeps one more at full load, and a flood of messages stalls the executor.
+- The pool's threads keep the interpreter from exiting while a callback is blocked.
 """
 
 from __future__ import annotations
@@ -35,55 +35,55 @@ from rclpy.task import Future as RclpyFuture
 from rclpy.timer import Timer
 from rclpy.waitable import Waitable
 
-from composer.runtime.executors import actions
-from composer.runtime.executors.entity_sources import Source, comes_by_itself, source_of
+from composer.runtime.executors.base_loop import BUSY_S, YIELD_S
+from composer.runtime.executors.entities.actions import expire_goals
+from composer.runtime.executors.entities.node_executor import NodeExecutor
+from composer.runtime.executors.entities.source_group import EntitySource
+from composer.runtime.executors.entities.sources import is_implicit, source_of
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.node_executor import NodeExecutor
-from composer.runtime.executors.scheduler import BUSY_S, MOMENT_S
 
 _Execute = Callable[[], Coroutine[Any, Any, None]]
-_ADDING = "to wait set: "  # what rclpy was at when it says "action client pointer is invalid"
-_END = None  # what a thread of the pool finds in the queue when it is to end
+_ADDING = "to wait set: "  # part of rclpy's message "action client pointer is invalid"
+_END = None  # ends the thread of the pool that gets it
 
 
-class Calling(Loop, Protocol):
-    """The loop an executor works for."""
+class CallingLoop(Loop, Protocol):
+    """The loop of an executor."""
 
     def call(self, name: Callable[[], str], callback: Callable[[], object]) -> None:
-        """Call ``callback``; what it raises is reported."""
+        """Call ``callback`` and report its exception."""
 
     def report(self, what: str, error: BaseException) -> None:
-        """Tell of an exception."""
+        """Report an exception."""
 
 
-class MendedExecutor(Executor):
-    """What both kinds have in common. A handler runs to its end on the thread that takes it up."""
+class WaitSetExecutor(Executor):
+    """The base of both kinds. A handler runs to completion on the thread that starts it."""
 
-    def __init__(self, loop: Calling) -> None:
+    def __init__(self, loop: CallingLoop) -> None:
         super().__init__()
         self._loop = loop
-        self._for_nodes = NodeExecutor(loop, lambda: None)
-        self._sources: dict[object, Source] = {}  # of the entities that were added by themselves
+        self._node_executor = NodeExecutor(loop, lambda: None)
+        self._sources: dict[object, EntitySource] = {}  # of the entities that were added
         self._served: WeakSet[Any] = WeakSet()
         self._ending = False
         self._busy_until_s = 0.0
-        self.threads: list[threading.Thread] = []  # those beside the one that calls turn
+        self.threads: list[threading.Thread] = []  # other than the one that calls spin_one
 
-    def serve(self, entity: object, source: Source | None) -> None:
-        """Serve an entity by ``source``, or as rclpy does."""
-        if source is not None:
-            self._sources[entity] = source
+    def serve(self, entity: object, source: EntitySource) -> None:
+        """Serve an entity by ``source``."""
+        self._sources[entity] = source
         self._served.add(entity)
         self.wake()
 
-    def serve_all_of(self, node: Any) -> None:
-        """Serve what the node has by now, as rclpy does."""
+    def serve_node(self, node: Any) -> None:
+        """Serve the present entities of a node as rclpy does."""
         for entities in (node.subscriptions, node.services, node.clients, node.waitables):
             self._served.update(entities)
         self.add_node(node)
 
     def forget(self, entity: object) -> None:
-        """Serve an entity no more."""
+        """Stop serving an entity."""
         self._served.discard(entity)
         self._sources.pop(entity, None)
         self.wake()
@@ -92,46 +92,46 @@ class MendedExecutor(Executor):
         """Call ``callback``, which must not raise, on a thread of the executor."""
         super().create_task(callback)
 
-    def create_task(  # type: ignore[override]  # no Task of rclpy's: those are polled
+    def create_task(  # type: ignore[override]  # not rclpy's Task, which is polled
         self, callback: Callable[..., Any], *args: Any, **kwargs: Any
     ) -> RclpyFuture:
-        """Call ``callback``, plain or ``async def``, on the loop: rclpy's action servers ask."""
-        return self._for_nodes.create_task(callback, *args, **kwargs)
+        """Call ``callback``, plain or ``async def``, on the loop: for rclpy's action servers."""
+        return self._node_executor.create_task(callback, *args, **kwargs)
 
     def can_execute(self, entity: Any) -> bool:
-        """Leave out what nobody added: its callback may not be the one it is for."""
-        served = entity in self._served or comes_by_itself(entity) or _is_rclpy_only(entity)
+        """Skip entities that were not added: their final callback may not be set yet."""
+        served = entity in self._served or is_implicit(entity) or _is_rclpy_only(entity)
         return served and bool(super().can_execute(entity))
 
-    def turn(self) -> bool:
-        """Wait for a handler and run it; false when there will be none any more."""
+    def spin_one(self) -> bool:
+        """Wait for a handler and run it; return false once the executor has ended."""
         try:
             handler, _, _ = self.wait_for_ready_callbacks(None, None, self._is_ending)
         except (ConditionReachedException, ShutdownException, ExternalShutdownException):
             return False
         except InvalidHandle:
-            return True  # an entity was destroyed between the wait and the look at its result
+            return True  # an entity was destroyed between the wait and reading its result
         except RCLError as error:
             if _ADDING not in str(error):
                 raise
-            return True  # rclpy finds that an action is destroyed, and adds it nonetheless
+            return True  # rclpy has added an action that is destroyed
         self._run(handler)
         return True
 
     def end(self) -> None:
-        """Have :meth:`turn` answer false."""
+        """Make :meth:`spin_one` return false."""
         self._ending = True
         self.wake()
 
-    def finish(self, until_s: float) -> bool:  # noqa: ARG002
-        """End what works for the executor, after the last turn; false when it takes too long."""
+    def join(self, until_s: float) -> bool:  # noqa: ARG002
+        """End the other threads, after the last spin; return false if that takes too long."""
         return True
 
     def _is_ending(self) -> bool:
-        """Asked before each wait: also the time to let other threads have their turn."""
+        """Return whether to end. Called before each wait, it also lets other threads run."""
         now_s = monotonic()
         if now_s > self._busy_until_s:
-            sleep(MOMENT_S)
+            sleep(YIELD_S)
             self._busy_until_s = now_s + BUSY_S
         return self._ending
 
@@ -159,7 +159,7 @@ class MendedExecutor(Executor):
             waitable._ready_to_take_data = False
             return self._take_entity(waitable)
         if isinstance(waitable, ActionServer) and waitable._is_goal_expired:
-            self._loop.run_task(actions.forget_expired_goals(waitable))
+            self._loop.run_task(expire_goals(waitable))
             return None
         if isinstance(waitable, ActionServer | ActionClient):
             return self._take_entity(waitable)
@@ -185,14 +185,14 @@ class MendedExecutor(Executor):
         return execute
 
 
-class MendedSingleThreadedExecutor(MendedExecutor, SingleThreadedExecutor):
-    """One thread: the one that calls :meth:`turn`."""
+class SingleThreadedWaitSetExecutor(WaitSetExecutor, SingleThreadedExecutor):
+    """One thread: the one that calls :meth:`spin_one`."""
 
 
-class MendedMultiThreadedExecutor(MendedExecutor):
-    """A pool of threads, and one that waits for them."""
+class MultiThreadedWaitSetExecutor(WaitSetExecutor):
+    """A pool of threads, and one thread that waits for entities."""
 
-    def __init__(self, loop: Calling, threads: int) -> None:
+    def __init__(self, loop: CallingLoop, threads: int) -> None:
         super().__init__(loop)
         self._handlers: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self.threads = [
@@ -202,8 +202,8 @@ class MendedMultiThreadedExecutor(MendedExecutor):
         for thread in self.threads:
             thread.start()
 
-    def finish(self, until_s: float) -> bool:
-        """End the pool."""
+    def join(self, until_s: float) -> bool:
+        """End the pool; return false if that takes too long."""
         for _ in self.threads:
             self._handlers.put(_END)
         for thread in self.threads:
@@ -211,27 +211,27 @@ class MendedMultiThreadedExecutor(MendedExecutor):
         return not any(thread.is_alive() for thread in self.threads)
 
     def _run(self, handler: Any) -> None:
-        with self._tasks_lock:  # or the next turn finds it again
+        with self._tasks_lock:  # or the next spin would find it again
             self._tasks = [entry for entry in self._tasks if entry[0] is not handler]
         self._handlers.put(handler)
 
     def _work(self) -> None:
         while (handler := self._handlers.get()) is not _END:
             handler()
-            if not handler.done():  # an async callback of a timer somebody gave the node
+            if not handler.done():  # an async callback of an rclpy timer
                 with self._tasks_lock:
                     self._tasks.append((handler, None, None))
                 self.wake()
 
 
 def _is_rclpy_only(entity: object) -> bool:
-    """Tell whether a loop has no way to be given the entity, so that it is served as it is."""
+    """Return whether a loop has no method to add such an entity, so that rclpy serves it."""
     return isinstance(entity, Timer | GuardCondition)
 
 
-def _take(entity: Any, source: Source) -> Any:
+def _take(entity: Any, source: EntitySource) -> Any:
     try:
-        # In use, so that no other thread destroys it before it is taken from.
+        # In use, so that no other thread destroys it before the take.
         with entity if isinstance(entity, Waitable) else entity.handle:
             return source.take()
     except InvalidHandle:

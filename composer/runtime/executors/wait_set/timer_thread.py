@@ -9,42 +9,42 @@ from time import monotonic
 from typing import Protocol
 
 from composer.runtime.executors.tasks import name_of
-from composer.runtime.executors.timer_queue import ScheduledCall, Timetable
+from composer.runtime.executors.timer_queue import ScheduledCall, TimerQueue
 
 
-class Caller(Protocol):
-    """The part of a loop that is needed here."""
+class CallRunner(Protocol):
+    """The part of a loop that timers need."""
 
     def call_soon(self, callback: Callable[[], object]) -> None:
         """Call ``callback`` on the loop as soon as it is free."""
 
     def call(self, name: Callable[[], str], callback: Callable[[], object]) -> None:
-        """Call ``callback`` on the current thread; what it raises is reported."""
+        """Call ``callback`` on the current thread and report its exception."""
 
 
 class TimerThread:
-    """Hands calls to a loop when they are due. A periodic call is never handed over twice."""
+    """Passes calls to a loop when they are due; a periodic one again only after it was made."""
 
-    def __init__(self, loop: Caller, name: str) -> None:
+    def __init__(self, loop: CallRunner, name: str) -> None:
         self._loop = loop
-        self._timers = Timetable()
+        self._timers = TimerQueue()
         self._changed = threading.Condition()
         self._stopping = False
         self.thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def add(self, call: ScheduledCall) -> ScheduledCall:
-        """Hand ``call`` over when it is due. From any thread."""
+        """Pass ``call`` to the loop when it is due. From any thread."""
         with self._changed:
             self._timers.add(call)
             self._changed.notify()
         return call
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self.thread.start()
 
     def stop(self) -> None:
-        """Hand nothing over any more."""
+        """Stop passing calls to the loop."""
         with self._changed:
             self._stopping = True
             self._changed.notify()
@@ -58,7 +58,7 @@ class TimerThread:
                 if remaining_s > 0.0:
                     self._changed.wait(min(remaining_s, threading.TIMEOUT_MAX))
                     continue
-                call = self._timers.take()
+                call = self._timers.pop()
             self._loop.call_soon(partial(self._call, call))
 
     def _call(self, call: ScheduledCall) -> None:
@@ -66,5 +66,5 @@ class TimerThread:
             return
         self._loop.call(partial(name_of, call.callback), call.callback)
         with self._changed:
-            self._timers.repeat(call)
+            self._timers.reschedule(call)
             self._changed.notify()

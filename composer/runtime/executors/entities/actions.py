@@ -1,6 +1,6 @@
-"""Action servers and clients: rclpy's own code does the work, as under its executors.
+"""The source of action servers and clients, which runs rclpy's own code as its executors do.
 
-Together with :mod:`composer.runtime.executors.entity_sources`, what reaches into rclpy.
+Together with ``sources`` and ``readiness``, everything that uses rclpy's internals.
 """
 
 from __future__ import annotations
@@ -25,41 +25,42 @@ from rclpy.action.server import (
 from rclpy.task import Future as RclpyFuture
 from unique_identifier_msgs.msg import UUID
 
-from composer.runtime.executors import readiness
-from composer.runtime.executors.readiness import Announcement, Handle, Signal
-from composer.runtime.executors.tasks import Cancelled, Clock, Future, Report, name_of
+from composer.runtime.executors.entities import readiness
+from composer.runtime.executors.entities.readiness import Handle, SetCallback, Signal
+from composer.runtime.executors.futures import Cancelled, Future
+from composer.runtime.executors.tasks import Report, SupportsCallLater, name_of
 
 T = TypeVar("T")
 
 
-class TaskLoop(Clock, Protocol):
+class TaskRunner(SupportsCallLater, Protocol):
     """The part of a loop that actions need."""
 
     def call_soon(self, callback: Callable[[], object]) -> None:
         """Call ``callback`` on the loop as soon as it is free."""
 
     def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
-        """Run a coroutine; the future is its outcome."""
+        """Run a coroutine; return the future of its result."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Side:
-    """What rclpy's servers and clients of actions differ in."""
+class _Role:
+    """How rclpy's action servers and action clients differ."""
 
     name: str
     handle: str  # the attribute that holds the handle
-    announcements: tuple[Announcement, ...]
-    ready_flags: tuple[str, ...]  # the attributes that tell ``take_data`` what to look for
+    setters: tuple[SetCallback, ...]
+    ready_flags: tuple[str, ...]  # the attributes that select what ``take_data`` takes
 
 
-_SERVER = _Side(
+_SERVER = _Role(
     "action server",
     "_handle",
     readiness.ACTION_SERVER,
     ("_is_goal_request_ready", "_is_cancel_request_ready", "_is_result_request_ready"),
 )
-# In this order: once the result is there, rclpy drops the feedback that is still to be taken.
-_CLIENT = _Side(
+# In this order: after taking the result, rclpy drops feedback that was not taken.
+_CLIENT = _Role(
     "action client",
     "_client_handle",
     readiness.ACTION_CLIENT,
@@ -71,7 +72,7 @@ _CLIENT = _Side(
         "_is_result_response_ready",
     ),
 )
-#: Where an action client keeps the requests that wait for each kind of response.
+#: The attributes of an action client with the requests that wait for each kind of response.
 _PENDING = {
     "goal": "_pending_goal_requests",
     "cancel": "_pending_cancel_requests",
@@ -82,49 +83,49 @@ _RETRY_AFTER_S = 0.001
 
 
 class ActionSource:
-    """Everything one action server or client receives, one thing at a time."""
+    """Everything that an action server or client receives, one item at a time."""
 
     def __init__(
-        self, waitable: ActionServer | ActionClient, executor: object, loop: TaskLoop
+        self, waitable: ActionServer | ActionClient, executor: object, loop: TaskRunner
     ) -> None:
         self._waitable: Any = waitable
-        self._side = _SERVER if isinstance(waitable, ActionServer) else _CLIENT
-        self.passes_over = self._side is _CLIENT
-        self._handle: Handle = getattr(waitable, self._side.handle)
+        self._role = _SERVER if isinstance(waitable, ActionServer) else _CLIENT
+        self.may_skip = self._role is _CLIENT
+        self._handle: Handle = getattr(waitable, self._role.handle)
         self._executor = executor
         self._loop = loop
 
     @property
     def name(self) -> str:
-        """What it is."""
-        return f"{self._side.name} of {self._waitable._action_type.__name__}"
+        """The role and the action type."""
+        return f"{self._role.name} of {self._waitable._action_type.__name__}"
 
     def attach(self, signal: Signal) -> None:
-        """Have everything about the action announced."""
-        signal.attach(self._handle, *self._side.announcements)
+        """Signal all items of the action."""
+        signal.attach(self._handle, *self._role.setters)
 
     def detach(self, signal: Signal) -> None:
-        """End that."""
+        """Stop that."""
         signal.detach(self._handle)
 
     def take(self) -> Any:
-        """Return one thing the action consists of, by its kind."""
+        """Return one item, by its kind."""
         waitable = self._waitable
-        waitable._is_goal_expired = False  # asked for by a timer, see forget_expired_goals
-        for wanted in self._side.ready_flags:
-            for flag in self._side.ready_flags:
-                setattr(waitable, flag, flag == wanted)
+        waitable._is_goal_expired = False  # handled by expire_goals
+        for selected in self._role.ready_flags:
+            for flag in self._role.ready_flags:
+                setattr(waitable, flag, flag == selected)
             if taken := waitable.take_data():
                 return taken
         return None
 
     def call(self, taken: Any) -> None:
-        """Have rclpy work on it."""
-        self._work_on(taken, _RETRIES)
+        """Pass the item to rclpy."""
+        self._execute(taken, _RETRIES)
 
-    def _work_on(self, taken: Any, retries: int) -> None:
+    def _execute(self, taken: Any, retries: int) -> None:
         if retries and self._is_early(taken):
-            later = partial(self._work_on, taken, retries - 1)
+            later = partial(self._execute, taken, retries - 1)
             self._loop.call_later(_RETRY_AFTER_S, later)
             return
         for future in self._waitable._futures:
@@ -132,44 +133,44 @@ class ActionSource:
         self._loop.run_task(self._waitable.execute(taken))
 
     def _is_early(self, taken: dict[str, Any]) -> bool:
-        """Tell whether a response came before its request was noted down.
+        """Return whether a response arrived before its request was registered.
 
-        rclpy does that after sending, without a lock, and adds the future last: another thread may
-        be in between.
+        rclpy registers a request after sending it, without a lock, and adds the future last:
+        another thread may run in between.
         """
-        return self._side is _CLIENT and any(
+        return self._role is _CLIENT and any(
             kind in _PENDING
             and getattr(self._waitable, _PENDING[kind]).get(item[0]) not in self._waitable._futures
             for kind, item in taken.items()
         )
 
 
-def keeps_goals(server: ActionServer) -> bool:
-    """Tell whether the server keeps goals, running or ended."""
+def has_goals(server: ActionServer) -> bool:
+    """Return whether the server keeps goals, running or ended."""
     return bool(server._goal_handles)
 
 
-async def forget_expired_goals(server: ActionServer) -> None:
-    """Drop the goals that ended longer ago than the server's result timeout."""
+async def expire_goals(server: ActionServer) -> None:
+    """Discard the goals that ended longer ago than the server's result timeout."""
     with server._lock:
         kept = len(server._goal_handles)
-        if not kept:  # rcl takes room for no goal as an error
+        if not kept:  # rcl rejects a capacity of zero
             return
         expired = server._handle.expire_goals(kept)
     await server._execute_expire_goals(expired)
 
 
-def contain(server: ActionServer, report: Report) -> None:
-    """Turn what the server's callbacks raise into an answer to the client, and a report.
+def contain_exceptions(server: ActionServer, report: Report) -> None:
+    """Turn exceptions of the server's callbacks into a response to the client, and a report.
 
-    A goal whose acceptance raises is rejected, a cancellation likewise; one whose execution raises
-    is aborted. rclpy by itself leaves the client without an answer, or contains ``Exception`` only.
+    A goal or cancellation whose callback raises is rejected; a goal whose execution raises is
+    aborted. rclpy would send no response, and contains only ``Exception``.
     """
 
-    def reject(_: object) -> GoalResponse:
+    def reject_goal(_: object) -> GoalResponse:
         return GoalResponse.REJECT
 
-    def refuse(_: object) -> CancelResponse:
+    def reject_cancel(_: object) -> CancelResponse:
         return CancelResponse.REJECT
 
     def abort(goal: Any) -> Any:
@@ -177,23 +178,23 @@ def contain(server: ActionServer, report: Report) -> None:
             goal.abort()
         return server.action_type.Result()
 
-    def give_up(goal: Any) -> None:
-        goal.execute(abort)  # the way for a goal that was accepted only
+    def abort_accepted(goal: Any) -> None:
+        goal.execute(abort)  # a goal that was only accepted cannot be aborted directly
 
-    server.register_goal_callback(_contained(server._goal_callback, reject, report))
-    server.register_cancel_callback(_contained(server._cancel_callback, refuse, report))
+    server.register_goal_callback(_contained(server._goal_callback, reject_goal, report))
+    server.register_cancel_callback(_contained(server._cancel_callback, reject_cancel, report))
     server.register_execute_callback(_contained(server._execute_callback, abort, report))
-    accepted = _contained(server._handle_accepted_callback, give_up, report)
+    accepted = _contained(server._handle_accepted_callback, abort_accepted, report)
     server.register_handle_accepted_callback(accepted)
 
 
 def _contained(
-    callback: Callable[[Any], Any], instead: Callable[[Any], Any], report: Report
+    callback: Callable[[Any], Any], fallback: Callable[[Any], Any], report: Report
 ) -> Callable[[Any], Any]:
     def fail(error: BaseException, argument: Any) -> Any:
         if not isinstance(error, Cancelled):  # the loop stops: nothing to report
             report(name_of(callback), error)
-        return instead(argument)
+        return fallback(argument)
 
     def call(argument: Any) -> Any:
         try:
@@ -212,16 +213,19 @@ def _contained(
     return call_and_await if inspect.iscoroutinefunction(callback) else call
 
 
-async def take_goal(server: Any, goal_id: UUID, goal: Any, tell: Callable[[bool], None]) -> None:
-    """Take a goal that did not come by DDS; ``tell`` is told first whether it is accepted.
+async def execute_goal_request(
+    server: Any, goal_id: UUID, goal: Any, respond: Callable[[bool], None]
+) -> None:
+    """Handle a goal request that did not come by DDS.
 
-    As ``ActionServer._execute_goal_request`` does, but for the answer.
+    First calls ``respond`` with whether the goal is accepted. Otherwise as
+    ``ActionServer._execute_goal_request``.
     """
     response = server._goal_callback(goal)
     if inspect.isawaitable(response):
         response = await response
     if response is not GoalResponse.ACCEPT:
-        tell(False)
+        respond(False)
         return
     info = GoalInfo(goal_id=goal_id, stamp=server._node.get_clock().now().to_msg())
     with server._lock:
@@ -230,27 +234,27 @@ async def take_goal(server: Any, goal_id: UUID, goal: Any, tell: Callable[[bool]
     server._goal_handles[identity] = handle
     server._result_futures[identity] = RclpyFuture()
     server.add_future(server._result_futures[identity])
-    tell(True)
+    respond(True)
     server._handle.publish_status()
     accepted = server._handle_accepted_callback(handle)
     if inspect.isawaitable(accepted):
         await accepted
 
 
-async def cancel_goal(server: Any, goal_id: UUID) -> Any:
-    """Ask for the end of a goal otherwise than by DDS; return the response, as by DDS."""
-    asked = CancelGoal.Request(goal_info=GoalInfo(goal_id=goal_id))
+async def execute_cancel_request(server: Any, goal_id: UUID) -> Any:
+    """Handle a cancel request that did not come by DDS; return the response."""
+    request = CancelGoal.Request(goal_info=GoalInfo(goal_id=goal_id))
     with server._lock:
-        response = server._handle.process_cancel_request(asked, CancelGoal.Response)
-    found, response.goals_canceling = response.goals_canceling, []
-    for info in found:
+        response = server._handle.process_cancel_request(request, CancelGoal.Response)
+    requested, response.goals_canceling = response.goals_canceling, []
+    for info in requested:
         handle = server._goal_handles.get(bytes(info.goal_id.uuid))
-        if handle is not None and await _agrees(server, handle):
+        if handle is not None and await _accepts_cancel(server, handle):
             response.goals_canceling.append(info)
     return response
 
 
-async def _agrees(server: Any, handle: ServerGoalHandle) -> bool:
+async def _accepts_cancel(server: Any, handle: ServerGoalHandle) -> bool:
     response = server._cancel_callback(handle)
     if inspect.isawaitable(response):
         response = await response
@@ -259,14 +263,14 @@ async def _agrees(server: Any, handle: ServerGoalHandle) -> bool:
     try:
         handle._update_state(GoalEvent.CANCEL_GOAL)
     except RCLError:
-        return False  # it has ended just now
+        return False  # it has just ended
     return True
 
 
-def when_ended(server: Any, identity: bytes, tell: Callable[[Any], None]) -> None:
-    """Have ``tell`` called with the response to a request for the goal's result, as by DDS."""
+def add_result_callback(server: Any, identity: bytes, respond: Callable[[Any], None]) -> None:
+    """Call ``respond`` with the result response of a goal once it has ended, as by DDS."""
     future = server._result_futures.get(identity)
-    if future is None:  # ended long ago
-        tell(server.action_type.Impl.GetResultService.Response())
+    if future is None:  # expired
+        respond(server.action_type.Impl.GetResultService.Response())
     else:
-        future.add_done_callback(lambda done: tell(done.result()))
+        future.add_done_callback(lambda done: respond(done.result()))

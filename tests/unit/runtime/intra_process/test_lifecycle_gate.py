@@ -9,9 +9,9 @@ from time import monotonic
 
 import pytest
 
-from composer.runtime.executors.tasks import Future
-from composer.runtime.intra_process import pending as module
-from composer.runtime.intra_process.pending import Pending
+from composer.runtime.executors.futures import Future
+from composer.runtime.intra_process import lifecycle_gate as module
+from composer.runtime.intra_process.lifecycle_gate import PendingFutures
 
 
 class Clock:
@@ -49,15 +49,15 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 @pytest.fixture
-def pending(clock: Clock) -> Pending:
-    return Pending(clock.call_later)
+def pending(clock: Clock) -> PendingFutures:
+    return PendingFutures(clock.call_later)
 
 
-def hold(pending: Pending, until_s: float) -> Future[str]:
-    return pending.hold(Future(), until_s, TooLate)
+def hold(pending: PendingFutures, until_s: float) -> Future[str]:
+    return pending.add(Future(), until_s, TooLate)
 
 
-def test_each_ends_at_its_own_time(clock: Clock, pending: Pending) -> None:
+def test_each_ends_at_its_own_time(clock: Clock, pending: PendingFutures) -> None:
     ends_s = (105.0, 103.0, 104.0, 103.0, 109.0)
     futures = [hold(pending, end_s) for end_s in ends_s]
     for second in range(101, 111):
@@ -67,7 +67,7 @@ def test_each_ends_at_its_own_time(clock: Clock, pending: Pending) -> None:
     assert not clock.timers
 
 
-def test_what_is_done_in_time_keeps_its_outcome(clock: Clock, pending: Pending) -> None:
+def test_what_is_done_in_time_keeps_its_outcome(clock: Clock, pending: PendingFutures) -> None:
     early, late = hold(pending, 101.0), hold(pending, 102.0)
     early.set_result("answer")
     clock.pass_s(5.0)
@@ -75,7 +75,9 @@ def test_what_is_done_in_time_keeps_its_outcome(clock: Clock, pending: Pending) 
     assert isinstance(late.exception(), TooLate)
 
 
-def test_one_call_after_the_other_takes_one_timer_for_all(clock: Clock, pending: Pending) -> None:
+def test_one_call_after_the_other_takes_one_timer_for_all(
+    clock: Clock, pending: PendingFutures
+) -> None:
     for _ in range(1000):
         hold(pending, clock.now_s + 5.0).set_result("answer")
         clock.pass_s(0.001)
@@ -90,7 +92,7 @@ def test_one_call_after_the_other_takes_one_timer_for_all(clock: Clock, pending:
 
 
 def test_a_sooner_time_is_kept_though_a_later_one_was_there_first(
-    clock: Clock, pending: Pending
+    clock: Clock, pending: PendingFutures
 ) -> None:
     later, sooner = hold(pending, 150.0), hold(pending, 101.0)
     clock.pass_s(1.0)
@@ -101,30 +103,32 @@ def test_a_sooner_time_is_kept_though_a_later_one_was_there_first(
 
 
 def test_without_a_limit_there_is_no_timer_and_the_end_ends_it(
-    clock: Clock, pending: Pending
+    clock: Clock, pending: PendingFutures
 ) -> None:
-    unlimited, limited = pending.hold(Future()), hold(pending, 103.0)
+    unlimited, limited = pending.add(Future()), hold(pending, 103.0)
     assert clock.ordered == 1
     clock.pass_s(1000.0)
     assert not unlimited.done()
     last = hold(pending, inf)
-    pending.end(lambda: ValueError("over"))
+    pending.fail_all(lambda: ValueError("over"))
     for future in (unlimited, last):
         assert str(future.exception()) == "over"
     assert isinstance(limited.exception(), TooLate)
     assert hold(pending, 2000.0).done() is False, "the end of others is not its own"
 
 
-def test_what_is_done_is_let_go(pending: Pending) -> None:
+def test_what_is_done_is_let_go(pending: PendingFutures) -> None:
     done: Future[str] = Future()
     done.set_result("answer")
-    pending.hold(done)
+    pending.add(done)
     hold(pending, 200.0).cancel()
     hold(pending, 200.0).set_result("answer")
     assert not pending._futures
 
 
-def test_who_waits_again_when_his_time_is_up_is_held_again(clock: Clock, pending: Pending) -> None:
+def test_who_waits_again_when_his_time_is_up_is_held_again(
+    clock: Clock, pending: PendingFutures
+) -> None:
     seen: list[Future[str]] = []
     hold(pending, 101.0).add_done_callback(lambda _: seen.append(hold(pending, 102.0)))
     clock.pass_s(1.0)
@@ -133,7 +137,9 @@ def test_who_waits_again_when_his_time_is_up_is_held_again(clock: Clock, pending
     assert [future.done() for future in seen] == [True]
 
 
-def test_a_time_that_has_passed_ends_it_at_the_next_look(clock: Clock, pending: Pending) -> None:
+def test_a_time_that_has_passed_ends_it_at_the_next_look(
+    clock: Clock, pending: PendingFutures
+) -> None:
     future = hold(pending, 99.0)
     assert not future.done()
     clock.pass_s(0.0)
@@ -142,7 +148,7 @@ def test_a_time_that_has_passed_ends_it_at_the_next_look(clock: Clock, pending: 
 
 def test_none_is_forgotten_while_threads_hold_and_the_timer_looks() -> None:
     due: list[Callable[[], object]] = []
-    pending = Pending(lambda _, look: due.append(look))
+    pending = PendingFutures(lambda _, look: due.append(look))
 
     def hold_some(_: int) -> list[Future[str]]:
         return [hold(pending, monotonic()) for _ in range(200)]

@@ -1,4 +1,4 @@
-"""What ``node.executor`` is under the composer's own loop."""
+"""The object that is ``node.executor`` under the composer's own loop."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from composer.runtime.executors.tasks import name_of
 
 
 class NodeExecutor:
-    """As much of ``rclpy.executors.Executor`` as rclpy's own code asks of ``node.executor``.
+    """The part of ``rclpy.executors.Executor`` that rclpy's own code uses of ``node.executor``.
 
-    An ActionServer runs its goals by ``create_task``, rclpy's futures their done callbacks. A
-    node calls ``wake`` when it got or lost an entity.
+    An ActionServer runs goals by ``create_task``, rclpy's futures their done callbacks. A node
+    calls ``wake`` when one of its entities was created or destroyed.
     """
 
     def __init__(self, loop: Loop, on_wake: Callable[[], None]) -> None:
@@ -25,7 +25,7 @@ class NodeExecutor:
         self._on_wake = on_wake
 
     def create_task(self, callback: Callable[..., Any], *args: Any, **kwargs: Any) -> RclpyFuture:
-        """Call ``callback``, plain or ``async def``, on the loop; the future is its result.
+        """Call ``callback``, plain or ``async def``, on the loop; return the future of its result.
 
         An exception goes to the loop's handler.
         """
@@ -45,11 +45,11 @@ class NodeExecutor:
         return outcome
 
     def wake(self) -> None:
-        """Look at what the node has, soon."""
+        """Check the node's entities soon."""
         self._on_wake()
 
     def add_node(self, node: object) -> None:
-        """Do nothing: nodes come by ``Loop.add_node``."""
+        """Do nothing: nodes are added by ``Loop.add_node``."""
 
     def remove_node(self, node: object) -> None:
-        """Do nothing: nodes go by ``Loop.remove_node``."""
+        """Do nothing: nodes are removed by ``Loop.remove_node``."""

@@ -1,0 +1,148 @@
+"""What loops of every kind share: tasks, timers, calls from other threads and error reports."""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Coroutine
+from time import monotonic
+from typing import Any, Generic, TypeVar, cast
+
+from composer.runtime.executors.futures import Future
+from composer.runtime.executors.loop import ExceptionHandler
+from composer.runtime.executors.stacks import format_stacks
+from composer.runtime.executors.tasks import Task, name_of
+from composer.runtime.executors.timer_queue import ScheduledCall
+
+T = TypeVar("T")
+
+#: After this time without a wait, a loop sleeps for :data:`YIELD_S`. Polling releases the
+#: interpreter's lock and takes it back before a waiting thread is awake. That thread counts it as
+#: a switch and does not request the lock: without the sleep it starves for seconds.
+BUSY_S = 0.005
+YIELD_S = 5e-5  # enough for another thread to wake up
+PAUSE_AFTER_FAULT_S = 0.01  # a permanent fault must not fill the log within a second
+
+
+class BaseLoop(ABC):
+    """A :class:`~composer.runtime.executors.loop.Loop`, except how it waits for entities."""
+
+    def __init__(self, name: str, on_exception: ExceptionHandler) -> None:
+        self._name = name
+        self._on_exception = on_exception
+        self._tasks: set[Task[Any]] = set()
+        self._stopping = False
+        self._stopped = False
+
+    @property
+    def name(self) -> str:
+        """The name of the executor in YAML."""
+        return self._name
+
+    @abstractmethod
+    def call_soon(self, callback: Callable[[], object]) -> None:
+        """Call ``callback`` on the loop as soon as it is free."""
+
+    @abstractmethod
+    def busy_threads(self) -> tuple[int, ...]:
+        """Return the identifiers of the threads that are in a callback now."""
+
+    @abstractmethod
+    def _is_current(self) -> bool:
+        """Return whether the calling thread belongs to the loop."""
+
+    @abstractmethod
+    def _schedule(self, call: ScheduledCall) -> ScheduledCall:
+        """Make ``call`` when it is due; return it."""
+
+    def call_later(self, delay_s: float, callback: Callable[[], object]) -> ScheduledCall:
+        """Call ``callback`` once, ``delay_s`` seconds from now."""
+        # Never before now: all calls due at one time are made before anything else.
+        return self._schedule(ScheduledCall(monotonic() + max(delay_s, 0.0), None, callback))
+
+    def call_every(self, period_s: float, callback: Callable[[], object]) -> ScheduledCall:
+        """Call ``callback`` each ``period_s`` seconds; a late call does not shift the next.
+
+        Raises ValueError for a period that is not positive.
+        """
+        return self._schedule(ScheduledCall(monotonic() + period_s, period_s, callback))
+
+    def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
+        """Run a coroutine; return the future of its result. Canceling the future closes it."""
+        task = Task(coroutine, self.call_soon, self.report, self._tasks.discard)
+        self._tasks.add(task)
+        future = task.start()
+        if self._stopped:
+            task.abandon()
+        return future
+
+    def run(self, function: Callable[[], T], timeout_s: float | None = None) -> T:
+        """Call ``function`` on the loop and wait for it; on the loop itself, call it at once.
+
+        Raises what ``function`` raises; TimeoutError if it takes longer, after which it is not
+        started; and RuntimeError if the loop has stopped.
+        """
+        if self._is_current():
+            return function()
+        call = CrossThreadCall(function)
+        self.call_soon(call.run)
+        if self._stopped and call.revoke():
+            raise RuntimeError(f"executor '{self._name}' has stopped")
+        return call.wait(timeout_s, self.current_stack)
+
+    def current_stack(self) -> str:
+        """Return the Python stacks of the callbacks that run now; empty if none does."""
+        return format_stacks(self.busy_threads())
+
+    def report(self, what: str, error: BaseException) -> None:
+        """Pass an exception to the exception handler."""
+        try:
+            self._on_exception(what, error)
+        except BaseException:
+            traceback.print_exc()  # the handler itself failed
+
+
+class CrossThreadCall(Generic[T]):
+    """Calls ``function`` on the thread that calls :meth:`run`, for another thread that waits."""
+
+    def __init__(self, function: Callable[[], T]) -> None:
+        self._function = function
+        self._right_to_start = [True]  # popping is atomic: started or revoked, never both
+        self._done = threading.Event()
+        self._value: T | None = None
+        self._error: BaseException | None = None
+
+    def run(self) -> None:
+        """Call the function unless it was revoked. Raises nothing."""
+        if not self.revoke():
+            return
+        try:
+            self._value = self._function()
+        except BaseException as error:
+            self._error = error
+        self._done.set()
+
+    def revoke(self) -> bool:
+        """Prevent the call; return false if it has started or was revoked before."""
+        try:
+            self._right_to_start.pop()
+        except IndexError:
+            return False
+        return True
+
+    def wait(self, timeout_s: float | None, current_stack: Callable[[], str]) -> T:
+        """Return what the function returns, or raise what it raises.
+
+        Raises TimeoutError, with ``current_stack()``, if that takes longer; the function is not
+        started after that.
+        """
+        if not self._done.wait(timeout_s):
+            status = "is still running" if not self.revoke() else "was not started"
+            stack = current_stack()
+            at = f"; the loop is at:\n{stack}" if stack else ""
+            name = name_of(self._function)
+            raise TimeoutError(f"'{name}' {status} after {timeout_s:g} s{at}")
+        if self._error is not None:
+            raise self._error
+        return cast(T, self._value)
