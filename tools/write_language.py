@@ -7,6 +7,7 @@ The descriptions of keys come from ``schemas/parts``, the introduction from
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -151,7 +152,7 @@ class Schema:
 
     def _plural(self, part: Part, key: str) -> str:
         kind = self._links(part, key) or self.kind(part, key)
-        return {"string": "strings"}.get(kind, kind)
+        return re.sub(r"\b(string|number|boolean|integer)\b", r"\1s", kind)
 
     def _links(self, part: Part, key: str) -> str:
         if _NAMES.get(_definition(part)):
