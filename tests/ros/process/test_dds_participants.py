@@ -26,7 +26,7 @@ JOIN = f"""
 import json, time
 from composer.runtime.process.environment import prepare_environment
 prepare_environment()
-from composer.remote.graph_names import Names
+from composer.remote.graph_names import GraphNames
 from composer.remote.session import Deadline, Session
 
 took_s, missing = [], []
@@ -35,7 +35,7 @@ for _ in range({JOINS}):
         began_s = time.monotonic()
         session.wait_for(lambda: session.others() or None, Deadline(10.0))
         took_s.append(time.monotonic() - began_s)
-        found = dict(Names(session, Deadline(10.0)).topics())
+        found = dict(GraphNames(session, Deadline(10.0)).topics())
         missing.append(sum(topic not in found for topic in {TOPICS}))
 print(json.dumps([took_s, missing]))
 """
