@@ -25,8 +25,8 @@ class Unreadable(Exception):
 def module_file(module: str, folder: Path, project: Project) -> Path | None:
     """Return the file of ``module``, a dotted name, or None.
 
-    It is looked for beside the YAML file (``folder``), in the folders of node types of its project,
-    and where Python would find it. Raises Unreadable for a symbolic link out of the project.
+    Searches next to the YAML file (``folder``), in the node type folders of its project, and on
+    Python's module search path. Raises Unreadable for a symbolic link out of the project.
     """
     parts = module.split(".")
     if not all(part.isidentifier() for part in parts):

@@ -106,7 +106,7 @@ def resolve_path(
     while index < len(parts):
         name, taken = _next_name(found, parts[index:])
         step = _element(found, name) if isinstance(name, int) else _field(found, name, interfaces)
-        if isinstance(step, _Failure):
+        if isinstance(step, _PathFailure):
             return PathProblem(step.message, index, step.hint)
         found, index = step, index + taken
     return found
@@ -175,23 +175,25 @@ def described(type_: ValueType) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class _Failure:
+class _PathFailure:
     message: str
     hint: str | None = None
 
 
-def _field(type_: ValueType, name: str, interfaces: Interfaces) -> ValueType | _Failure:
+def _field(type_: ValueType, name: str, interfaces: Interfaces) -> ValueType | _PathFailure:
     if isinstance(type_, Mapping):
         found = type_.get(name)
         return (
             found
             if found is not None
-            else _Failure(f"'{name}' does not exist", suggestion(name, type_))
+            else _PathFailure(f"'{name}' does not exist", suggestion(name, type_))
         )
     if isinstance(type_, FieldType) and type_.is_array:
-        return _Failure(f"{type_} has no field '{name}'", "it is a list: use an index, as in [0]")
+        return _PathFailure(
+            f"{type_} has no field '{name}'", "it is a list: use an index, as in [0]"
+        )
     if isinstance(type_, FieldType) and type_.is_primitive:
-        return _Failure(f"{type_} has no field '{name}'", "it is a value, not a message")
+        return _PathFailure(f"{type_} has no field '{name}'", "it is a value, not a message")
     message = fields_of(type_, interfaces)
     if message is None:  # an unknown type or message
         return ANYTHING
@@ -199,15 +201,15 @@ def _field(type_: ValueType, name: str, interfaces: Interfaces) -> ValueType | _
     if field is not None:
         return field.type
     hint = suggestion(name, message.field_names)
-    return _Failure(f"{message.name} has no field '{name}'", hint)
+    return _PathFailure(f"{message.name} has no field '{name}'", hint)
 
 
-def _element(type_: ValueType, index: int) -> ValueType | _Failure:
+def _element(type_: ValueType, index: int) -> ValueType | _PathFailure:
     if isinstance(type_, Anything):
         return ANYTHING
     if not isinstance(type_, FieldType) or not type_.is_array:
-        return _Failure(f"{described(type_)} has no elements")
+        return _PathFailure(f"{described(type_)} has no elements")
     limit = type_.array_size if type_.array_size is not None else type_.array_bound
     if limit is not None and not -limit <= index < limit:
-        return _Failure(f"{type_} has no element {index}")
+        return _PathFailure(f"{type_} has no element {index}")
     return type_.element

@@ -1,6 +1,6 @@
-"""Every file in err/ gives exactly the report beside it.
+"""Every file in err/ gives exactly the report next to it.
 
-pytest tests/golden --update-golden    writes the reports anew: read the difference
+After an intended change, run ``pytest tests/golden --update-golden`` and review the diff.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ CODE = re.compile(r"^\w+\[(RC\d+) ", re.MULTILINE)
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_findings_are_those_written_down(
+def test_report_matches_the_golden_file(
     name: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(ROOT)
@@ -30,8 +30,8 @@ def test_findings_are_those_written_down(
     if request.config.getoption("--update-golden"):
         expected.write_text(report, encoding="utf-8")
     assert report == expected.read_text(encoding="utf-8")
-    assert CODE.search(report), "a file in err/ has something wrong with it"
-    assert str(ROOT) not in report, "a report names no folder of one machine"
+    assert CODE.search(report), "every file in err/ has a mistake"
+    assert str(ROOT) not in report, "reports contain no absolute paths"
 
 
 def test_every_report_has_its_file() -> None:
@@ -47,9 +47,9 @@ def test_every_check_has_a_report() -> None:
     assert checked - reported == set()
 
 
-def test_ten_mistakes_give_ten_findings(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ten_mistakes_give_ten_diagnostics(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    findings = load(ERRORS / "ten_mistakes.yaml").diagnostics
-    rules = [finding.rule.code for finding in findings]
+    diagnostics = load(ERRORS / "ten_mistakes.yaml").diagnostics
+    rules = [diagnostic.rule.code for diagnostic in diagnostics]
     assert len(rules) == 10
     assert len(set(rules)) == 10

@@ -1,7 +1,7 @@
-"""Diagrams, to the byte. ``graph/depot.<view>.<ending>`` is what is expected of ``depot.yaml``.
+"""Diagrams of ``depot.yaml``, byte for byte; ``graph/depot.<view>.<suffix>`` is expected.
 
-After a change that is meant: ``pytest tests/golden --update-golden``, then look at
-the difference, and at the pictures.
+After an intended change, run ``pytest tests/golden --update-golden`` and review the diff and the
+images.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from composer.graph.placing import Engine
 from composer.loading import load
 
 HERE = Path(__file__).parent / "graph"
-ENDINGS = {Format.MERMAID: "mmd", Format.DOT: "dot", Format.JSON: "json", Format.SVG: "svg"}
+SUFFIXES = {Format.MERMAID: "mmd", Format.DOT: "dot", Format.JSON: "json", Format.SVG: "svg"}
 
 
 @pytest.mark.parametrize("view", list(View))
-@pytest.mark.parametrize("form", list(ENDINGS))
+@pytest.mark.parametrize("form", list(SUFFIXES))
 def test_diagram(view: View, form: Format, request: pytest.FixtureRequest) -> None:
     loading = load(HERE / "depot.yaml", shown="depot.yaml")
     assert loading.system is not None
     graph = build_graph(scene_of([loading.system], loading.diagnostics), view)
     text = render([graph], form, Engine.BUNDLED).decode()
-    expected = HERE / f"depot.{view}.{ENDINGS[form]}"
+    expected = HERE / f"depot.{view}.{SUFFIXES[form]}"
     if request.config.getoption("--update-golden"):
         expected.write_text(text, encoding="utf-8")
     assert text == expected.read_text(encoding="utf-8")
 
 
-def test_every_expected_diagram_is_made() -> None:
-    made = {f"depot.{view}.{ending}" for view in View for ending in ENDINGS.values()}
-    assert {path.name for path in HERE.glob("depot.*.*")} == made
+def test_every_expected_diagram_is_generated() -> None:
+    generated = {f"depot.{view}.{ending}" for view in View for ending in SUFFIXES.values()}
+    assert {path.name for path in HERE.glob("depot.*.*")} == generated

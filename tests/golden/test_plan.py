@@ -1,4 +1,4 @@
-"""The plans of the example systems, as they print. ``plan/<system>.txt`` is what is expected."""
+"""The plans of the example systems, with ``plan/<system>.txt`` as expected output."""
 
 from __future__ import annotations
 
@@ -24,6 +24,6 @@ def test_plan(path: Path) -> None:
     assert printed == (EXPECTED / f"{path.stem}.txt").read_text(encoding="utf-8")
 
 
-def test_every_expected_plan_is_one_of_a_system() -> None:
+def test_every_expected_plan_belongs_to_a_system() -> None:
     expected = {path.stem for path in EXPECTED.glob("*.txt")}
     assert expected == {path.stem for path in SYSTEMS}

@@ -1,4 +1,4 @@
-"""How often things happen, as far as YAML and Python tell."""
+"""The rates of publishers and topics, from YAML and behaviors."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ def topic_hz(name: str, text: str, folder: Path) -> float | None:
     return rates(context).topic_hz(name)
 
 
-def test_a_timer_tells_the_rate_of_what_it_publishes(tmp_path: Path) -> None:
+def test_a_timer_determines_the_rate_of_its_publishers(tmp_path: Path) -> None:
     assert topic_hz("/chatter", TALKER, tmp_path) == pytest.approx(20.0)
 
 
-def test_what_is_passed_on_comes_as_often_as_it_is_heard(tmp_path: Path) -> None:
+def test_a_relay_publishes_at_the_rate_of_its_subscription(tmp_path: Path) -> None:
     assert topic_hz("/echo", TALKER + RELAY, tmp_path) == pytest.approx(20.0)
 
 
@@ -60,12 +60,12 @@ def test_publishers_of_one_topic_add_up(tmp_path: Path) -> None:
     assert topic_hz("/echo", TALKER + RELAY + other, tmp_path) == pytest.approx(25.0)
 
 
-def test_a_topic_that_is_heard_from_outside_has_no_known_rate(tmp_path: Path) -> None:
+def test_a_topic_with_external_publishers_has_no_known_rate(tmp_path: Path) -> None:
     outside = RELAY.replace("qos: command, publish", "qos: command, external: true, publish")
     assert topic_hz("/echo", TALKER + outside, tmp_path) is None
 
 
-def test_what_goes_round_in_a_circle_has_no_known_rate(tmp_path: Path) -> None:
+def test_topics_in_a_cycle_have_no_known_rate(tmp_path: Path) -> None:
     back = RELAY.replace("relay:", "back:").replace("chatter", "x").replace("echo", "chatter")
     back = back.replace("      x:", "      echo:")
     assert topic_hz("/echo", TALKER + RELAY + back, tmp_path) is None
@@ -98,7 +98,7 @@ PUBLISH = "self.publishers.chatter.publish(None)"
         ({"on_configure": "self.send = self.publishers.chatter.publish"}, None),
     ],
 )
-def test_behaviors_are_read_for_what_they_publish(
+def test_publishers_in_behaviors_are_recognized(
     bodies: dict[str, str], rate_hz: float | None, tmp_path: Path
 ) -> None:
     (tmp_path / "robot.py").write_text(behavior(**bodies), encoding="utf-8")
@@ -106,7 +106,7 @@ def test_behaviors_are_read_for_what_they_publish(
 
 
 @pytest.mark.slow  # 1500 nodes
-def test_a_long_line_of_relays_is_followed(tmp_path: Path) -> None:
+def test_a_long_chain_of_relays_is_followed(tmp_path: Path) -> None:
     count = 1500
     nodes = [TALKER]
     for number in range(count):

@@ -20,7 +20,7 @@ def read(folder: Path, text: str) -> BehaviorSource:
     return find("robot:Robot", folder)
 
 
-def test_methods_have_names_places_and_arguments(tmp_path: Path) -> None:
+def test_methods_have_names_spans_and_arguments(tmp_path: Path) -> None:
     source = read(
         tmp_path,
         "class Robot:\n"
@@ -48,7 +48,7 @@ def test_columns_count_characters(tmp_path: Path) -> None:
     assert (method.span.line, method.span.column) == (2, 14)
 
 
-def test_static_and_class_methods_take_what_is_given(tmp_path: Path) -> None:
+def test_static_and_class_methods_have_their_arguments(tmp_path: Path) -> None:
     source = read(
         tmp_path,
         "class Robot:\n"
@@ -60,7 +60,7 @@ def test_static_and_class_methods_take_what_is_given(tmp_path: Path) -> None:
     assert [method.arguments for method in source.methods] == [("message",), ()]
 
 
-def test_what_hides_a_signature_makes_no_claim(tmp_path: Path) -> None:
+def test_hidden_signatures_are_unknown(tmp_path: Path) -> None:
     source = read(
         tmp_path,
         "class Robot:\n    @timed(3)\n    def on_scan(self): ...\n    on_tick = make_handler()\n",
@@ -69,7 +69,7 @@ def test_what_hides_a_signature_makes_no_claim(tmp_path: Path) -> None:
     assert all(method.accepts(7) for method in source.methods)
 
 
-def test_bases_are_followed_in_the_file_and_beside_it(tmp_path: Path) -> None:
+def test_bases_are_followed_within_the_folder(tmp_path: Path) -> None:
     (tmp_path / "base.py").write_text("class Base:\n    def on_base(self): ...\n")
     (tmp_path / "wheels.py").write_text("class Wheels:\n    def on_wheels(self): ...\n")
     source = read(
@@ -104,7 +104,7 @@ def test_the_nearest_definition_of_a_method_counts(tmp_path: Path) -> None:
         "class Robot:\n    def __getattr__(self, name): ...\n",
     ],
 )
-def test_what_syntax_does_not_tell_is_not_claimed(tmp_path: Path, text: str) -> None:
+def test_dynamic_classes_are_incomplete(tmp_path: Path, text: str) -> None:
     source = read(tmp_path, text)
     assert source.class_found
     assert not source.complete
@@ -119,13 +119,13 @@ def test_what_syntax_does_not_tell_is_not_claimed(tmp_path: Path, text: str) -> 
         "def __getattr__(name): ...\n",
     ],
 )
-def test_a_class_that_may_be_there_is_not_called_missing(tmp_path: Path, text: str) -> None:
+def test_a_class_that_may_exist_is_not_missing(tmp_path: Path, text: str) -> None:
     source = read(tmp_path, text)
     assert source.class_found
     assert not source.complete
 
 
-def test_a_class_behind_a_relative_import_is_found(tmp_path: Path) -> None:
+def test_relative_imports_are_followed(tmp_path: Path) -> None:
     package = tmp_path / "robots"
     package.mkdir()
     (package / "__init__.py").write_text("from .arm import Arm\nfrom . import leg\n")
@@ -139,7 +139,7 @@ def test_a_class_behind_a_relative_import_is_found(tmp_path: Path) -> None:
     assert find("robots.arm:Arm", tmp_path).complete
 
 
-def test_a_class_under_a_condition_is_found(tmp_path: Path) -> None:
+def test_conditional_classes_are_found(tmp_path: Path) -> None:
     text = (
         "try:\n    import fast\nexcept ImportError:\n"
         "    if True:\n        class Robot:\n            def on_tick(self): ...\n"
@@ -147,13 +147,13 @@ def test_a_class_under_a_condition_is_found(tmp_path: Path) -> None:
     assert [method.name for method in read(tmp_path, text).methods] == ["on_tick"]
 
 
-def test_bases_that_go_round_in_a_circle_end(tmp_path: Path) -> None:
+def test_cyclic_bases_end(tmp_path: Path) -> None:
     (tmp_path / "other.py").write_text("from robot import Robot\nclass Other(Robot): ...\n")
     source = read(tmp_path, "from other import Other\nclass Robot(Other): ...\n")
     assert source.class_found
 
 
-def test_the_projects_nodes_folder_is_looked_in_after_the_files_own(tmp_path: Path) -> None:
+def test_the_nodes_folder_of_the_project_is_searched_last(tmp_path: Path) -> None:
     nodes = tmp_path / "nodes"
     systems = tmp_path / "systems"
     nodes.mkdir()
@@ -172,14 +172,14 @@ def test_installed_modules_are_found_without_importing_them(tmp_path: Path) -> N
     assert "mailbox" not in sys.modules
 
 
-def test_an_installed_package_is_not_imported_for_what_is_below_it(tmp_path: Path) -> None:
+def test_an_installed_package_is_not_imported_for_its_modules(tmp_path: Path) -> None:
     for name in [name for name in sys.modules if name.split(".")[0] == "wsgiref"]:
         del sys.modules[name]
     assert find("wsgiref.handlers:CGIHandler", tmp_path).class_found
     assert not any(name.startswith("wsgiref") for name in sys.modules)
 
 
-def test_a_module_without_syntax_is_not_called_missing(tmp_path: Path) -> None:
+def test_a_compiled_module_is_not_missing(tmp_path: Path) -> None:
     source = find("sys:Robot", tmp_path)
     assert source.module_found
     assert source.class_found
@@ -189,12 +189,12 @@ def test_a_module_without_syntax_is_not_called_missing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text", ["nothing_here:Robot", "..:Robot", "../robot:Robot", "a b:C", ":Robot", "", "json.no:X"]
 )
-def test_a_module_that_is_nowhere_is_missing(tmp_path: Path, text: str) -> None:
+def test_an_unknown_module_is_missing(tmp_path: Path, text: str) -> None:
     (tmp_path.parent / "robot.py").write_text("class Robot: ...\n")
     assert not find(text, tmp_path).module_found
 
 
-def test_a_missing_class_is_missing_and_the_others_are_named(tmp_path: Path) -> None:
+def test_a_missing_class_is_reported_with_the_existing_ones(tmp_path: Path) -> None:
     (tmp_path / "robot.py").write_text("class Rover: ...\nclass Arm: ...\n")
     for text in ("robot:Robot", "robot"):
         source = find(text, tmp_path)
@@ -203,7 +203,7 @@ def test_a_missing_class_is_missing_and_the_others_are_named(tmp_path: Path) -> 
         assert source.class_names == ("Rover", "Arm")
 
 
-def test_a_change_of_the_file_is_seen(tmp_path: Path) -> None:
+def test_changes_of_the_file_are_noticed(tmp_path: Path) -> None:
     assert read(tmp_path, "class Rover: ...\n").class_found is False
     assert read(tmp_path, "class Robot: ...\n").class_found is True
 
@@ -232,6 +232,6 @@ def test_no_content_raises(tmp_path: Path, content: bytes, problem: str) -> None
     assert source.problem.startswith(problem)
 
 
-def test_a_folder_with_the_name_of_the_file_is_no_module(tmp_path: Path) -> None:
+def test_a_folder_with_the_name_of_the_file_is_not_a_module(tmp_path: Path) -> None:
     (tmp_path / "robot.py").mkdir()
     assert find("robot:Robot", tmp_path).problem == "is not a regular file"

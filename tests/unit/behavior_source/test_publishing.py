@@ -1,4 +1,4 @@
-"""How often a node publishes, as far as its YAML and the text of its behavior tell."""
+"""The publishing rates of a node, from its YAML and its behavior."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def publishing(body: str) -> PublisherUses:
         "publishers = self.publishers\nout = publishers.out\nsend = out.publish\nsend(x)",
     ],
 )
-def test_a_statement_that_is_always_reached_publishes_each_time(body: str) -> None:
+def test_unconditional_statements_publish_each_time(body: str) -> None:
     assert publishing(body) == PublisherUses(("out",), ("out",))
 
 
@@ -49,7 +49,7 @@ def test_a_statement_that_is_always_reached_publishes_each_time(body: str) -> No
         "self.publishers.out.topic",
     ],
 )
-def test_what_depends_on_something_is_only_named(body: str) -> None:
+def test_conditional_publishers_are_only_mentioned(body: str) -> None:
     assert publishing(body) == PublisherUses((), ("out",))
 
 
@@ -63,12 +63,12 @@ def test_what_depends_on_something_is_only_named(body: str) -> None:
         "def send(out=self.publishers.out):\n    out.publish(x)",
     ],
 )
-def test_what_is_kept_or_given_away_may_be_used_by_anybody(body: str) -> None:
+def test_stored_publishers_may_be_used_anywhere(body: str) -> None:
     assert publishing(body) == PublisherUses((), ("out",), ("out",))
 
 
 @pytest.mark.parametrize("body", ["out.publish(x)", "self.out.publish(x)", "self.publishers"])
-def test_what_is_no_publisher_is_not_named(body: str) -> None:
+def test_other_attributes_are_not_publishers(body: str) -> None:
     assert publishing(body) == PublisherUses()
 
 
@@ -102,11 +102,11 @@ def test_the_rate_is_that_of_the_timer_whose_handler_publishes(tmp_path: Path) -
     assert rates(tmp_path) == {"out": 20.0}
 
 
-def test_no_rate_is_told_where_another_handler_publishes_too(tmp_path: Path) -> None:
+def test_the_rate_is_unknown_if_another_handler_publishes_too(tmp_path: Path) -> None:
     assert rates(tmp_path, SENDER.replace("pass", "self.publishers.out.publish(1)")) == {}
 
 
-def test_no_rate_is_told_where_what_comes_in_is_answered_with_it(tmp_path: Path) -> None:
+def test_the_rate_is_unknown_if_a_subscription_publishes_too(tmp_path: Path) -> None:
     system = SYSTEM.replace(
         "timers:",
         "subscriptions: {in: {type: std_msgs/msg/String, publish: {out: {}}}}\n        timers:",
@@ -114,5 +114,5 @@ def test_no_rate_is_told_where_what_comes_in_is_answered_with_it(tmp_path: Path)
     assert rates(tmp_path, SENDER, system) == {}
 
 
-def test_no_rate_is_told_where_there_is_no_handler(tmp_path: Path) -> None:
+def test_the_rate_is_unknown_without_a_handler(tmp_path: Path) -> None:
     assert rates(tmp_path, SENDER.replace("on_tick", "on_tock")) == {}

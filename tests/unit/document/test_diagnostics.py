@@ -24,7 +24,7 @@ def parser(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(events, "_LOADER", request.param)
 
 
-def findings_in(text: str) -> list[Diagnostic]:
+def diagnostics_in(text: str) -> list[Diagnostic]:
     return parse_document(SourceFile("f", text))[1]
 
 
@@ -84,7 +84,7 @@ def told(finding: Diagnostic) -> str:
     ],
 )
 def test_syntax(text: str, expected: str, hint: str) -> None:
-    (finding,) = findings_in(text)
+    (finding,) = diagnostics_in(text)
     assert told(finding) == expected
     assert finding.rule.name == "yaml-syntax"
     assert hint in str(finding.hint)
@@ -92,7 +92,7 @@ def test_syntax(text: str, expected: str, hint: str) -> None:
 
 @pytest.mark.usefixtures("parser")
 def test_misplaced_line_shows_where_its_map_begins() -> None:
-    (finding,) = findings_in("x: 1\na:\n  b: 1\n c: 2")
+    (finding,) = diagnostics_in("x: 1\na:\n  b: 1\n c: 2")
     assert [(str(label.span), label.message) for label in finding.related] == [
         ("f:1:1", "the map begins here")
     ]
@@ -140,13 +140,13 @@ def test_misplaced_line_shows_where_its_map_begins() -> None:
     ],
 )
 def test_finding(text: str, rule: str, expected: str) -> None:
-    (finding,) = findings_in(text)
+    (finding,) = diagnostics_in(text)
     assert finding.rule.name == rule
     assert told(finding).startswith(expected)
 
 
 def test_second_key_shows_the_first() -> None:
-    (finding,) = findings_in("x:\n  a: 1\n  b: 2\n  a: 3")
+    (finding,) = diagnostics_in("x:\n  a: 1\n  b: 2\n  a: 3")
     assert [str(label.span) for label in finding.related] == ["f:2:3"]
 
 
@@ -154,12 +154,12 @@ def test_second_key_shows_the_first() -> None:
     "text", ["a: 😀👩‍🚀", "a: م", "a: 1 # ✓ é", 'a: "tab\\t line\\n"', "a: m/s²"]
 )
 def test_characters_people_write(text: str) -> None:
-    assert findings_in(text) == []
+    assert diagnostics_in(text) == []
 
 
-def test_all_findings_in_one_run() -> None:
+def test_all_diagnostics_in_one_run() -> None:
     text = "a: .nan\nb: !x 1\nc: 1\nc: 2\n5: x\nd: {<<: 1}\ne: {x}"
-    assert [finding.rule.code for finding in findings_in(text)] == [
+    assert [finding.rule.code for finding in diagnostics_in(text)] == [
         "RC014", "RC010", "RC011", "RC012", "RC013", "RC016",
     ]  # fmt: skip
 

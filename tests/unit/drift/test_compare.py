@@ -1,4 +1,4 @@
-"""What differs between a declared system and a seen graph: no ROS needed to tell."""
+"""The differences between a declared system and an observed graph, without ROS."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ def found(*nodes: ObservedNode, **options: object) -> tuple[Drift, ...]:
     return compare(SYSTEM, Snapshot(nodes), **options)  # type: ignore[arg-type]
 
 
-def test_what_is_as_declared_differs_in_nothing() -> None:
+def test_a_system_as_declared_has_no_drift() -> None:
     assert differences(*ALL) == []
 
 
-def test_a_missing_node_is_named_with_the_one_that_is_nearly_it() -> None:
+def test_a_missing_node_is_reported_with_the_most_similar_one() -> None:
     clark = replace(CLERK, full_name="/front/clark")
     missing, extra = found(clark, GUARD, SLEEPER)
     assert missing.message == "/front/clerk: the node does not exist"
@@ -62,7 +62,7 @@ def test_a_missing_node_is_named_with_the_one_that_is_nearly_it() -> None:
     assert extra.message == "/front/clark: the node exists, but is not declared"
 
 
-def test_a_node_in_another_namespace_is_nearly_it() -> None:
+def test_a_node_in_another_namespace_is_similar() -> None:
     (missing, _) = found(replace(CLERK, full_name="/clerk"), GUARD, SLEEPER)
     assert "'/clerk' exists" in missing.hint
 
@@ -73,7 +73,7 @@ def test_two_nodes_with_one_name_are_reported() -> None:
     ]
 
 
-def test_others_are_extra_unless_ignored_hidden_or_the_systems_own() -> None:
+def test_undeclared_nodes_are_extra_unless_ignored_hidden_or_the_manager() -> None:
     manager = ObservedNode(
         "/shop/manager",
         (ObservedEndpoint(PortKind.SERVICE, "/shop/manager/is_active", "std_srvs/srv/Trigger"),),
@@ -86,7 +86,7 @@ def test_others_are_extra_unless_ignored_hidden_or_the_systems_own() -> None:
 
 
 @pytest.mark.parametrize("name", ["/stranger", "/_ros2cli_7"])
-def test_another_type_on_a_declared_topic_is_named_whoever_has_it(name: str) -> None:
+def test_another_type_on_a_declared_topic_is_reported_for_any_node(name: str) -> None:
     stranger = ObservedNode(
         name, (ObservedEndpoint(PortKind.PUBLISHER, "/bill", "std_msgs/msg/Int8"),)
     )
@@ -95,7 +95,7 @@ def test_another_type_on_a_declared_topic_is_named_whoever_has_it(name: str) -> 
     ) in differences(*ALL, stranger, ignored=["/stranger"])
 
 
-def test_a_missing_endpoint_is_named_with_the_one_that_is_nearly_it() -> None:
+def test_a_missing_endpoint_is_reported_with_the_most_similar_one() -> None:
     bills = replace(BILL, name="/bills")
     missing, extra = found(replace(CLERK, endpoints=(bills, ASK)), GUARD, SLEEPER)
     assert missing.kind is DriftKind.MISSING_ENDPOINT
@@ -114,14 +114,14 @@ def test_a_cleaned_up_node_is_reported_with_its_state_and_missing_endpoints() ->
     assert gone[1].hint == "the node is unconfigured: it has no ports"
 
 
-def test_a_node_that_is_to_stay_unconfigured_lacks_nothing_until_it_is_configured() -> None:
+def test_an_unconfigured_node_needs_no_endpoints() -> None:
     assert differences(CLERK, GUARD, replace(SLEEPER, state="inactive")) == [
         "/sleeper: lifecycle state is inactive, declared unconfigured",
         "/sleeper: publisher /dream is missing",
     ]
 
 
-def test_how_far_the_system_was_brought_up_may_be_said() -> None:
+def test_the_autostart_state_can_be_overridden() -> None:
     inactive = replace(CLERK, state="inactive")
     assert differences(inactive, GUARD, SLEEPER, autostart=PrimaryState.INACTIVE) == []
 
@@ -147,7 +147,7 @@ def test_how_far_the_system_was_brought_up_may_be_said() -> None:
         ),
     ],
 )
-def test_types_and_what_is_really_offered(
+def test_types_and_offered_qos(
     change: Callable[[ObservedEndpoint], ObservedEndpoint], expected: str
 ) -> None:
     clerk = replace(CLERK, endpoints=(change(BILL), ASK))
@@ -174,7 +174,7 @@ def test_parameter_values(values: dict[str, object], expected: list[str]) -> Non
     assert differences(clerk, GUARD, SLEEPER) == [f"/front/clerk: {text}" for text in expected]
 
 
-def test_a_parameter_that_is_not_there() -> None:
+def test_a_missing_parameter() -> None:
     clerk = replace(CLERK, parameters={"on": True, "tags": ["a", "b"]})
     assert differences(clerk, GUARD, SLEEPER) == ["/front/clerk: parameter speed is missing"]
 
@@ -187,7 +187,7 @@ def test_a_node_that_does_not_respond_is_reported() -> None:
     ]
 
 
-def test_a_node_without_a_lifecycle_is_not_what_is_declared() -> None:
+def test_a_node_without_a_lifecycle_differs() -> None:
     assert differences(replace(CLERK, state=""), GUARD, SLEEPER) == [
         "/front/clerk: lifecycle state is none: it is not a lifecycle node, declared active"
     ]

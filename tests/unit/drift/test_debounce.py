@@ -35,7 +35,7 @@ def test_a_reported_difference_with_another_value_is_reported_immediately() -> N
     assert debouncer.update(0.1, [faster]) == DriftChange((faster,), ())
 
 
-def test_settled_is_when_all_that_was_seen_has_lasted() -> None:
+def test_settled_if_all_differences_have_lasted() -> None:
     debouncer = Debouncer(1.0)
     debouncer.update(0.0, [SPEED])
     assert not debouncer.is_settled([SPEED])

@@ -12,7 +12,7 @@ from composer.document.limits import MAX_COPIES
 from composer.expand import expand
 from composer.source import SourceFile
 from composer.tree import Mapping, Plain, plain
-from tests.unit.support.checking import findings_in
+from tests.unit.support.checking import diagnostics_in
 
 
 def expanded(text: str) -> tuple[Mapping, list[Diagnostic]]:
@@ -89,7 +89,7 @@ nodes:
     timers: {{tick: {{rate_hz: 1, log: "${{i}} ticks"}}}}
   b: {{lifecycle: {{depends_on: [a_0]}}}}
 """
-    [finding] = findings_in(text, tmp_path)
+    [finding] = diagnostics_in(text, tmp_path)
     assert (finding.rule.name, str(finding.primary)) == (rule, f"system.yaml:{place}")
 
 
@@ -102,7 +102,7 @@ nodes:
     lifecycle: {depends_on: ["lamp_${i}"]}
     publishers: {image: {type: std_msgs/msg/String, qos: command, dpth: 1}}
 """
-    found = [(item.rule.name, str(item.primary)) for item in findings_in(text, tmp_path)]
+    found = [(item.rule.name, str(item.primary)) for item in diagnostics_in(text, tmp_path)]
     assert found == [
         ("unknown-node", "system.yaml:5:30"),
         ("unknown-key", "system.yaml:6:67"),
@@ -123,5 +123,5 @@ nodes:
 connections:
   - {topic: /images, from: ["c*_?.image", "*_*.image"], to: viewer.image}
 """
-    [finding] = findings_in(text, tmp_path)  # a star is the only sign that stands for others
+    [finding] = diagnostics_in(text, tmp_path)  # a star is the only sign that stands for others
     assert finding.message == "'c*_?.image' names node 'c*_?', which is not a node of this system"

@@ -1,4 +1,4 @@
-"""The types of expressions, and what can never work in them."""
+"""The types of expressions, and expressions that can never work."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_every_function_has_a_type() -> None:
         ("max(message.many)", "message.many: string[] where numbers are expected"),
     ],
 )
-def test_what_can_never_work(source: str, problem: str) -> None:
+def test_expressions_that_can_never_work(source: str, problem: str) -> None:
     assert problem in inferred(source)[1]
 
 

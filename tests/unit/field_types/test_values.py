@@ -131,13 +131,13 @@ def test_does_not_fit(field: str, value: object, message: str, hint: str | None)
 
 
 @pytest.mark.parametrize("value", ["text", "a {count}", 3, None, ["{count}"]])
-def test_a_message_is_made_of_a_map(value: object) -> None:
+def test_a_message_needs_a_map(value: object) -> None:
     (problem,) = problems_of(value, definition("geometry_msgs/msg/Point"))
     assert problem.message == "geometry_msgs/msg/Point must be a map of its fields"
     assert problem.hint == "fields: x, y, z"
 
 
-def test_a_whole_message_can_be_passed_on() -> None:
+def test_a_whole_message_can_be_republished() -> None:
     assert problems_of("{message}") == []
     assert problems_of("{point}", definition("geometry_msgs/msg/Point")) == []
     assert problems_of("${open}") == []
@@ -145,7 +145,7 @@ def test_a_whole_message_can_be_passed_on() -> None:
     assert problem.message == "demo_msgs/msg/Everything where geometry_msgs/msg/Point is expected"
 
 
-def test_every_problem_is_found_once() -> None:
+def test_every_problem_is_reported_once() -> None:
     value = {
         "small": 300,
         "poin": {"x": "{mesage.on}"},
@@ -174,7 +174,7 @@ def test_every_problem_is_found_once() -> None:
         ("{parameters.rate}", "rate"),
     ],
 )
-def test_the_very_part_is_marked(text: str, marked: str) -> None:
+def test_the_exact_part_is_marked(text: str, marked: str) -> None:
     (problem,) = CHECKER.text(template(text))
     start = problem.span.column - 1
     assert text[start : start + problem.span.length] == marked
@@ -187,7 +187,7 @@ def test_the_very_part_is_marked(text: str, marked: str) -> None:
         *("{state.free:d}", "{state.seen_count:d}"),
     ],
 )
-def test_a_value_that_can_be_written_in_its_format(text: str) -> None:
+def test_values_that_fit_their_format(text: str) -> None:
     assert list(CHECKER.text(template(["", {"a": text}]))) == []
 
 
@@ -200,19 +200,19 @@ def test_a_value_that_can_be_written_in_its_format(text: str) -> None:
         ("{message.three:.2f}", "float64[3] cannot be formatted as '.2f'"),
     ],
 )
-def test_a_value_that_cannot(text: str, message: str) -> None:
+def test_values_that_do_not_fit_their_format(text: str, message: str) -> None:
     (problem,) = CHECKER.text(template(text))
     assert problem.message == message
 
 
-def test_where_the_file_does_not_spell_the_text_out_the_whole_is_marked() -> None:
+def test_the_whole_value_is_marked_if_the_file_does_not_contain_it_literally() -> None:
     span = Span(FILE, 4, 7, 40)
     (problem,) = CHECKER.expression(compile_expression("message.doubl"), span)
     assert problem.span == span
 
 
 @pytest.mark.parametrize("source", ["message.on", "count > 1", "state.free", "true", "'a' in node"])
-def test_a_condition_is_true_or_false(source: str) -> None:
+def test_a_condition_is_a_bool(source: str) -> None:
     assert list(CHECKER.condition(compile_expression(source), Span(FILE, 1, 1))) == []
 
 
@@ -225,7 +225,7 @@ def test_a_condition_is_true_or_false(source: str) -> None:
         ("message.ok", "demo_msgs/msg/Everything has no field 'ok'", None),
     ],
 )
-def test_a_condition_that_is_something_else(source: str, message: str, hint: str | None) -> None:
+def test_a_condition_of_another_type(source: str, message: str, hint: str | None) -> None:
     (problem,) = CHECKER.condition(compile_expression(source), Span(FILE, 1, 1))
     assert problem.message == message
     assert hint in (None, problem.hint)
@@ -271,11 +271,11 @@ def test_a_path_leads_to_a_type(parts: tuple[str | int, ...], expected: str | No
         ),
     ],
 )
-def test_a_path_that_leads_nowhere(parts: tuple[str | int, ...], problem: PathProblem) -> None:
+def test_a_path_that_cannot_be_resolved(parts: tuple[str | int, ...], problem: PathProblem) -> None:
     assert resolve_path(EVERYTHING, parts, INTERFACES) == problem
 
 
-def test_what_is_not_known_is_anything() -> None:
+def test_unknown_types_fit_everywhere() -> None:
     assert resolve_path(EVERYTHING, ("foreign", "a", 0), INTERFACES) is ANYTHING
     assert type_of(None) is type_of("${open}") is type_of([1]) is ANYTHING
     assert parameter_type("oddity") is ANYTHING

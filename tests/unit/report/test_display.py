@@ -1,4 +1,4 @@
-"""Nothing in a report steers a terminal, and its columns are those that people see."""
+"""Escaping of control characters, and display width."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from composer.report.display import visible, width
         ("line\r\nline", "line\\x0d\\x0aline"),
     ],
 )
-def test_what_could_steer_a_terminal_is_escaped(text: str, shown: str) -> None:
+def test_control_characters_are_escaped(text: str, shown: str) -> None:
     assert visible(text) == shown
 
 

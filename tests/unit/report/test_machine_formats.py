@@ -1,4 +1,4 @@
-"""The reports for programs: JSON by its schema, SARIF by its specification, GitHub's commands."""
+"""JSON, SARIF and GitHub annotations."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from composer.report import json as json_report
 from composer.report.fingerprint import fingerprints
 from composer.resources import schemas_folder
 from composer.source import SourceFile, Span
-from tests.unit.support.reporting import finding, rule
+from tests.unit.support.reporting import diagnostic, rule
 
 TEXT = "system: demo\nnodes: {talker: {type: relai}}\n"
 
 
 def example() -> list[Diagnostic]:
-    first = finding(TEXT, "relai", "there is no 'relai'", line=2, hint="did you mean 'relay'?")
+    first = diagnostic(TEXT, "relai", "there is no 'relai'", line=2, hint="did you mean 'relay'?")
     label = Label(first.primary.part(0, 2), "this one")
     second = replace(first, rule=rule(Severity.INFO, "RC998", "hint"), related=(label,), hint=None)
     return [first, replace(first, message="again"), second]
 
 
-def test_json_is_what_its_schema_says() -> None:
+def test_json_matches_its_schema() -> None:
     schema = json.loads((schemas_folder() / "report.schema.json").read_text(encoding="utf-8"))
     Draft7Validator.check_schema(schema)
-    for findings in ([], example()):
-        report = json.loads(json_report.render(findings))
+    for diagnostics in ([], example()):
+        report = json.loads(json_report.render(diagnostics))
         assert list(Draft7Validator(schema).iter_errors(report)) == []
 
 
-def test_json_says_all_there_is_to_say() -> None:
+def test_json_is_complete() -> None:
     report = json.loads(json_report.render(example()))
     assert report["summary"] == {"errors": 2, "warnings": 0, "infos": 1}
     assert report["diagnostics"][0] == {
@@ -51,7 +51,7 @@ def test_json_says_all_there_is_to_say() -> None:
     assert [label["message"] for label in report["diagnostics"][2]["related"]] == ["this one"]
 
 
-#: The properties that SARIF 2.1.0 knows for the objects that are used: OASIS, section 3.
+#: The properties of the used objects in SARIF 2.1.0 (OASIS, section 3).
 SARIF_PROPERTIES = {
     "log": {"$schema", "version", "runs"},  # 3.13
     "run": {"tool", "results", "columnKind"},  # 3.14
@@ -76,8 +76,8 @@ SARIF_PROPERTIES = {
 }
 
 
-def sarif_log(findings: list[Diagnostic]) -> dict[str, Any]:
-    log: dict[str, Any] = json.loads(sarif.render(findings))
+def sarif_log(diagnostics: list[Diagnostic]) -> dict[str, Any]:
+    log: dict[str, Any] = json.loads(sarif.render(diagnostics))
     return log
 
 
@@ -101,7 +101,7 @@ def test_sarif_has_the_shape_of_the_specification() -> None:
             assert 1 <= region["startColumn"] < region["endColumn"]
 
 
-def test_sarif_tells_the_levels_and_the_hint() -> None:
+def test_sarif_has_the_level_and_the_hint() -> None:
     results = sarif_log(example())["runs"][0]["results"]
     assert [result["level"] for result in results] == ["error", "error", "note"]
     assert results[0]["message"]["text"] == "there is no 'relai'\ndid you mean 'relay'?"
@@ -118,7 +118,7 @@ def test_sarif_tells_the_levels_and_the_hint() -> None:
     ],
 )
 def test_sarif_paths_are_uri_references(path: str, uri: str) -> None:
-    [result] = sarif_log([finding(TEXT, "demo", path=path)])["runs"][0]["results"]
+    [result] = sarif_log([diagnostic(TEXT, "demo", path=path)])["runs"][0]["results"]
     assert result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] == uri
 
 
@@ -142,19 +142,19 @@ def test_fingerprints_survive_lines_added_above_and_deeper_indentation() -> None
     assert fingerprints(before) == fingerprints(after)
 
 
-def test_fingerprints_tell_findings_apart() -> None:
-    same = finding(TEXT, "relai", line=2)
+def test_fingerprints_are_unique() -> None:
+    same = diagnostic(TEXT, "relai", line=2)
     others = [
         replace(same, message="another"),
         replace(same, rule=rule(code="RC998")),
-        finding(TEXT.replace("relai", "rely"), "rely", line=2),
-        finding(TEXT, "relai", line=2, path="another.yaml"),
+        diagnostic(TEXT.replace("relai", "rely"), "rely", line=2),
+        diagnostic(TEXT, "relai", line=2, path="another.yaml"),
     ]
     prints = fingerprints([same, same, *others])
     assert len(set(prints)) == len(prints)
 
 
-def test_github_commands_name_the_place_and_end_with_the_message() -> None:
+def test_github_commands_have_the_location_and_the_message() -> None:
     [line] = github.render(example()[:1]).splitlines()
     assert line == (
         "::error file=systems/demo.yaml,line=2,endLine=2,col=24,endColumn=29,"
@@ -162,8 +162,8 @@ def test_github_commands_name_the_place_and_end_with_the_message() -> None:
     )
 
 
-def test_github_commands_cannot_be_broken_out_of() -> None:
-    found = finding(
+def test_github_commands_are_escaped() -> None:
+    found = diagnostic(
         TEXT, "demo", "100%\n::error::gotcha\r", path="a,line=1::b%.yaml", hint="x\x1b[2J"
     )
     [line] = github.render([found]).splitlines()
@@ -174,5 +174,5 @@ def test_github_commands_cannot_be_broken_out_of() -> None:
 
 def test_github_commands_follow_the_severity() -> None:
     made_by = [rule(severity) for severity in Severity]
-    lines = github.render(finding("a", "a", made_by=item) for item in made_by).splitlines()
+    lines = github.render(diagnostic("a", "a", made_by=item) for item in made_by).splitlines()
     assert [line.split()[0] for line in lines] == ["::error", "::warning", "::notice"]

@@ -1,4 +1,4 @@
-"""The page of rules is current, and every rule tells what it should."""
+"""docs/rules.md is up to date, and every rule is documented."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from composer.report.rule_page import BANDS, all_rules, explain, files_of, find_
 PAGE = Path(__file__).parents[3] / "docs" / "rules.md"
 
 
-def test_the_page_is_current() -> None:
+def test_the_page_is_up_to_date() -> None:
     current = PAGE.read_text(encoding="utf-8")
     assert current == page(all_rules()), "run: python tools/write_rules.py"
 
 
 @pytest.mark.parametrize("rule", all_rules(), ids=lambda rule: rule.code)
-def test_a_rule_tells_what_and_why_and_how(rule: Rule) -> None:
+def test_a_rule_has_a_summary_a_reason_and_examples(rule: Rule) -> None:
     assert rule.code[:2] == "RC"
     assert rule.code[2] in BANDS
     assert rule.name == rule.name.lower().replace("_", "-")
@@ -27,14 +27,14 @@ def test_a_rule_tells_what_and_why_and_how(rule: Rule) -> None:
     assert rule.bad != rule.good
 
 
-def test_a_rule_is_found_by_code_and_by_name() -> None:
+def test_rules_can_be_looked_up_by_code_and_name() -> None:
     rules = all_rules()
     by_code, by_name = find_rule("rc202", rules), find_rule("unknown-node", rules)
     assert by_code is by_name is not None
     assert find_rule("nonsense", rules) is None
 
 
-def test_an_explanation_has_everything() -> None:
+def test_an_explanation_is_complete() -> None:
     rule = find_rule("RC202", all_rules())
     assert rule is not None
     text = explain(rule)

@@ -35,13 +35,13 @@ def log_of(path: Path) -> Any:
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_findings(path: Path) -> None:
+def test_diagnostics_match_the_schema(path: Path) -> None:
     log = log_of(path)
     assert log["runs"][0]["results"]
     check(log)
 
 
-def test_no_findings() -> None:
+def test_an_empty_log_matches_the_schema() -> None:
     check(json.loads(sarif.render([])))
 
 
@@ -63,6 +63,6 @@ def _in_result(change: Callable[[Any], None]) -> Any:
     ],
     ids=["no message", "a level", "a property", "an index", "a line", "a place"],
 )
-def test_it_refuses_what_is_wrong(change: Callable[[Any], None]) -> None:
+def test_invalid_logs_do_not_match_the_schema(change: Callable[[Any], None]) -> None:
     with pytest.raises(ValidationError):
         check(_in_result(change))

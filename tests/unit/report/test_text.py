@@ -1,4 +1,4 @@
-"""The report for people: every mark stands under what is meant."""
+"""The text format: every mark is under its value."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from composer.diagnostics import Label, Severity
 from composer.report.display import width
 from composer.report.text import render, summary
 from composer.source import SourceFile, Span
-from tests.unit.support.reporting import finding, rule, span_of
+from tests.unit.support.reporting import diagnostic, rule, span_of
 
 PLAIN = """\
 error[RC999 made-up]: it is wrong
@@ -19,19 +19,19 @@ error[RC999 made-up]: it is wrong
   |
 1 | nodes: {talker: 1}
   |       ^
-  = hint: mend it
+  = hint: fix it
 
 found 1 error
 """
 
 
-def test_a_finding_shows_its_line_with_a_caret() -> None:
-    found = finding("nodes: {talker: 1}", " ", hint="mend it")
+def test_a_diagnostic_shows_its_line_with_a_caret() -> None:
+    found = diagnostic("nodes: {talker: 1}", " ", hint="fix it")
     assert render([found]) == PLAIN
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "marked"),
     [
         ("key:\t{a: wrong}", "wrong"),
         ("名前: {日本語: wrong}", "wrong"),
@@ -42,24 +42,24 @@ def test_a_finding_shows_its_line_with_a_caret() -> None:
         ("y" * 300 + " wrong", "wrong"),
     ],
 )
-def test_the_caret_is_under_the_value_cell_by_cell(text: str, wanted: str) -> None:
-    report = render([finding(text, wanted)])
+def test_the_caret_is_aligned_with_the_value(text: str, marked: str) -> None:
+    report = render([diagnostic(text, marked)])
     lines = report.splitlines()
     line, marks = lines[3], lines[4]
     before = marks.index("^")
     # As many cells before the caret as before the value.
-    assert width(line[: line.index(wanted)]) == before
-    assert marks.count("^") == width(wanted)
+    assert width(line[: line.index(marked)]) == before
+    assert marks.count("^") == width(marked)
 
 
-def test_long_lines_are_shown_in_part() -> None:
-    report = render([finding("x" * 50_000 + " wrong " + "y" * 50_000, "wrong")])
+def test_long_lines_are_truncated() -> None:
+    report = render([diagnostic("x" * 50_000 + " wrong " + "y" * 50_000, "wrong")])
     assert max(len(line) for line in report.splitlines()) < 140
 
 
 def test_a_value_longer_than_the_line_is_marked_to_its_end() -> None:
     source = SourceFile("demo.yaml", "text: |\n  much")
-    found = replace(finding("a", "a"), primary=Span(source, 1, 7, 500))
+    found = replace(diagnostic("a", "a"), primary=Span(source, 1, 7, 500))
     assert marked_cells(render([found])) == 1
 
 
@@ -67,16 +67,16 @@ def marked_cells(report: str) -> int:
     return report.splitlines()[4].count("^")
 
 
-def test_a_place_behind_the_end_of_the_text_is_shown() -> None:
-    found = replace(finding("a", "a"), primary=Span(SourceFile("empty.yaml", ""), 1, 1, 1))
+def test_a_span_after_the_end_of_the_text_is_shown() -> None:
+    found = replace(diagnostic("a", "a"), primary=Span(SourceFile("empty.yaml", ""), 1, 1, 1))
     assert render([found]).splitlines()[1:5] == [" --> empty.yaml:1:1", "  |", "1 |", "  | ^"]
 
 
-def test_labels_stand_on_their_own_lines_with_words() -> None:
+def test_labels_are_shown_on_lines_of_their_own() -> None:
     source = SourceFile("systems/demo.yaml", "one: 1\ntwo: 2\n")
     other = SourceFile("nodes/planner.yaml", "\n" * 11 + "three: 3")
     found = replace(
-        finding("one: 1\ntwo: 2\n", "one"),
+        diagnostic("one: 1\ntwo: 2\n", "one"),
         related=(
             Label(span_of(source, "1"), "this value"),
             Label(span_of(other, "three", 12), "declared here"),
@@ -102,7 +102,7 @@ def test_messages_hints_paths_and_labels_are_escaped() -> None:
     nasty = "\x1b[2J\u202e"
     source = SourceFile(f"a{nasty}.yaml", f"key: {nasty}")
     label = Label(Span(source, 1, 1, 3), nasty)
-    found = finding(
+    found = diagnostic(
         f"key: {nasty}", "key", nasty, path=f"b{nasty}.yaml", related=(label,), hint=nasty
     )
     report = render([found])
@@ -110,11 +110,11 @@ def test_messages_hints_paths_and_labels_are_escaped() -> None:
     assert "\u202e" not in report
 
 
-def test_without_colour_there_is_no_escape_and_with_it_the_same_words() -> None:
-    found = finding("nodes: {talker: 1}", "talker", hint="mend it")
-    coloured = render([found], color=True)
-    assert "\x1b[" in coloured
-    assert re.sub(r"\x1b\[[0-9;]*m", "", coloured) == render([found])
+def test_color_changes_only_escape_sequences() -> None:
+    found = diagnostic("nodes: {talker: 1}", "talker", hint="fix it")
+    colored = render([found], color=True)
+    assert "\x1b[" in colored
+    assert re.sub(r"\x1b\[[0-9;]*m", "", colored) == render([found])
 
 
 @pytest.mark.parametrize(
@@ -128,4 +128,4 @@ def test_without_colour_there_is_no_escape_and_with_it_the_same_words() -> None:
     ],
 )
 def test_the_summary_counts(severities: list[Severity], line: str) -> None:
-    assert summary(finding("a", "a", made_by=rule(severity)) for severity in severities) == line
+    assert summary(diagnostic("a", "a", made_by=rule(severity)) for severity in severities) == line

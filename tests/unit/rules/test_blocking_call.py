@@ -1,4 +1,4 @@
-"""Which calls in a handler count as blocking."""
+"""Which calls in a handler are blocking."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.support.checking import findings_in
+from tests.unit.support.checking import diagnostics_in
 
 SYSTEM = "system: demo\nnodes:\n  a: {behavior: code:Code, timers: {tick: {period_ms: 1000}}}\n"
 
@@ -45,26 +45,26 @@ def messages(statement: str, imports: str, folder: Path) -> list[str]:
         "    def helper(self):\n        time.sleep(1.0)\n\n    def unused(self):\n        input()\n"
     )
     (folder / "code.py").write_text(source, encoding="utf-8")
-    return [item.message for item in findings_in(SYSTEM, folder)]
+    return [item.message for item in diagnostics_in(SYSTEM, folder)]
 
 
 @pytest.mark.parametrize(("statement", "imports"), BLOCKING.items())
-def test_calls_that_wait_are_told(statement: str, imports: str, tmp_path: Path) -> None:
+def test_blocking_calls_are_reported(statement: str, imports: str, tmp_path: Path) -> None:
     [message] = messages(statement, imports, tmp_path)
     assert message.startswith("handler 'on_tick' of 'Code' blocks in '")
 
 
 @pytest.mark.parametrize(("statement", "imports"), FINE.items())
-def test_calls_that_do_not_wait_are_not(statement: str, imports: str, tmp_path: Path) -> None:
+def test_other_calls_are_not_reported(statement: str, imports: str, tmp_path: Path) -> None:
     assert messages(statement, imports, tmp_path) == []
 
 
-def test_a_line_that_two_handlers_lead_to_is_told_once(tmp_path: Path) -> None:
+def test_a_call_reached_by_two_handlers_is_reported_once(tmp_path: Path) -> None:
     system = SYSTEM.replace("{period_ms: 1000}}", "{period_ms: 1000}, tock: {period_ms: 1000}}")
     methods = "".join(
         f"    def {name}(self):\n        self.ask()\n\n" for name in ("on_tick", "on_tock")
     )
     source = f"class Code:\n{methods}    def ask(self):\n        input()\n"
     (tmp_path / "code.py").write_text(source, encoding="utf-8")
-    [finding] = findings_in(system, tmp_path)
-    assert finding.related[0].span.line == 9
+    [diagnostic] = diagnostics_in(system, tmp_path)
+    assert diagnostic.related[0].span.line == 9

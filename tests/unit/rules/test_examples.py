@@ -1,4 +1,4 @@
-"""The examples in the rules are true: a bad one breaks its rule and no other, a good one none."""
+"""The examples of the rules: a bad one breaks only its own rule, a good one none."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from composer.loading import load
 from composer.report.rule_page import all_rules, files_of
 from composer.rules import all_checks
 
-# Examples of rules about what is not YAML of ours - a command line, bytes - are not run here.
+# Examples other than system files, such as command lines, are not tested here.
 RULES = [rule for rule in all_rules() if files_of(rule.bad) and files_of(rule.good)]
 
 
-def findings_in(example: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Diagnostic]:
+def diagnostics_in(example: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Diagnostic]:
     files = files_of(example)
     for name, text in files.items():
         path = folder / name
@@ -29,18 +29,18 @@ def findings_in(example: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def test_bad_example_breaks_the_rule(
     rule: Rule, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = findings_in(rule.bad, tmp_path, monkeypatch)
-    assert {finding.rule.code for finding in found} == {rule.code}
+    found = diagnostics_in(rule.bad, tmp_path, monkeypatch)
+    assert {diagnostic.rule.code for diagnostic in found} == {rule.code}
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
 def test_good_example_breaks_none(
     rule: Rule, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = findings_in(rule.good, tmp_path, monkeypatch)
-    assert [f"{finding.rule.code}: {finding.message}" for finding in found] == []
+    found = diagnostics_in(rule.good, tmp_path, monkeypatch)
+    assert [f"{diagnostic.rule.code}: {diagnostic.message}" for diagnostic in found] == []
 
 
-def test_all_checks_have_examples_that_are_run() -> None:
+def test_all_checks_have_tested_examples() -> None:
     run = {rule.code for rule in RULES}
     assert {check.__globals__["RULE"].code for check in all_checks()} - run == set()

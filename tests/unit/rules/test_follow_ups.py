@@ -1,4 +1,4 @@
-"""One mistake, one finding: what follows from it is not told too."""
+"""One mistake, one diagnostic: its consequences are not reported."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ MISTAKES = {
         system("motor: {timers: {tick: {period_ms: -5, log: tick}}}"),
         ["out-of-range"],
     ),
-    "a variable without value is judged by nobody": (
+    "a variable without a value is not checked": (
         system('motor: {namespace: "${where}", timers: {tick: {rate_hz: "${rate}", log: tick}}}'),
         ["unknown-variable", "unknown-variable"],
     ),
@@ -153,11 +153,11 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize(("text", "rules"), MISTAKES.values(), ids=MISTAKES.keys())
-def test_a_mistake_is_told_once(text: str, rules: list[str], tmp_path: Path) -> None:
+def test_a_mistake_is_reported_once(text: str, rules: list[str], tmp_path: Path) -> None:
     assert rules_broken(text, tmp_path) == rules
 
 
-def test_a_node_type_with_a_mistake_is_told_once_for_all_its_instances(tmp_path: Path) -> None:
+def test_a_mistake_in_a_node_type_is_reported_once_for_all_instances(tmp_path: Path) -> None:
     (tmp_path / "nodes").mkdir()
     (tmp_path / "nodes" / "talker.yaml").write_text(
         "node: talker\n"
@@ -169,7 +169,7 @@ def test_a_node_type_with_a_mistake_is_told_once_for_all_its_instances(tmp_path:
     assert rules_broken(text, tmp_path) == ["unknown-field"]
 
 
-def test_a_node_type_alone_is_not_asked_for_its_surroundings(tmp_path: Path) -> None:
+def test_a_node_type_alone_needs_no_connections(tmp_path: Path) -> None:
     text = (
         "node: relay\nvariables: {message_type: {description: The type.}}\n"
         "parameters: {rate_hz: {type: double}}\n"

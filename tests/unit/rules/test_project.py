@@ -1,4 +1,4 @@
-"""What is told of files only when they are looked at together."""
+"""Rules that check several files together."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def together(*names: str) -> list[Diagnostic]:
     return project_diagnostics([load(Path(name)) for name in names])
 
 
-def test_a_node_type_that_no_system_uses_is_told(project: Path) -> None:
-    [finding] = together(*FILES)
-    assert finding.rule.name == "unused-node-type"
-    assert str(finding.primary) == "nodes/old_planner.yaml:1:7"
+def test_an_unused_node_type_is_reported(project: Path) -> None:
+    [diagnostic] = together(*FILES)
+    assert diagnostic.rule.name == "unused-node-type"
+    assert str(diagnostic.primary) == "nodes/old_planner.yaml:1:7"
 
 
-def test_node_types_without_a_system_are_not_judged(project: Path) -> None:
+def test_node_types_without_a_system_are_not_checked(project: Path) -> None:
     assert together("nodes/planner.yaml", "nodes/old_planner.yaml") == []
 
 
@@ -44,11 +44,11 @@ def test_a_type_of_the_same_name_elsewhere_does_not_count(project: Path) -> None
     other = project / "other" / "nodes"
     other.mkdir(parents=True)
     (other / "planner.yaml").write_text(FILES["nodes/planner.yaml"], encoding="utf-8")
-    [finding] = together("other/nodes/planner.yaml", "systems/pipeline.yaml")
-    assert str(finding.primary) == "other/nodes/planner.yaml:1:7"
+    [diagnostic] = together("other/nodes/planner.yaml", "systems/pipeline.yaml")
+    assert str(diagnostic.primary) == "other/nodes/planner.yaml:1:7"
 
 
-def test_it_can_be_silenced(project: Path) -> None:
+def test_it_can_be_ignored(project: Path) -> None:
     path = project / "nodes" / "old_planner.yaml"
     comment = "# compose: ignore[unused-node-type] for other projects\n"
     path.write_text(comment + FILES["nodes/old_planner.yaml"], encoding="utf-8")

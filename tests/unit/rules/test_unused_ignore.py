@@ -1,4 +1,4 @@
-"""Comments that silence a rule: what they hold for, and what is told of useless ones."""
+"""Comments that ignore a rule: where they apply, and unused ones."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 from composer.rules.unused_ignore import ignores_in
 from composer.source import SourceFile
-from tests.unit.support.checking import findings_in, quoted, rules_broken
+from tests.unit.support.checking import diagnostics_in, quoted, rules_broken
 
 SYSTEM = """\
 system: demo
@@ -33,7 +33,7 @@ def text(before: str = "# a talker", behind: str = "") -> str:
         ("# compose: ignore[unheard-publisher]\n    # and why\n", ""),
     ],
 )
-def test_a_comment_silences_its_line(before: str, behind: str, tmp_path: Path) -> None:
+def test_a_comment_applies_to_its_line(before: str, behind: str, tmp_path: Path) -> None:
     assert rules_broken(text(), tmp_path) == ["unheard-publisher"]
     assert rules_broken(text(before, behind), tmp_path) == []
 
@@ -46,18 +46,18 @@ def test_a_comment_silences_its_line(before: str, behind: str, tmp_path: Path) -
         "  # composed: ignore[unheard-publisher]",
     ],
 )
-def test_other_comments_silence_nothing(behind: str, tmp_path: Path) -> None:
+def test_other_comments_ignore_nothing(behind: str, tmp_path: Path) -> None:
     assert rules_broken(text(behind=behind), tmp_path) == ["unheard-publisher"]
 
 
 @pytest.mark.parametrize("line", ["log: a# compose: ignore[x]", 'log: "a # compose: ignore[x]"'])
-def test_what_is_no_comment_silences_nothing(line: str) -> None:
+def test_text_other_than_comments_ignores_nothing(line: str) -> None:
     assert list(ignores_in(SourceFile("a.yaml", line))) == []
 
 
-def test_every_rule_of_a_comment_that_silences_nothing_is_told(tmp_path: Path) -> None:
+def test_every_unused_rule_of_a_comment_is_reported(tmp_path: Path) -> None:
     behind = "  # compose: ignore[RC324, unfed-subscription, unherd-publisher]"
-    found = findings_in(text(behind=behind), tmp_path)
+    found = diagnostics_in(text(behind=behind), tmp_path)
     assert [(item.rule.name, quoted(item)) for item in found] == [
         ("unused-ignore", "unfed-subscription"),
         ("unused-ignore", "unherd-publisher"),
@@ -65,7 +65,7 @@ def test_every_rule_of_a_comment_that_silences_nothing_is_told(tmp_path: Path) -
     assert found[1].hint == "did you mean 'unheard-publisher'?"
 
 
-def test_a_comment_at_a_related_place_silences_too(tmp_path: Path) -> None:
+def test_a_comment_at_a_related_location_applies_too(tmp_path: Path) -> None:
     nodes = (
         "system: demo\nnodes:\n"
         "  planner: {lifecycle: {autostart: inactive}}  # MARK\n"
@@ -76,7 +76,7 @@ def test_a_comment_at_a_related_place_silences_too(tmp_path: Path) -> None:
     assert rules_broken(silenced, tmp_path) == []
 
 
-def test_no_comment_silences_an_error(tmp_path: Path) -> None:
+def test_errors_cannot_be_ignored(tmp_path: Path) -> None:
     text = (
         "system: demo\nnodes:\n"
         "  lidar:\n"
@@ -86,12 +86,12 @@ def test_no_comment_silences_an_error(tmp_path: Path) -> None:
     )
     assert rules_broken(text, tmp_path) == ["qos-incompatible"]
     commented = text.replace("MARK", "compose: ignore[qos-incompatible] on purpose")
-    found = findings_in(commented, tmp_path)
+    found = diagnostics_in(commented, tmp_path)
     assert [item.rule.name for item in found] == ["unused-ignore", "qos-incompatible"]
     assert found[0].message == "'qos-incompatible' is an error here"
 
 
-def test_a_comment_in_a_python_file_silences_what_is_found_there(tmp_path: Path) -> None:
+def test_a_comment_in_a_python_file_applies_to_that_file(tmp_path: Path) -> None:
     source = (
         "import time\n\n\nclass Slow:\n    def on_tick(self):\n        time.sleep(1.0)  # MARK\n"
     )
@@ -103,12 +103,12 @@ def test_a_comment_in_a_python_file_silences_what_is_found_there(tmp_path: Path)
     assert rules_broken(system.replace("slow:Slow", "other:Other"), tmp_path) == []
 
 
-def test_nothing_is_called_unused_where_the_file_could_not_be_read(tmp_path: Path) -> None:
+def test_nothing_is_unused_if_the_file_cannot_be_read(tmp_path: Path) -> None:
     broken = "system: demo  # compose: ignore[unheard-publisher]\nnodes: {a: [}\n"
     assert "unused-ignore" not in rules_broken(broken, tmp_path)
 
 
-def test_places_of_rules_in_a_comment_are_exact() -> None:
+def test_spans_of_rules_in_a_comment_are_exact() -> None:
     source = SourceFile("a.yaml", "key: 1  # compose: ignore[one, RC301]")
     assert [(item.rule, item.line, item.span.column) for item in ignores_in(source)] == [
         ("one", 1, 27),

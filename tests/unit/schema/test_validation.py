@@ -20,7 +20,7 @@ def tree_of(text: str) -> Mapping:
     return tree
 
 
-def findings_in(text: str) -> list[Diagnostic]:
+def diagnostics_in(text: str) -> list[Diagnostic]:
     tree = tree_of(text)
     return check_schema(tree, str(kind_of(tree)))
 
@@ -267,14 +267,14 @@ def profile(text: str) -> str:
     ],
 )  # fmt: skip
 def test_finding(text: str, rule: str, mark: str, message: str, hint: str) -> None:
-    (finding,) = findings_in(text)
+    (finding,) = diagnostics_in(text)
     assert (finding.rule.name, marked(finding)) == (rule, mark)
     assert finding.message.startswith(message)
     assert hint in (finding.hint or "")
 
 
 def test_two_keys_that_say_the_same_are_both_shown() -> None:
-    (finding,) = findings_in(timer("{rate_hz: 1, period_ms: 2}"))
+    (finding,) = diagnostics_in(timer("{rate_hz: 1, period_ms: 2}"))
     assert [label.span.column for label in finding.related] == [27]
 
 
@@ -298,7 +298,7 @@ def test_two_keys_that_say_the_same_are_both_shown() -> None:
     ],
 )
 def test_what_is_right(text: str) -> None:
-    assert [finding.message for finding in findings_in(text)] == []
+    assert [finding.message for finding in diagnostics_in(text)] == []
 
 
 @pytest.mark.parametrize(
@@ -317,11 +317,11 @@ def test_what_is_right(text: str) -> None:
     ],
 )  # fmt: skip
 def test_variable_without_value_fits_everywhere(text: str) -> None:
-    assert [finding.message for finding in findings_in(text)] == []
+    assert [finding.message for finding in diagnostics_in(text)] == []
 
 
 def test_all_mistakes_in_one_run() -> None:
-    findings = findings_in(
+    findings = diagnostics_in(
         """
         system: demo
         namspace: /robot
@@ -363,6 +363,6 @@ def test_kind(text: str, kind: str | None) -> None:
 
 
 def test_long_and_hostile_keys_are_cut_and_escaped() -> None:
-    (finding,) = findings_in(f"system: demo\nnodes: {{a: {{}}}}\n'\xa0{'x' * 900}': 1")
+    (finding,) = diagnostics_in(f"system: demo\nnodes: {{a: {{}}}}\n'\xa0{'x' * 900}': 1")
     assert finding.message.startswith("'\\xa0xxx")
     assert len(finding.message) < 120

@@ -1,4 +1,4 @@
-"""LoadResult a text as if it were a file, for the tests of checks."""
+"""Checks text as if it were a file, for the tests of rules."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from composer.diagnostics import Diagnostic
 from composer.loading import load_bytes
 
 
-def findings_in(text: str, folder: Path) -> list[Diagnostic]:
+def diagnostics_in(text: str, folder: Path) -> list[Diagnostic]:
     return load_bytes(text.encode(), folder, shown="system.yaml").diagnostics
 
 
 def rules_broken(text: str, folder: Path) -> list[str]:
-    """Return the names of the rules that find something, in the order of the places."""
-    return [finding.rule.name for finding in findings_in(text, folder)]
+    """Return the names of the rules with diagnostics, sorted by location."""
+    return [diagnostic.rule.name for diagnostic in diagnostics_in(text, folder)]
 
 
-def quoted(finding: Diagnostic) -> str:
-    """Return what the file says at the place of a finding."""
-    span = finding.primary
+def quoted(diagnostic: Diagnostic) -> str:
+    """Return the text at the location of a diagnostic."""
+    span = diagnostic.primary
     return span.file.line(span.line)[span.column - 1 :][: span.length]

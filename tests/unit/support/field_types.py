@@ -72,7 +72,7 @@ CHECKER = FieldChecker(INTERFACES, SCOPE)
 
 
 def tree(value: object) -> Tree:
-    """Return plain data as a tree; every scalar stands alone on a line, from column 1."""
+    """Return plain data as a tree; every scalar is on a line of its own, from column 1."""
     match value:
         case dict():
             entries = (Entry(_scalar(name), tree(content)) for name, content in value.items())

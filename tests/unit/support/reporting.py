@@ -1,4 +1,4 @@
-"""Findings made up for the tests of reports."""
+"""Diagnostics for the tests of reports."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ def rule(severity: Severity = Severity.ERROR, code: str = "RC999", name: str = "
     return Rule(code, name, severity, "What it is.", "Why it is.", "bad: 1\n", "good: 1\n")
 
 
-def span_of(source: SourceFile, wanted: str, line: int = 1) -> Span:
-    """Return the place of the first ``wanted`` in a line."""
-    return Span(source, line, source.line(line).index(wanted) + 1, len(wanted))
+def span_of(source: SourceFile, marked: str, line: int = 1) -> Span:
+    """Return the span of the first ``marked`` on a line."""
+    return Span(source, line, source.line(line).index(marked) + 1, len(marked))
 
 
-def finding(
+def diagnostic(
     text: str,
-    wanted: str,
+    marked: str,
     message: str = "it is wrong",
     *,
     path: str = "systems/demo.yaml",
@@ -27,4 +27,4 @@ def finding(
     hint: str | None = None,
 ) -> Diagnostic:
     source = SourceFile(path, text)
-    return Diagnostic(made_by or rule(), message, span_of(source, wanted, line), related, hint)
+    return Diagnostic(made_by or rule(), message, span_of(source, marked, line), related, hint)
