@@ -1,6 +1,8 @@
-"""Diagrams: systems or a running graph become a scene, a scene a graph (``views/``), that a text.
+"""Diagrams of systems and of running ROS graphs.
 
-One file makes a scene (``declared``, ``live``), one a view, one a format.
+Systems (``declared``) or a snapshot of a ROS graph (``live``) become a scene, a view (``views/``)
+turns a scene
+into a graph, and a renderer turns the graph into a file format.
 """
 
 from __future__ import annotations
@@ -12,14 +14,14 @@ from composer.diagnostics import Diagnostic
 from composer.drift import Snapshot
 from composer.graph import declared, live
 from composer.graph.diagnostics import DiagnosticIndex
-from composer.graph.picture import Graph
+from composer.graph.diagram import Graph
 from composer.graph.scene import Scene
 from composer.graph.views import connections, deployment, lifecycle, nodes, states
 from composer.model import System
 
 
 class View(StrEnum):
-    """The ways to look at a system."""
+    """The views of a system."""
 
     NODES = "nodes"
     CONNECTIONS = "connections"
@@ -38,12 +40,12 @@ _VIEWS: dict[View, Callable[[Scene], Graph]] = {
 
 
 def scene_of(systems: Sequence[System], diagnostics: Iterable[Diagnostic] = ()) -> Scene:
-    """Return what there is to see in systems; what a diagnostic points at is marked as wrong."""
+    """Return the scene of systems; entities with diagnostics are marked as wrong."""
     return declared.scene_of(systems, DiagnosticIndex(diagnostics))
 
 
 def live_scene_of(snapshot: Snapshot, rates_hz: Mapping[str, float]) -> Scene:
-    """Return what there is to see in a running ROS graph; rates are measured, by topic."""
+    """Return the scene of a running ROS graph; ``rates_hz`` are measured rates by topic."""
     return live.scene_of(snapshot, rates_hz)
 
 

@@ -1,4 +1,4 @@
-"""From systems to a scene: what their files declare, with what the checks say about it."""
+"""Build a scene from declared systems and their diagnostics."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from composer.graph.diagnostics import DiagnosticIndex
 from composer.graph.facts import node_facts, port_facts
 from composer.graph.labels import qos_label
 from composer.graph.rates import publishing_rates_hz
-from composer.graph.scene import Actor, End, ExecutorGroup, Scene, Wait
+from composer.graph.scene import ExecutorGroup, Scene, SceneNode, ScenePort, Wait
 from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, System
 from composer.model.dependencies import dependency_edges
 from composer.plan import bring_up
@@ -18,7 +18,7 @@ from composer.plan import bring_up
 
 @dataclass(frozen=True, slots=True)
 class _BroughtUp:
-    """What the bring-up does with each node, by its key in the system."""
+    """The bring-up steps and final state of each node, by its key."""
 
     steps: dict[str, str]
     states: dict[str, str]
@@ -28,26 +28,26 @@ class _BroughtUp:
         steps: dict[str, list[str]] = {}
         for step in bring_up(system).steps:
             steps.setdefault(step.node, []).append(f"#{step.number} {step.transition}")
-        said = {name: ", ".join(texts) for name, texts in steps.items()}
-        return cls(said, states_after_bring_up(system))
+        labels = {name: ", ".join(texts) for name, texts in steps.items()}
+        return cls(labels, states_after_bring_up(system))
 
 
 def scene_of(systems: Sequence[System], diagnostics: DiagnosticIndex) -> Scene:
     """Return the nodes of one or several systems as one scene.
 
-    ROS knows nodes by their full names: of two that share one, the first is drawn and marked.
+    If several nodes have the same full name, the first is drawn and marked as wrong.
     """
     several = len(systems) > 1
-    actors: dict[str, Actor] = {}
+    nodes: dict[str, SceneNode] = {}
     for system in systems:
         brought_up = _BroughtUp.of(system)
         for node in system.nodes:
-            actor = _actor(node, system, brought_up, diagnostics, several)
-            known = actors.get(actor.full_name)
-            actors[actor.full_name] = actor if known is None else _twice(known)
+            scene_node = _scene_node(node, system, brought_up, diagnostics, several)
+            known = nodes.get(scene_node.full_name)
+            nodes[scene_node.full_name] = scene_node if known is None else _with_duplicate(known)
     return Scene(
         title=" + ".join(system.name.value for system in systems),
-        actors=tuple(actors.values()),
+        nodes=tuple(nodes.values()),
         waits=tuple(wait for system in systems for wait in _waits(system)),
         executors=tuple(
             dict.fromkeys(group for system in systems for group in _groups(system, several))
@@ -55,11 +55,11 @@ def scene_of(systems: Sequence[System], diagnostics: DiagnosticIndex) -> Scene:
     )
 
 
-def _actor(
+def _scene_node(
     node: Node, system: System, brought_up: _BroughtUp, diagnostics: DiagnosticIndex, several: bool
-) -> Actor:
+) -> SceneNode:
     rates_hz = publishing_rates_hz(node)
-    return Actor(
+    return SceneNode(
         name=node.name.value,
         full_name=node.full_name,
         namespace=node.namespace.value,
@@ -67,26 +67,28 @@ def _actor(
         state=brought_up.states[node.name.value],
         steps=brought_up.steps.get(node.name.value, ""),
         executor=_executor_key(system, _executor_name(node)),
-        ends=tuple(_end(port, rates_hz.get(port.name.value), diagnostics) for port in node.ports),
+        ports=tuple(
+            _scene_port(port, rates_hz.get(port.name.value), diagnostics) for port in node.ports
+        ),
         details=node_facts(node, rates_hz),
         wrong=diagnostics.about_node(node),
     )
 
 
-def _twice(actor: Actor) -> Actor:
-    wrong = actor.wrong or f"two nodes are called '{actor.full_name}'"
-    return replace(actor, wrong=wrong)
+def _with_duplicate(scene_node: SceneNode) -> SceneNode:
+    wrong = scene_node.wrong or f"two nodes are called '{scene_node.full_name}'"
+    return replace(scene_node, wrong=wrong)
 
 
 def _note(node: Node, system: System, several: bool) -> str:
-    """Say what the name does not: the node's type, and whose it is where there are several."""
+    """Return the note of a node: its type if it differs from its name, and its system."""
     type_name = node.type_name.value if node.type_name is not None else ""
-    said = type_name if type_name != node.name.value else ""
-    return " · ".join(filter(None, (said, system.name.value if several else "")))
+    labels = type_name if type_name != node.name.value else ""
+    return " · ".join(filter(None, (labels, system.name.value if several else "")))
 
 
-def _end(port: Port, rate_hz: float | None, diagnostics: DiagnosticIndex) -> End:
-    return End(
+def _scene_port(port: Port, rate_hz: float | None, diagnostics: DiagnosticIndex) -> ScenePort:
+    return ScenePort(
         kind=port.kind,
         name=port.name.value,
         channel=port.full_name,
@@ -107,16 +109,16 @@ def _waits(system: System) -> Iterator[Wait]:
     }
     for edge in dependency_edges(system):
         if edge.implied and (edge.node, edge.on) in states:
-            continue  # it is said already
+            continue  # declared already
         reason = f"serves {edge.serves}" if edge.implied else f"once {states[edge.node, edge.on]}"
         yield Wait(names[edge.node], names[edge.on], reason, edge.implied)
 
 
 def _groups(system: System, several: bool) -> Iterator[ExecutorGroup]:
     declared = {executor.name.value: executor for executor in system.executors}
-    whose = f"{system.name.value} · " if several else ""
+    prefix = f"{system.name.value} · " if several else ""
     for name in dict.fromkeys([*declared, *map(_executor_name, system.nodes)]):
-        label = f"{whose}{name}: {_kind(declared.get(name))}"
+        label = f"{prefix}{name}: {_kind(declared.get(name))}"
         yield ExecutorGroup(_executor_key(system, name), label)
 
 

@@ -1,4 +1,4 @@
-"""Which part of a diagram a diagnostic is about: the part that was written where it points."""
+"""Find the diagnostics about a node or port, by location."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _Place = tuple[str, int, int]
 
 
 class DiagnosticIndex:
-    """Errors and warnings by the places they point at."""
+    """Errors and warnings by location."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic] = ()) -> None:
         self._by_place: dict[_Place, str] = {}
@@ -24,11 +24,11 @@ class DiagnosticIndex:
                 self._by_place.setdefault(_place(span), text)
 
     def about_port(self, port: Port) -> str:
-        """Return the diagnostic that points at a port's declaration; empty for none."""
+        """Return the diagnostic about a port's declaration, or an empty text."""
         return self._first(_port_spans(port))
 
     def about_node(self, node: Node) -> str:
-        """Return the diagnostic that points at a node itself; empty for none."""
+        """Return the diagnostic about a node itself, or an empty text."""
         return self._first(_node_spans(node))
 
     def _first(self, spans: Iterable[Span]) -> str:

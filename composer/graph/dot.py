@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.graph.picture import Cluster, Edge, Graph, Kind, Line, Vertex
+from composer.graph.diagram import Cluster, Edge, EdgeKind, Graph, Vertex, VertexKind
 
 _VERTICES = {
-    Kind.NODE: 'shape=box, style="filled,rounded", fillcolor="#dbeafe", color="#1d4ed8"',
-    Kind.TOPIC: 'shape=ellipse, style=filled, fillcolor="#dcfce7", color="#15803d"',
-    Kind.SERVICE: 'shape=hexagon, style=filled, fillcolor="#ffedd5", color="#c2410c"',
-    Kind.ACTION: 'shape=box, peripheries=2, style=filled, fillcolor="#f3e8ff", color="#7e22ce"',
-    Kind.PORT: 'shape=box, style="filled,rounded", fillcolor="#f8fafc", color="#64748b"',
-    Kind.STATE: 'shape=box, style="filled,rounded", fillcolor="#e2e8f0", color="#475569"',
+    VertexKind.NODE: 'shape=box, style="filled,rounded", fillcolor="#dbeafe", color="#1d4ed8"',
+    VertexKind.TOPIC: 'shape=ellipse, style=filled, fillcolor="#dcfce7", color="#15803d"',
+    VertexKind.SERVICE: 'shape=hexagon, style=filled, fillcolor="#ffedd5", color="#c2410c"',
+    VertexKind.ACTION: (
+        'shape=box, peripheries=2, style=filled, fillcolor="#f3e8ff", color="#7e22ce"'
+    ),
+    VertexKind.PORT: 'shape=box, style="filled,rounded", fillcolor="#f8fafc", color="#64748b"',
+    VertexKind.STATE: 'shape=box, style="filled,rounded", fillcolor="#e2e8f0", color="#475569"',
 }
 
 _EDGES = {
-    Line.TOPIC: 'color="#15803d"',
-    Line.SERVICE: 'color="#c2410c", style=dashed',
-    Line.ACTION: 'color="#7e22ce", style=bold',
-    Line.DEPENDENCY: 'color="#475569"',
-    Line.IMPLIED: 'color="#475569", style=dashed',
-    Line.TRANSITION: 'color="#475569"',
+    EdgeKind.TOPIC: 'color="#15803d"',
+    EdgeKind.SERVICE: 'color="#c2410c", style=dashed',
+    EdgeKind.ACTION: 'color="#7e22ce", style=bold',
+    EdgeKind.DEPENDENCY: 'color="#475569"',
+    EdgeKind.IMPLIED: 'color="#475569", style=dashed',
+    EdgeKind.TRANSITION: 'color="#475569"',
 }
 
 _WRONG = 'color="#dc2626", penwidth=3'
@@ -85,7 +87,7 @@ def _label(lines: tuple[str, ...]) -> str:
 
 
 def _key(key: str) -> str:
-    """Quote a name that is not shown: only the quote itself is special in it."""
+    """Quote an identifier, in which only quotes are special."""
     return '"' + key.replace('"', '\\"') + '"'
 
 
@@ -94,6 +96,6 @@ def _text(text: str) -> str:
 
 
 def _escaped(text: str) -> str:
-    """Escape what is shown: backslashes begin sequences in it, ampersands HTML's entities."""
+    """Escape a label, in which backslashes start sequences and ampersands HTML entities."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("&", "&amp;")
     return escaped.replace("\n", "\\n")

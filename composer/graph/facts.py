@@ -1,13 +1,13 @@
-"""What a diagram knows about nodes, ports and channels beyond their place in it."""
+"""Details of nodes, ports and channels for diagrams."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+from composer.graph.diagram import Details
 from composer.graph.labels import qos_facts
-from composer.graph.picture import Details
 from composer.graph.rates import timer_rate_hz
-from composer.graph.scene import Channel, Meeting
+from composer.graph.scene import SceneChannel, SceneEndpoint
 from composer.model import DEFAULT_EXECUTOR, ChannelKind, Node, Port
 from composer.tree import Plain
 
@@ -24,9 +24,9 @@ _SINKS = {
 
 
 def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
-    """Return what is worth knowing about a node, down to its ports and parameters.
+    """Return the details of a node with its ports and parameters.
 
-    ``rates_hz`` is how often it publishes, by port, where that is known.
+    ``rates_hz`` are the known publishing rates by port.
     """
     facts: dict[str, Plain] = {
         "full_name": node.full_name,
@@ -48,11 +48,11 @@ def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
             for parameter in node.parameters
         },
     }
-    return _said(facts)
+    return _non_empty(facts)
 
 
 def port_facts(port: Port, rate_hz: float | None) -> Details:
-    """Return what is worth knowing about a port."""
+    """Return the details of a port."""
     facts: dict[str, Plain] = {
         "port": port.name.value,
         "kind": port.kind.value,
@@ -65,13 +65,13 @@ def port_facts(port: Port, rate_hz: float | None) -> Details:
         "rate_hz": rate_hz,
         "declared_at": str(port.span),
     }
-    return _said(facts)
+    return _non_empty(facts)
 
 
-def channel_facts(channel: Channel) -> Details:
-    """Return what is worth knowing about a topic, service or action."""
+def channel_facts(channel: SceneChannel) -> Details:
+    """Return the details of a topic, service or action."""
     types: list[Plain] = [*channel.types]
-    return _said(
+    return _non_empty(
         {
             "name": channel.name,
             "type": types[0] if len(types) == 1 else types,
@@ -81,9 +81,9 @@ def channel_facts(channel: Channel) -> Details:
     )
 
 
-def _end(meeting: Meeting) -> str:
-    return f"{meeting.actor.full_name}.{meeting.end.name}"
+def _end(endpoint: SceneEndpoint) -> str:
+    return f"{endpoint.node.full_name}.{endpoint.port.name}"
 
 
-def _said(facts: dict[str, Plain]) -> Details:
+def _non_empty(facts: dict[str, Plain]) -> Details:
     return tuple((name, value) for name, value in facts.items() if value not in (None, [], {}))

@@ -1,6 +1,7 @@
-"""Layout by Graphviz's ``dot``, where it is installed: it gets boxes of our sizes, we draw.
+"""Lay out graphs with Graphviz's ``dot``, if it is installed.
 
-So a picture looks the same whoever laid it out, and text fits as it does in ours.
+Graphviz gets boxes with our sizes and we draw the result, so that pictures look the same with
+either layout engine.
 """
 
 from __future__ import annotations
@@ -11,24 +12,24 @@ import subprocess
 from collections.abc import Iterator
 from typing import Any
 
-from composer.graph.layout import Frame, Layout, Path, Place, Point, Size, Sizes
-from composer.graph.layout.ranks import forward
-from composer.graph.layout.shelves import MARGIN
-from composer.graph.layout.solids import Solids
+from composer.graph.diagram import Edge, Graph
+from composer.graph.layout import Frame, Layout, Path, Point, Rectangle, Size, Sizes
+from composer.graph.layout.components import MARGIN
+from composer.graph.layout.ranks import break_cycles
+from composer.graph.layout.units import LayoutUnits
 from composer.graph.measure import HEAD_HEIGHT, ROW_HEIGHT
-from composer.graph.picture import Edge, Graph
 
 _POINTS_PER_INCH = 72.0
-#: Beyond this something is wrong with it; 300 nodes take a second.
+#: Timeout of Graphviz; 300 nodes take about one second.
 _TIMEOUT_S = 30.0
 
 
 class GraphvizFailed(Exception):
-    """Graphviz is not installed, or did not do what it was asked."""
+    """Graphviz is not installed or failed."""
 
 
 def run_dot(source: str, form: str) -> bytes:
-    """Return what ``dot -T<form>`` makes of ``source``. Raises GraphvizFailed."""
+    """Return the output of ``dot -T<form>`` for ``source``. Raises GraphvizFailed."""
     program = shutil.which("dot")
     if program is None:
         raise GraphvizFailed("Graphviz is not installed")
@@ -49,21 +50,21 @@ def run_dot(source: str, form: str) -> bytes:
 
 
 def lay_out(graph: Graph, sizes: Sizes) -> Layout:
-    """Return the layout that Graphviz finds for ``graph``. Raises GraphvizFailed."""
-    source = "\n".join(_Source(graph, sizes).lines()) + "\n"
-    return _Answer(graph, sizes, json.loads(run_dot(source, "json0"))).layout()
+    """Return Graphviz's layout of ``graph``. Raises GraphvizFailed."""
+    source = "\n".join(_DotSource(graph, sizes).lines()) + "\n"
+    return _DotResult(graph, sizes, json.loads(run_dot(source, "json0"))).layout()
 
 
-class _Source:
-    """What is asked of Graphviz: everything is named by its number, nothing has text."""
+class _DotSource:
+    """The input of Graphviz, with numbers as names and without text."""
 
     def __init__(self, graph: Graph, sizes: Sizes) -> None:
         self._graph = graph
         self._sizes = sizes
-        self._solids = Solids(graph, sizes)
-        self._number = {key: number for number, key in enumerate(self._solids.all)}
+        self._units = LayoutUnits(graph, sizes)
+        self._number = {key: number for number, key in enumerate(self._units.all)}
         self._row = {vertex.key: number for number, vertex in enumerate(graph.vertices)}
-        self._backward = _backward(graph, self._solids)
+        self._backward = _backward(graph, self._units)
 
     def lines(self) -> Iterator[str]:
         yield "digraph {"
@@ -75,9 +76,9 @@ class _Source:
         yield "}"
 
     def _inside(self, around: str) -> Iterator[str]:
-        for solid in self._solids.all.values():
-            if solid.cluster == around:
-                yield f"n{self._number[solid.key]} [{self._node(solid.key, solid.size)}];"
+        for unit in self._units.all.values():
+            if unit.cluster == around:
+                yield f"n{self._number[unit.key]} [{self._node(unit.key, unit.size)}];"
         for number, cluster in enumerate(self._graph.clusters):
             if cluster.parent == around and not cluster.block:
                 label = _blank(self._sizes.frames[cluster.key])
@@ -95,12 +96,12 @@ class _Source:
         return f"shape=plain, label=<{_table(*rows)}>"
 
     def _end(self, vertex: str) -> str:
-        solid = self._solids.key(vertex)
-        port = f":p{self._row[vertex]}" if solid != vertex else ""
-        return f"n{self._number[solid]}{port}"
+        unit = self._units.key(vertex)
+        port = f":p{self._row[vertex]}" if unit != vertex else ""
+        return f"n{self._number[unit]}{port}"
 
     def _edge(self, number: int, edge: Edge) -> str:
-        """Point every edge where most lead: Graphviz then ranks things as we do."""
+        """Return an edge in the direction of the ranks, so that Graphviz ranks units as we do."""
         ends = (self._end(edge.source), self._end(edge.target))
         begin, end = ends[::-1] if number in self._backward else ends
         back = ", dir=back" if number in self._backward else ""
@@ -108,10 +109,10 @@ class _Source:
         return f"{begin} -> {end} [id={number}{back}{label}];"
 
 
-def _backward(graph: Graph, solids: Solids) -> set[int]:
-    """Return the numbers of the edges that are turned round to break cycles."""
-    pairs = [(solids.key(edge.source), solids.key(edge.target)) for edge in graph.edges]
-    turned = forward(list(solids.all), pairs)
+def _backward(graph: Graph, units: LayoutUnits) -> set[int]:
+    """Return the numbers of the edges that are reversed to break cycles."""
+    pairs = [(units.key(edge.source), units.key(edge.target)) for edge in graph.edges]
+    turned = break_cycles(list(units.all), pairs)
     return {number for number, pair in enumerate(pairs) if pair != turned[number]}
 
 
@@ -131,13 +132,13 @@ def _cell(width: float, height: float, port: str = "") -> str:
     return f"<TR><TD{named} {size}></TD></TR>"
 
 
-class _Answer:
-    """What Graphviz says: points, with y upwards."""
+class _DotResult:
+    """The output of Graphviz, in points with y upwards."""
 
     def __init__(self, graph: Graph, sizes: Sizes, data: dict[str, Any]) -> None:
         self._graph = graph
         self._sizes = sizes
-        self._solids = Solids(graph, sizes)
+        self._units = LayoutUnits(graph, sizes)
         self._data = data
         self._objects = {item["name"]: item for item in data.get("objects", [])}
         left, bottom, right, top = _numbers(data["bb"])
@@ -146,8 +147,8 @@ class _Answer:
 
     def layout(self) -> Layout:
         places = {
-            key: Place(self._point(self._objects[f"n{number}"]["pos"]), solid.size)
-            for number, (key, solid) in enumerate(self._solids.all.items())
+            key: Rectangle(self._point(self._objects[f"n{number}"]["pos"]), unit.size)
+            for number, (key, unit) in enumerate(self._units.all.items())
         }
         return Layout(
             size=self._size,
@@ -158,25 +159,25 @@ class _Answer:
             paths=tuple(self._paths()),
         )
 
-    def _vertex(self, key: str, places: dict[str, Place]) -> Place:
-        solid = self._solids.key(key)
-        if solid == key:
+    def _vertex(self, key: str, places: dict[str, Rectangle]) -> Rectangle:
+        unit = self._units.key(key)
+        if unit == key:
             return places[key]
-        return places[solid].row(self._sizes.rows[key], self._sizes.vertices[key].height)
+        return places[unit].row(self._sizes.rows[key], self._sizes.vertices[key].height)
 
-    def _frames(self, places: dict[str, Place]) -> Iterator[Frame]:
+    def _frames(self, places: dict[str, Rectangle]) -> Iterator[Frame]:
         for number, cluster in enumerate(self._graph.clusters):
             place = places.get(cluster.key) if cluster.block else self._frame(number)
             if place is not None:
                 yield Frame(cluster, place)
 
-    def _frame(self, number: int) -> Place | None:
+    def _frame(self, number: int) -> Rectangle | None:
         found = self._objects.get(f"cluster_{number}", {}).get("bb")
         if found is None:
             return None
         left, bottom, right, top = _numbers(found)
         center = self._at((left + right) / 2, (bottom + top) / 2)
-        return Place(center, Size(right - left, top - bottom))
+        return Rectangle(center, Size(right - left, top - bottom))
 
     def _paths(self) -> Iterator[Path]:
         edges: dict[int, dict[str, Any]] = {int(item["id"]): item for item in self._data["edges"]}
@@ -186,9 +187,9 @@ class _Answer:
             yield Path(edge, tuple(self._spline(found["pos"])), label)
 
     def _spline(self, position: str) -> list[Point]:
-        """Return a start and three points a curve; the arrow's head goes on straight from there.
+        """Return a start and three points per curve, with a straight line to the arrow head.
 
-        The form is that of the type splineType (graphviz.org/docs/attr-types/splineType).
+        The format is splineType (graphviz.org/docs/attr-types/splineType).
         """
         parts = position.split(";", maxsplit=1)[0].split(" ")
         tips = {part[0]: self._point(part[2:]) for part in parts if part[0] in "se"}

@@ -1,11 +1,11 @@
-"""A graph as JSON, for programs. The form is part of the command's interface: only add to it."""
+"""Render a graph as JSON. The format is part of the command's interface: only add to it."""
 
 from __future__ import annotations
 
 import json
 from typing import Any
 
-from composer.graph.picture import Cluster, Edge, Graph, Vertex
+from composer.graph.diagram import Cluster, Edge, Graph, Vertex
 
 
 def render(graph: Graph) -> str:

@@ -1,4 +1,4 @@
-"""Short texts for diagrams: what a person says instead of the whole of it."""
+"""Short labels for diagrams."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ def short_type(interface: str) -> str:
 
 
 def rate(hertz: float) -> str:
-    """Return ``10 Hz``, with three digits: more would pretend that clocks are better."""
+    """Return a rate such as ``10 Hz``, with three significant digits."""
     return f"{float(f'{hertz:.3g}'):g} Hz"
 
 
 def qos_label(profile: QosProfile) -> str:
-    """Return the preset's name where the profile is one, else what differs from the default."""
+    """Return the name of a matching preset, else the policies of the profile."""
     for name in ("command", "sensor_data", "state"):
         if profile == PRESETS[name]:
             return name
     return ", ".join([profile.reliability, profile.durability, _history(profile), *_times(profile)])
 
 
-def told_qos_label(profile: QosProfile) -> str:
-    """Return what other processes are told of a profile: history and depth are not."""
+def discovered_qos_label(profile: QosProfile) -> str:
+    """Return the policies that discovery reports, which exclude history and depth."""
     return ", ".join([profile.reliability, profile.durability, *_times(profile)])
 
 
 def qos_facts(profile: QosProfile) -> dict[str, Plain]:
-    """Return every policy that says something, keyed as in YAML."""
+    """Return all policies that are set, with the keys of YAML."""
     facts: dict[str, Plain] = {
         "reliability": profile.reliability.value,
         "durability": profile.durability.value,

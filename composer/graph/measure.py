@@ -1,19 +1,19 @@
-"""How big everything in a picture is: what its texts need."""
+"""Measure texts, and the sizes of everything in a diagram."""
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterator
 
+from composer.graph.diagram import Cluster, Edge, Graph, Vertex, VertexKind
 from composer.graph.layout import Size, Sizes
-from composer.graph.picture import Cluster, Edge, Graph, Kind, Vertex
-from composer.graph.text_size import text_width
 
 FONT_SIZE = 12.0
 SMALL = 10.0
 LINE_HEIGHT = 15.0
 EDGE_LINE_HEIGHT = SMALL + 3.0
 ROW_HEIGHT = 20.0
-#: The head of a block, with its name.
+#: The head of a block with its label.
 HEAD_HEIGHT = 24.0
 ROW_INDENT = 10.0
 HEXAGON_SLANT = 12.0
@@ -22,7 +22,7 @@ _ROW_GAP = 16.0
 
 
 def sizes(graph: Graph) -> Sizes:
-    """Return how much room the texts of a graph need."""
+    """Return the sizes that the texts of a graph need."""
     blocks = dict(_blocks(graph))
     return Sizes(
         vertices={
@@ -61,7 +61,7 @@ def _blocks(graph: Graph) -> Iterator[tuple[str, tuple[Cluster, list[Vertex]]]]:
 def _vertex_size(vertex: Vertex) -> Size:
     first, *others = vertex.lines
     width = max([text_width(first, FONT_SIZE), *(text_width(line, SMALL) for line in others)])
-    slant = HEXAGON_SLANT if vertex.kind in (Kind.SERVICE, Kind.TOPIC) else 0.0
+    slant = HEXAGON_SLANT if vertex.kind in (VertexKind.SERVICE, VertexKind.TOPIC) else 0.0
     return Size(
         round(width + 2 * (_PADDING.width + slant / 2)),
         len(vertex.lines) * LINE_HEIGHT + 2 * _PADDING.height,
@@ -80,3 +80,29 @@ def _block_size(cluster: Cluster, ports: list[Vertex]) -> Size:
     head = text_width(cluster.label, FONT_SIZE) + 2 * _PADDING.width
     widest = max(_row_size(port).width for port in ports)
     return Size(round(max(head, widest)), HEAD_HEIGHT + len(ports) * ROW_HEIGHT)
+
+
+#: Widths of Helvetica in thousandths of the font size (Adobe font metrics), by character.
+_NARROW = dict.fromkeys("fijlt.,:;!|'`Iƒ/\\[]() ", 300) | dict.fromkeys("ijl'|", 230)
+_WIDE = dict.fromkeys("mwMW%@", 900) | dict.fromkeys("ABCDEGHKNOPQRSTUVXYZ&", 710)
+_WIDTHS = _NARROW | _WIDE
+_USUAL = 560
+_FULL = 1000
+
+#: Extra width so that estimates for Helvetica fit wider fonts such as DejaVu Sans too.
+_SAFETY = 1.14
+
+
+def text_width(text: str, size: float) -> float:
+    """Return the width of one line of text, in the unit of the font's ``size``."""
+    return sum(map(_thousandths, text)) * size * _SAFETY / 1000.0
+
+
+def _thousandths(character: str) -> int:
+    known = _WIDTHS.get(character)
+    if known is not None:
+        return known
+    if unicodedata.combining(character):
+        return 0
+    wide = unicodedata.east_asian_width(character) in {"W", "F"}
+    return _FULL if wide else _USUAL

@@ -4,29 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.graph.picture import Cluster, Edge, Graph, Kind, Line, Vertex
+from composer.graph.diagram import Cluster, Edge, EdgeKind, Graph, Vertex, VertexKind
 
-#: What Mermaid draws at most unless its host allows more (``maxTextSize``, ``maxEdges``).
-MOST_CHARACTERS = 50_000
-MOST_EDGES = 500
+#: Mermaid's default limits (``maxTextSize``, ``maxEdges``).
+MAX_CHARACTERS = 50_000
+MAX_EDGES = 500
 
-#: What stands around a label decides the shape.
+#: The brackets around a label determine the shape.
 _SHAPES = {
-    Kind.NODE: ("[", "]"),
-    Kind.TOPIC: ("([", "])"),
-    Kind.SERVICE: ("{{", "}}"),
-    Kind.ACTION: ("[[", "]]"),
-    Kind.PORT: ("(", ")"),
-    Kind.STATE: ("(", ")"),
+    VertexKind.NODE: ("[", "]"),
+    VertexKind.TOPIC: ("([", "])"),
+    VertexKind.SERVICE: ("{{", "}}"),
+    VertexKind.ACTION: ("[[", "]]"),
+    VertexKind.PORT: ("(", ")"),
+    VertexKind.STATE: ("(", ")"),
 }
 
 _ARROWS = {
-    Line.TOPIC: "-->",
-    Line.SERVICE: "-.->",
-    Line.ACTION: "==>",
-    Line.DEPENDENCY: "-->",
-    Line.IMPLIED: "-.->",
-    Line.TRANSITION: "-->",
+    EdgeKind.TOPIC: "-->",
+    EdgeKind.SERVICE: "-.->",
+    EdgeKind.ACTION: "==>",
+    EdgeKind.DEPENDENCY: "-->",
+    EdgeKind.IMPLIED: "-.->",
+    EdgeKind.TRANSITION: "-->",
 }
 
 _STYLES = (
@@ -46,8 +46,8 @@ def render(graph: Graph) -> str:
 
 
 def is_too_large(graph: Graph) -> bool:
-    """Say whether viewers refuse to draw the diagram: Mermaid has limits of its own."""
-    return len(graph.edges) > MOST_EDGES or len(render(graph)) > MOST_CHARACTERS
+    """Return whether the diagram exceeds Mermaid's limits."""
+    return len(graph.edges) > MAX_EDGES or len(render(graph)) > MAX_CHARACTERS
 
 
 def _lines(graph: Graph) -> Iterator[str]:
@@ -66,7 +66,7 @@ def _lines(graph: Graph) -> Iterator[str]:
 
 
 def _title(graph: Graph) -> str:
-    """Quote the title as YAML: Mermaid reads what stands between the dashes as such."""
+    """Return the title as quoted YAML for Mermaid's front matter."""
     text = f"{graph.title}: {graph.view}".replace("\\", "\\\\").replace('"', '\\"')
     return f'"{text}"'
 
@@ -117,6 +117,6 @@ def _quoted(lines: tuple[str, ...]) -> str:
 
 
 def _escaped(text: str) -> str:
-    """Write what Mermaid or HTML would read as syntax as character codes (``#35;`` is ``#``)."""
+    """Escape characters of Mermaid's and HTML's syntax as codes (``#35;`` is ``#``)."""
     special = '#&<>"`\\'
     return "".join(f"#{ord(letter)};" if letter in special else letter for letter in text)

@@ -1,28 +1,28 @@
-"""Namespaces as frames: which are drawn, and which one a name stands in."""
+"""Namespaces as frames: which ones to draw, and the frame of each name."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from composer.graph.picture import Cluster
+from composer.graph.diagram import Cluster
 
 
 class Namespaces:
-    """The namespaces of nodes. One that holds nothing but one other is not drawn."""
+    """The namespaces of nodes. A namespace with only one child and no nodes is not drawn."""
 
     def __init__(self, namespaces: Iterable[str]) -> None:
         used = set(namespaces) - {"/"}
         self._drawn = {name for name in _with_ancestors(used) if name in used or _forks(name, used)}
 
     def clusters(self) -> tuple[Cluster, ...]:
-        """Return a cluster for each namespace that is drawn, parents first."""
+        """Return a cluster for each drawn namespace, parents first."""
         return tuple(
             Cluster(name, name, self.around(parent_of(name)), namespace=name)
             for name in sorted(self._drawn)
         )
 
     def around(self, namespace: str) -> str:
-        """Return the innermost drawn namespace that ``namespace`` is or lies in; else empty."""
+        """Return the innermost drawn namespace that contains ``namespace``, or an empty text."""
         while namespace not in self._drawn:
             if namespace == "/":
                 return ""
@@ -30,12 +30,12 @@ class Namespaces:
         return namespace
 
     def around_name(self, full_name: str) -> str:
-        """Return the innermost drawn namespace that a topic, service or action name lies in."""
+        """Return the innermost drawn namespace of the name of a topic, service or action."""
         return self.around(parent_of(full_name))
 
 
 def parent_of(name: str) -> str:
-    """Return the namespace that a full name stands in."""
+    """Return the namespace of a full name."""
     return name.rpartition("/")[0] or "/"
 
 

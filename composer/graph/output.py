@@ -1,4 +1,4 @@
-"""A diagram in the format somebody asked for."""
+"""Render diagrams in a format."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Callable, Sequence
 from enum import StrEnum
 
 from composer.graph import dot, html, json, mermaid, png, svg
-from composer.graph.picture import Graph
-from composer.graph.placing import Engine, placed
+from composer.graph.diagram import Graph
+from composer.graph.engines import Engine, lay_out
 
 __all__ = ["Engine", "Format", "render"]
 
 
 class Format(StrEnum):
-    """What a diagram is written as."""
+    """The format of a diagram."""
 
     MERMAID = "mermaid"
     DOT = "dot"
@@ -33,18 +33,18 @@ _TEXTS: dict[Format, Callable[[Graph], str]] = {
 def render(
     graphs: Sequence[Graph], form: Format, engine: Engine = Engine.AUTO, shown: int = 0
 ) -> bytes:
-    """Return the graph at index ``shown`` in the format; a page (HTML) has them all.
+    """Return the graph at index ``shown`` in the format; HTML contains all graphs.
 
     Raises GraphvizFailed, PngMissing.
     """
     graph = graphs[shown]
     match form:
         case Format.HTML:
-            pictures = [(each, placed(each, engine)) for each in graphs]
+            pictures = [(each, lay_out(each, engine)) for each in graphs]
             return html.render(pictures, shown).encode()
         case Format.SVG:
-            return svg.render(graph, placed(graph, engine)).encode()
+            return svg.render(graph, lay_out(graph, engine)).encode()
         case Format.PNG:
-            return png.render(graph, placed(graph, engine))
+            return png.render(graph, lay_out(graph, engine))
         case _:
             return _TEXTS[form](graph).encode()

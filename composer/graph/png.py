@@ -1,4 +1,4 @@
-"""A picture as PNG: drawn from ours by resvg where that is installed, else by Graphviz."""
+"""Render PNG from our SVG with resvg if it is installed, else with Graphviz."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import math
 from importlib.util import find_spec
 
 from composer.graph import dot, graphviz, svg
+from composer.graph.diagram import Graph
 from composer.graph.layout import Layout
-from composer.graph.picture import Graph
 
-#: Two pixels for one of the layout's, for screens of today; fewer where that would be too many.
+#: Pixels per layout unit for high-resolution screens, reduced for very large pictures.
 _ZOOM = 2.0
-_MOST_PIXELS = 40_000_000
+_MAX_PIXELS = 40_000_000
 
 
 class PngMissing(Exception):
-    """Nothing that can make a PNG is installed."""
+    """No PNG renderer is installed."""
 
 
 def render(graph: Graph, layout: Layout) -> bytes:
@@ -35,7 +35,7 @@ def _by_resvg(graph: Graph, layout: Layout) -> bytes:
     import resvg_py  # noqa: PLC0415 - an extra
 
     pixels = layout.size.width * layout.size.height
-    zoom = min(_ZOOM, math.sqrt(_MOST_PIXELS / max(pixels, 1.0)))
+    zoom = min(_ZOOM, math.sqrt(_MAX_PIXELS / max(pixels, 1.0)))
     width, _ = svg.page_size(graph, layout)
     drawn = resvg_py.svg_to_bytes(
         svg_string=svg.render(graph, layout), width=max(1, round(width * zoom))

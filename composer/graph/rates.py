@@ -1,4 +1,4 @@
-"""How often a node publishes, where its declaration says so."""
+"""Publishing rates that follow from declarations."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What views look at: nodes with their ends, whether they were declared or found running.
+"""Scenes: nodes with their ports, either declared or discovered.
 
-``declared`` makes a scene of systems, ``live`` one of a ROS graph; every view reads scenes only.
+``declared`` builds scenes from systems, ``live`` from a ROS graph; views only read scenes.
 """
 
 from __future__ import annotations
@@ -8,21 +8,21 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from composer.graph.picture import Details
+from composer.graph.diagram import Details
 from composer.model import ChannelKind, PortKind
 
 _SOURCES = (PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER)
-#: Where messages or requests come from; the arrow leads from these into the channel.
+#: Ports that send messages or requests: their arrows point to the channel.
 SENDING = (PortKind.PUBLISHER, PortKind.CLIENT, PortKind.ACTION_CLIENT)
 
 
 @dataclass(frozen=True, slots=True)
-class End:
-    """One node's end of a topic, service or action.
+class ScenePort:
+    """An endpoint of a node on a topic, service or action.
 
-    ``name`` is the port's (of a running node, that of the channel); ``rate_hz`` is how often it
-    publishes, None where nobody knows. ``qos`` says the profile in short, and is empty where
-    nothing was said about it. ``wrong`` is the diagnostic about it, empty for none.
+    ``name`` is the port's name (of a running node, the channel's); ``rate_hz`` is the publishing
+    rate, None if unknown. ``qos`` is a short label, empty if not explicit. ``wrong`` is a
+    diagnostic, or empty.
     """
 
     kind: PortKind
@@ -36,12 +36,12 @@ class End:
 
 
 @dataclass(frozen=True, slots=True)
-class Actor:
+class SceneNode:
     """A node. ``full_name`` is unique in a scene.
 
-    ``note`` is said below the name. ``state`` is the lifecycle state the node is in, or will be
-    brought to; empty for a node without one. ``steps`` are those of its bring-up. ``executor`` is
-    the key of the group that runs it, empty where that is not known.
+    ``note`` is shown below the name. ``state`` is the current lifecycle state, or the state after
+    bring-up; empty without one. ``steps`` are its bring-up steps. ``executor`` is the key of its
+    executor group, empty if unknown.
     """
 
     name: str
@@ -51,16 +51,16 @@ class Actor:
     state: str = ""
     steps: str = ""
     executor: str = ""
-    ends: tuple[End, ...] = ()
+    ports: tuple[ScenePort, ...] = ()
     details: Details = ()
     wrong: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """``waiting`` goes on after ``waited_for`` has; both are full names.
+    """A dependency: ``waiting`` waits for ``waited_for``; both are full names.
 
-    ``implied`` is true where no file says so and it follows from who serves whom.
+    ``implied`` is true if it follows from a service or action.
     """
 
     waiting: str
@@ -71,7 +71,7 @@ class Wait:
 
 @dataclass(frozen=True, slots=True)
 class ExecutorGroup:
-    """Something that calls the callbacks of nodes."""
+    """An executor and its label."""
 
     key: str
     label: str
@@ -79,58 +79,78 @@ class ExecutorGroup:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Everything there is to draw.
+    """Everything to draw.
 
-    ``rates_hz`` is how often messages come over a topic where it is not known from whom.
+    ``rates_hz`` are the measured rates of topics with several publishers.
     """
 
     title: str
-    actors: tuple[Actor, ...]
+    nodes: tuple[SceneNode, ...]
     waits: tuple[Wait, ...] = ()
     executors: tuple[ExecutorGroup, ...] = ()
     rates_hz: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
-class Meeting:
-    """An end, and the node that has it."""
+class SceneEndpoint:
+    """A port together with its node."""
 
-    actor: Actor
-    end: End
+    node: SceneNode
+    port: ScenePort
 
 
 @dataclass(frozen=True, slots=True)
-class Channel:
-    """A topic, service or action, and everyone who meets on it."""
+class SceneChannel:
+    """A topic, service or action with its endpoints."""
 
     kind: ChannelKind
     name: str
-    sources: tuple[Meeting, ...]  # publishers or servers
-    sinks: tuple[Meeting, ...]  # subscriptions or clients
+    sources: tuple[SceneEndpoint, ...]  # publishers or servers
+    sinks: tuple[SceneEndpoint, ...]  # subscriptions or clients
 
     @property
-    def ends(self) -> tuple[Meeting, ...]:
-        """Everyone, sources first."""
+    def endpoints(self) -> tuple[SceneEndpoint, ...]:
+        """All endpoints, sources first."""
         return self.sources + self.sinks
 
     @property
     def types(self) -> tuple[str, ...]:
-        """The interface, and any other that somebody has by mistake."""
-        return tuple(dict.fromkeys(meeting.end.interface for meeting in self.ends))
+        """The interface types of all endpoints, normally a single one."""
+        return tuple(dict.fromkeys(endpoint.port.interface for endpoint in self.endpoints))
 
 
-def channels(actors: Iterable[Actor]) -> tuple[Channel, ...]:
-    """Return every topic, service and action of some nodes, sorted by kind and name."""
-    found: dict[tuple[ChannelKind, str], list[Meeting]] = {}
-    for actor in actors:
-        for end in actor.ends:
-            found.setdefault((end.kind.channel, end.channel), []).append(Meeting(actor, end))
+def channels(nodes: Iterable[SceneNode]) -> tuple[SceneChannel, ...]:
+    """Return all topics, services and actions of the nodes, sorted by kind and name."""
+    found: dict[tuple[ChannelKind, str], list[SceneEndpoint]] = {}
+    for node in nodes:
+        for port in node.ports:
+            found.setdefault((port.kind.channel, port.channel), []).append(
+                SceneEndpoint(node, port)
+            )
     return tuple(
-        Channel(
+        SceneChannel(
             kind,
             name,
-            tuple(meeting for meeting in met if meeting.end.kind in _SOURCES),
-            tuple(meeting for meeting in met if meeting.end.kind not in _SOURCES),
+            tuple(endpoint for endpoint in endpoints if endpoint.port.kind in _SOURCES),
+            tuple(endpoint for endpoint in endpoints if endpoint.port.kind not in _SOURCES),
         )
-        for (kind, name), met in sorted(found.items())
+        for (kind, name), endpoints in sorted(found.items())
     )
+
+
+def node_key(node: SceneNode) -> str:
+    """Return the key of a node."""
+    return f"node:{node.full_name}"
+
+
+def port_key(node: SceneNode, port: ScenePort) -> str:
+    """Return the key of a port.
+
+    The kind is part of it: a running node may have a publisher and a subscription with one name.
+    """
+    return f"{port.kind.value.replace(' ', '_')}:{node.full_name}.{port.name}"
+
+
+def channel_key(channel: SceneChannel) -> str:
+    """Return the key of a topic, service or action."""
+    return f"{channel.kind}:{channel.name}"

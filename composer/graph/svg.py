@@ -1,14 +1,13 @@
-"""A graph as a self-contained SVG picture, for light and dark pages, laid out by ``layout``."""
+"""Render a graph as a self-contained SVG picture for light and dark pages."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.graph import drawing
+from composer.graph import svg_elements
+from composer.graph.diagram import Graph
 from composer.graph.layout import Layout, arrange
-from composer.graph.measure import sizes
-from composer.graph.picture import Graph
-from composer.graph.text_size import text_width
+from composer.graph.measure import sizes, text_width
 from composer.graph.theme import STYLE
 
 _TITLE_SIZE = 14.0
@@ -16,7 +15,7 @@ _TITLE_HEIGHT = 26.0
 
 
 def render(graph: Graph, layout: Layout | None = None) -> str:
-    """Return the picture as SVG text with a newline at the end; laid out here unless given."""
+    """Return the picture as SVG text with a newline at the end; by default with our layout."""
     found = arrange(graph, sizes(graph)) if layout is None else layout
     return "\n".join(_lines(graph, found)) + "\n"
 
@@ -32,18 +31,18 @@ def _title(graph: Graph) -> str:
 
 
 def _lines(graph: Graph, layout: Layout) -> Iterator[str]:
-    width, height = map(drawing.number, page_size(graph, layout))
-    said = drawing.text(_title(graph))
+    width, height = map(svg_elements.number, page_size(graph, layout))
+    title = svg_elements.text(_title(graph))
     yield (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}"'
-        f' width="{width}" height="{height}" role="img" aria-label="{said}">'
+        f' width="{width}" height="{height}" role="img" aria-label="{title}">'
     )
-    yield f"<title>{said}</title>"
+    yield f"<title>{title}</title>"
     yield f"<style>{STYLE}</style>"
-    yield drawing.markers()
+    yield svg_elements.markers()
     yield f'<rect class="page" width="{width}" height="{height}"/>'
-    yield f'<text class="title" x="16" y="22">{said}</text>'
-    yield f'<g transform="translate(0 {drawing.number(_TITLE_HEIGHT)})">'
+    yield f'<text class="title" x="16" y="22">{title}</text>'
+    yield f'<g transform="translate(0 {svg_elements.number(_TITLE_HEIGHT)})">'
     yield from contents(graph, layout)
     yield "</g>"
     yield "</svg>"
@@ -54,15 +53,15 @@ def contents(graph: Graph, layout: Layout) -> Iterator[str]:
     blocks = {cluster.key for cluster in graph.clusters if cluster.block}
     for item in layout.frames:
         if not item.cluster.block:
-            yield from drawing.frame(item)
+            yield from svg_elements.frame(item)
     for path in layout.paths:
-        yield drawing.line(path)
+        yield svg_elements.line(path)
     for item in layout.frames:
         if item.cluster.block:
-            yield from drawing.frame(item)
+            yield from svg_elements.frame(item)
     for vertex in graph.vertices:
-        draw = drawing.row if vertex.cluster in blocks else drawing.vertex
+        draw = svg_elements.row if vertex.cluster in blocks else svg_elements.vertex
         yield from draw(vertex, layout.vertices[vertex.key])
     for path in layout.paths:
         if path.label is not None:
-            yield from drawing.label(path, path.label)
+            yield from svg_elements.label(path, path.label)

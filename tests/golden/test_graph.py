@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from composer.graph import View, build_graph, scene_of
+from composer.graph.engines import Engine
 from composer.graph.output import Format, render
-from composer.graph.placing import Engine
 from composer.loading import load
 
 HERE = Path(__file__).parent / "graph"

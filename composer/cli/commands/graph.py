@@ -54,7 +54,7 @@ class DiagramView(StrEnum):
 
 
 class LayoutEngine(StrEnum):
-    """The same as composer.graph.placing.Engine, which is slow to import."""
+    """The same as composer.graph.engines.Engine, which is slow to import."""
 
     AUTO = "auto"
     GRAPHVIZ = "graphviz"

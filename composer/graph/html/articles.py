@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from composer.graph.drawing import text
-from composer.graph.picture import Details, Graph
+from composer.graph.diagram import Details, Graph
+from composer.graph.svg_elements import text
 from composer.tree import Plain
 
 #: Words of facts that are no words of people.

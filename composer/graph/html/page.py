@@ -8,11 +8,11 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from composer.graph.drawing import markers, number, text
+from composer.graph.diagram import Graph, VertexKind
 from composer.graph.html.articles import articles
 from composer.graph.layout import Layout
-from composer.graph.picture import Graph, Kind
 from composer.graph.svg import contents
+from composer.graph.svg_elements import markers, number, text
 from composer.graph.theme import FORMS, color_rules, colors
 
 #: The parts of the script, each before those that use it.
@@ -26,7 +26,7 @@ _SCRIPTS = (
     "appearance.js",
     "main.js",
 )
-_KINDS = (Kind.NODE, Kind.TOPIC, Kind.SERVICE, Kind.ACTION)
+_KINDS = (VertexKind.NODE, VertexKind.TOPIC, VertexKind.SERVICE, VertexKind.ACTION)
 
 Picture = tuple[Graph, Layout]
 
@@ -116,11 +116,11 @@ def _tabs(views: Sequence[str], shown: int) -> Iterator[str]:
 def _filters(graphs: Sequence[Graph]) -> Iterator[str]:
     vertices = [vertex for graph in graphs for vertex in graph.vertices]
     blocks = [cluster for graph in graphs for cluster in graph.clusters if cluster.block]
-    kinds = {vertex.kind for vertex in vertices} | ({Kind.NODE} if blocks else set())
-    namespaces = {vertex.namespace for vertex in vertices if vertex.kind is Kind.NODE}
+    kinds = {vertex.kind for vertex in vertices} | ({VertexKind.NODE} if blocks else set())
+    namespaces = {vertex.namespace for vertex in vertices if vertex.kind is VertexKind.NODE}
     namespaces |= {block.namespace for block in blocks}
     yield '<details class="filter"><summary>Filter</summary><div class="menu">'
-    yield "<fieldset><legend>Kind</legend>"
+    yield "<fieldset><legend>VertexKind</legend>"
     yield from (_choice("kind", kind.value, f"{kind.value}s") for kind in _KINDS if kind in kinds)
     yield "</fieldset><fieldset><legend>Namespace</legend>"
     yield from (

@@ -1,18 +1,18 @@
-"""Where everything in a diagram goes, without Graphviz: a layered layout with nested frames.
+"""Layered graph drawing with nested frames (Sugiyama, Tagawa and Toda, 1981).
 
-The steps are those of Sugiyama, Tagawa and Toda (1981): ranks along the direction of the arrows
-(``ranks``), an order across it with few crossings (``order``), straight edges (``straighten``), and
-lines through the bends (``routes``). A frame is one lane across the ranks, so frames never overlap.
-Positions are in pixels; the same graph is always laid out in the same way.
-
-What lines have in common they share (``build``): a topic that everybody hears is a tree, not a
-thicket. Ports of a block are rows of one box (``solids``).
+The steps are: rank assignment (``ranks``), ordering with few crossings (``ordering``,
+``transpose``), coordinate
+assignment (``coordinates``) and edge routing (``routing``). A frame is one lane across the ranks,
+so frames never
+overlap. Positions are in pixels, and the layout is deterministic. Edges with a common end share
+segments
+(``build``). Ports of a block are rows of one box (``units``).
 """
 
 from __future__ import annotations
 
 from composer.graph.layout.arrange import LayOut, arrange
-from composer.graph.layout.result import Frame, Layout, Path, Place, Point, Size
-from composer.graph.layout.solids import Sizes
+from composer.graph.layout.result import Frame, Layout, Path, Point, Rectangle, Size
+from composer.graph.layout.units import Sizes
 
-__all__ = ["Frame", "LayOut", "Layout", "Path", "Place", "Point", "Size", "Sizes", "arrange"]
+__all__ = ["Frame", "LayOut", "Layout", "Path", "Point", "Rectangle", "Size", "Sizes", "arrange"]

@@ -1,48 +1,50 @@
-"""The layout from graph to places: the steps in their order, and the way back to x and y."""
+"""Lay out a graph: run the steps in order and convert the result to x and y."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from typing import TypeAlias
 
+from composer.graph.diagram import Graph
+from composer.graph.layout.bend_removal import Obstacles
 from composer.graph.layout.boxes import Item
 from composer.graph.layout.build import Parts, build
-from composer.graph.layout.columns import Extent, columns, reach
-from composer.graph.layout.components import components
-from composer.graph.layout.loops import loop_path
-from composer.graph.layout.order import put_in_order
-from composer.graph.layout.result import Frame, Layout, Place
-from composer.graph.layout.routes import Router
-from composer.graph.layout.shelves import MARGIN, side_by_side
-from composer.graph.layout.shortcuts import Obstacles
-from composer.graph.layout.solids import Sizes
-from composer.graph.layout.straighten import straighten
-from composer.graph.picture import Graph
+from composer.graph.layout.components import MARGIN, components, pack_components
+from composer.graph.layout.coordinates import assign_coordinates
+from composer.graph.layout.ordering import order_boxes
+from composer.graph.layout.rank_extents import Extent, extent_of, rank_extents
+from composer.graph.layout.result import Frame, Layout, Rectangle
+from composer.graph.layout.routing import Router
+from composer.graph.layout.self_loops import loop_path
+from composer.graph.layout.units import Sizes
 
-#: Lays out a graph in one piece, with a margin around.
+#: Lays out a connected graph with a margin.
 LayOut: TypeAlias = Callable[[Graph, Sizes], Layout]
 
 
 def arrange(graph: Graph, sizes: Sizes, lay_out: LayOut | None = None) -> Layout:
-    """Return the layout of ``graph``; everything in it is as big as ``sizes`` says.
+    """Return the layout of ``graph`` with the given ``sizes``.
 
-    What no arrow and no frame joins is laid out apart, and set side by side. ``lay_out`` lays out
-    what arrows join; by itself this module does.
+    Connected components are laid out separately and packed side by side. ``lay_out`` replaces the
+    layered layout of components with edges.
     """
-    joined = _layered if lay_out is None else lay_out
-    return side_by_side(
-        [joined(part, sizes) if part.edges else _layered(part, sizes) for part in components(graph)]
+    lay_out_component = _layered if lay_out is None else lay_out
+    return pack_components(
+        [
+            lay_out_component(part, sizes) if part.edges else _layered(part, sizes)
+            for part in components(graph)
+        ]
     )
 
 
 def _layered(graph: Graph, sizes: Sizes) -> Layout:
     parts = build(graph, sizes)
-    put_in_order(parts.root)
-    straighten(parts.root)
+    order_boxes(parts.root)
+    assign_coordinates(parts.root)
     parts.root.shift(MARGIN - parts.root.low)
-    ranks = columns(parts.root, MARGIN)
+    ranks = rank_extents(parts.root, MARGIN)
     obstacles = Obstacles(parts.root.boxes(), ranks)
-    loops = [loop_path(loop, reach(loop.box, ranks).end, parts.axes) for loop in parts.loops]
+    loops = [loop_path(loop, extent_of(loop.box, ranks).end, parts.axes) for loop in parts.loops]
     end = _end(parts, ranks)
     return Layout(
         size=parts.axes.size(end + MARGIN, parts.root.high + MARGIN),
@@ -53,11 +55,11 @@ def _layered(graph: Graph, sizes: Sizes) -> Layout:
 
 
 def _end(parts: Parts, ranks: list[Extent]) -> float:
-    tails = [reach(box, ranks).end + box.tail for box in parts.boxes.values()]
-    return max(reach(parts.root, ranks).end, *tails)
+    tails = [extent_of(box, ranks).end + box.tail for box in parts.boxes.values()]
+    return max(extent_of(parts.root, ranks).end, *tails)
 
 
-def _vertices(parts: Parts, sizes: Sizes, ranks: list[Extent]) -> Iterator[tuple[str, Place]]:
+def _vertices(parts: Parts, sizes: Sizes, ranks: list[Extent]) -> Iterator[tuple[str, Rectangle]]:
     blocks = {cluster.key for cluster in parts.graph.clusters if cluster.block}
     for vertex in parts.graph.vertices:
         if vertex.cluster not in blocks:
@@ -76,8 +78,8 @@ def _frames(parts: Parts, ranks: list[Extent]) -> Iterator[Frame]:
             yield Frame(cluster, _place(parts, parts.groups[cluster.key], ranks))
 
 
-def _place(parts: Parts, item: Item, ranks: list[Extent]) -> Place:
-    along = reach(item, ranks)
+def _place(parts: Parts, item: Item, ranks: list[Extent]) -> Rectangle:
+    along = extent_of(item, ranks)
     across = (item.low + item.high) / 2
     center = parts.axes.point(along.middle, across)
-    return Place(center, parts.axes.size(along.end - along.begin, item.high - item.low))
+    return Rectangle(center, parts.axes.size(along.end - along.begin, item.high - item.low))

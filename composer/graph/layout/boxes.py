@@ -1,6 +1,6 @@
-"""What is laid out: boxes on ranks, in nested groups. The working data of the layout.
+"""The working data of the layout: boxes on ranks, in nested groups.
 
-"Along" is the axis the arrows follow, "across" the other one; the steps know nothing of x and y.
+"Along" is the axis of the arrows, "across" the other axis; only ``Axes`` knows x and y.
 """
 
 from __future__ import annotations
@@ -9,21 +9,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from composer.graph.picture import Edge
+from composer.graph.diagram import Edge
+from composer.graph.layout.result import Point, Size
 
-#: Space between things on one rank: boxes, and the bends of lines that pass between them.
+#: Space on a rank between boxes, and between bends of edges.
 BOX_GAP = 18.0
 BEND_GAP = 8.0
-#: Space between a frame and what it holds, and for its label.
+#: Space between a frame and its contents, and for its label.
 FRAME_PADDING = 14.0
 FRAME_LABEL = 20.0
 
 
 @dataclass(slots=True, eq=False)
 class Link:
-    """A piece of a line, from a box to one on the next rank.
+    """A segment of an edge, from a box to one on the next rank.
 
-    The offsets say where it leaves and arrives, across, from the boxes' centres.
+    The offsets of its ends across are relative to the centers of the boxes.
     """
 
     low: Box
@@ -37,11 +38,11 @@ class Box:
     """A vertex, the bend of a long edge, or an edge's label."""
 
     rank: int
-    along: float  # its size along the arrows
+    along: float  # size along the arrows
     across: float
     gap: float = BOX_GAP
-    tail: float = 0.0  # the part of ``along``, at its end, that is for lines back to itself
-    position: float = 0.0  # of its centre, across
+    tail: float = 0.0  # the part of ``along`` at its end for self-loops
+    position: float = 0.0  # of its center, across
     before: list[Link] = field(default_factory=list)  # from the rank before
     after: list[Link] = field(default_factory=list)  # to the rank after
 
@@ -57,16 +58,16 @@ class Box:
 
     @property
     def low(self) -> float:
-        """Where it begins, across."""
+        """The lower bound, across."""
         return self.position - self.across / 2
 
     @property
     def high(self) -> float:
-        """Where it ends, across."""
+        """The upper bound, across."""
         return self.position + self.across / 2
 
     def shift(self, distance: float) -> None:
-        """Move it, across."""
+        """Move the box across."""
         self.position += distance
 
     def boxes(self) -> Iterator[Box]:
@@ -76,12 +77,12 @@ class Box:
 
 @dataclass(slots=True, eq=False)
 class Group:
-    """A frame and what is in it, in order across; or all there is (``padding`` 0)."""
+    """A frame with its contents in order across; the root has ``padding`` 0."""
 
     padding: float = FRAME_PADDING
-    label: float = 0.0  # room for the label across, where the frame begins
-    label_along: float = 0.0  # room for the label along
-    least: float = 0.0  # its least size across
+    label: float = 0.0  # space for the label across, at the start of the frame
+    label_along: float = 0.0  # space for the label along
+    least: float = 0.0  # minimum size across
     least_along: float = 0.0
     children: list[Item] = field(default_factory=list)
     low: float = 0.0
@@ -91,36 +92,36 @@ class Group:
     gap: float = BOX_GAP
 
     def shift(self, distance: float) -> None:
-        """Move it with all it holds, across."""
+        """Move the group and its contents across."""
         self.low += distance
         self.high += distance
         for child in self.children:
             child.shift(distance)
 
     def boxes(self) -> Iterator[Box]:
-        """Yield every box in it."""
+        """Yield all boxes of the group."""
         for child in self.children:
             yield from child.boxes()
 
     def inner(self) -> list[Group]:
-        """Return the groups directly in it."""
+        """Return the direct child groups."""
         return [child for child in self.children if isinstance(child, Group)]
 
     def groups(self) -> Iterator[Group]:
-        """Yield every group in it, outer ones first."""
+        """Yield all nested groups, outer ones first."""
         for child in self.inner():
             yield child
             yield from child.groups()
 
     def span_ranks(self) -> None:
-        """Work out from which to which rank it and its groups reach."""
+        """Compute the first and last rank of the group and its child groups."""
         for child in self.inner():
             child.span_ranks()
         self.first_rank = min(child.first_rank for child in self.children)
         self.last_rank = max(child.last_rank for child in self.children)
 
     def fit(self) -> None:
-        """Draw the frame, and those in it, as close around the contents as they may be."""
+        """Fit the frame and nested frames around their contents."""
         for child in self.inner():
             child.fit()
         low = min(child.low for child in self.children) - self.padding - self.label
@@ -133,11 +134,11 @@ Item: TypeAlias = "Box | Group"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Chain:
-    """An edge as the boxes it passes, in the order of the ranks.
+class EdgeChain:
+    """An edge as the boxes that it passes, in the order of the ranks.
 
-    The offsets say where it leaves the first box and reaches the last one, across, from their
-    centres; None where any place on the side will do.
+    The offsets are its ends across, relative to the centers of the first and last box; None for any
+    position.
     """
 
     edge: Edge
@@ -149,8 +150,8 @@ class Chain:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Loop:
-    """An edge from a box to itself; it runs through the box's tail."""
+class SelfLoop:
+    """An edge from a box to itself, drawn in the tail of the box."""
 
     edge: Edge
     box: Box
@@ -161,12 +162,12 @@ class Loop:
 
 
 def space_between(first: Item, second: Item) -> float:
-    """Return the least space between two neighbours."""
+    """Return the minimum space between two neighbors."""
     return max(first.gap, second.gap)
 
 
-def link(chain: Chain) -> None:
-    """Join the boxes of a chain; pieces that lines share are there once."""
+def link(chain: EdgeChain) -> None:
+    """Link the boxes of a chain; shared segments are added once."""
     last = len(chain.boxes) - 1
     for index in range(last):
         low, high = chain.boxes[index], chain.boxes[index + 1]
@@ -177,3 +178,22 @@ def link(chain: Chain) -> None:
         joined = Link(low, high, low_offset, high_offset)
         low.after.append(joined)
         high.before.append(joined)
+
+
+@dataclass(frozen=True, slots=True)
+class Axes:
+    """The arrows run along x, or along y if ``down``."""
+
+    down: bool
+
+    def of_size(self, size: Size) -> tuple[float, float]:
+        """Return the size along and across."""
+        return (size.height, size.width) if self.down else (size.width, size.height)
+
+    def size(self, along: float, across: float) -> Size:
+        """Return the size of which the two extents are given."""
+        return Size(across, along) if self.down else Size(along, across)
+
+    def point(self, along: float, across: float) -> Point:
+        """Return the point of which the two coordinates are given."""
+        return Point(across, along) if self.down else Point(along, across)

@@ -1,43 +1,43 @@
-"""From a graph to boxes in groups: vertices on even ranks, bends and labels between them."""
+"""Convert a graph to boxes in groups: vertices on even ranks, bends and labels between them."""
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
 
-from composer.graph.layout.axes import Axes
+from composer.graph.diagram import Cluster, Direction, Edge, Graph
 from composer.graph.layout.boxes import (
     BEND_GAP,
     FRAME_LABEL,
     FRAME_PADDING,
+    Axes,
     Box,
-    Chain,
+    EdgeChain,
     Group,
-    Loop,
+    SelfLoop,
     link,
 )
-from composer.graph.layout.loops import loops_of, make_room
-from composer.graph.layout.ranks import forward, ranks
+from composer.graph.layout.ranks import assign_ranks, break_cycles
 from composer.graph.layout.result import Size
-from composer.graph.layout.solids import Sizes, Solids
-from composer.graph.picture import Cluster, Direction, Edge, Graph
+from composer.graph.layout.self_loops import loops_of, make_room
+from composer.graph.layout.units import LayoutUnits, Sizes
 
 
 @dataclass(slots=True)
 class Parts:
-    """Everything of a graph on its way to a place."""
+    """The parts of a graph during layout."""
 
     graph: Graph
     axes: Axes
     root: Group
     groups: dict[str, Group]  # by cluster key; "" is the root
-    boxes: dict[str, Box] = field(default_factory=dict)  # by the solid's key
-    chains: list[Chain] = field(default_factory=list)
-    loops: list[Loop] = field(default_factory=list)
+    boxes: dict[str, Box] = field(default_factory=dict)  # by the unit's key
+    chains: list[EdgeChain] = field(default_factory=list)
+    loops: list[SelfLoop] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
-class _Way:
+class _DirectedEdge:
     """An edge in the direction of the ranks: from ``low`` to ``high``, which are vertex keys."""
 
     edge: Edge
@@ -49,36 +49,36 @@ class _Way:
         return self.low != self.edge.source
 
     @property
-    def looks(self) -> tuple[str, bool, bool]:
-        """What lines must have in common to be drawn over one another."""
+    def style(self) -> tuple[str, bool, bool]:
+        """The style that edges must have in common to share segments."""
         return (self.edge.kind.value, bool(self.edge.wrong), self.backward)
 
 
 def build(graph: Graph, sizes: Sizes) -> Parts:
-    """Return the boxes and groups of a graph, not placed yet. It has at least one vertex."""
-    solids = Solids(graph, sizes)
-    through = [edge for edge in graph.edges if solids.key(edge.source) != solids.key(edge.target)]
-    pairs = [(solids.key(edge.source), solids.key(edge.target)) for edge in through]
-    clusters = {key: solid.cluster for key, solid in solids.all.items()}
-    turned = forward(list(clusters), pairs)
-    rank = ranks(clusters, turned)
+    """Return the boxes and groups of a graph, without positions. It has at least one vertex."""
+    units = LayoutUnits(graph, sizes)
+    through = [edge for edge in graph.edges if units.key(edge.source) != units.key(edge.target)]
+    pairs = [(units.key(edge.source), units.key(edge.target)) for edge in through]
+    clusters = {key: unit.cluster for key, unit in units.all.items()}
+    turned = break_cycles(list(clusters), pairs)
+    rank = assign_ranks(clusters, turned)
     axes = Axes(graph.direction is Direction.DOWN)
     root = Group(padding=0.0)
     parts = Parts(graph, axes, root, _groups(graph, root, axes, sizes))
-    for key, solid in solids.all.items():
-        along, across = axes.of_size(solid.size)
+    for key, unit in units.all.items():
+        along, across = axes.of_size(unit.size)
         box = Box(2 * rank[key], along, across)
         parts.boxes[key] = box
-        parts.groups[solid.cluster].children.append(box)
-    for key, edges in loops_of(graph, solids).items():
+        parts.groups[unit.cluster].children.append(box)
+    for key, edges in loops_of(graph, units).items():
         parts.loops += make_room(parts.boxes[key], edges, sizes, axes)
-    ways = [
-        _Way(edge, edge.source, edge.target)
+    directed_edges = [
+        _DirectedEdge(edge, edge.source, edge.target)
         if pair == straight
-        else _Way(edge, edge.target, edge.source)
+        else _DirectedEdge(edge, edge.target, edge.source)
         for edge, pair, straight in zip(through, turned, pairs, strict=True)
     ]
-    _Chains(parts, solids, ways).add(sizes)
+    _Chains(parts, units, directed_edges).add(sizes)
     _drop_empty(root)
     root.span_ranks()
     return parts
@@ -101,51 +101,55 @@ def _groups(graph: Graph, root: Group, axes: Axes, sizes: Sizes) -> dict[str, Gr
 
 
 class _Chains:
-    """Joins boxes by bends on the ranks between them; a label stands on one of these.
+    """Joins boxes by bends on the ranks between them, one of which holds the label.
 
-    Lines that come from one place, or lead to one, run together for as long as they can: what
-    everybody listens to would else be a thicket.
+    Edges with a common source or target share segments as long as possible.
     """
 
-    def __init__(self, parts: Parts, solids: Solids, ways: list[_Way]) -> None:
+    def __init__(
+        self, parts: Parts, units: LayoutUnits, directed_edges: list[_DirectedEdge]
+    ) -> None:
         self._parts = parts
-        self._solids = solids
-        self._ways = ways
-        self._frames = _Frames(parts.graph, solids)
+        self._units = units
+        self._ways = directed_edges
+        self._frames = _Frames(parts.graph, units)
         self._shared: dict[tuple[object, ...], Box] = {}
-        self._leaving = Counter((way.low, *way.looks) for way in ways)
-        self._arriving = Counter((way.high, *way.looks) for way in ways)
+        self._leaving = Counter((directed.low, *directed.style) for directed in directed_edges)
+        self._arriving = Counter((directed.high, *directed.style) for directed in directed_edges)
 
     def add(self, sizes: Sizes) -> None:
-        for way in self._ways:
-            chain = self._chain(way, sizes.labels.get(way.edge.key))
+        for directed in self._ways:
+            chain = self._chain(directed, sizes.labels.get(directed.edge.key))
             link(chain)
             self._parts.chains.append(chain)
 
-    def _chain(self, way: _Way, label: Size | None) -> Chain:
-        low, high = self._solids.key(way.low), self._solids.key(way.high)
+    def _chain(self, directed: _DirectedEdge, label: Size | None) -> EdgeChain:
+        low, high = self._units.key(directed.low), self._units.key(directed.high)
         begin, end = self._parts.boxes[low], self._parts.boxes[high]
         inside = self._frames.around_both(low, high)
-        leaving, arriving = self._leaving[way.low, *way.looks], self._arriving[way.high, *way.looks]
+        leaving, arriving = (
+            self._leaving[directed.low, *directed.style],
+            self._arriving[directed.high, *directed.style],
+        )
         ranks = range(begin.rank + 1, end.rank)
-        hub = ("leaving", way.low) if leaving >= arriving else ("arriving", way.high)
+        hub = ("leaving", directed.low) if leaving >= arriving else ("arriving", directed.high)
         own = ranks[-1] if leaving >= arriving else ranks[0]
         if leaving == arriving == 1:
-            own = ranks[-1] if way.backward else ranks[0]
-            hub = ("alone", way.edge.key)
+            own = ranks[-1] if directed.backward else ranks[0]
+            hub = ("alone", directed.edge.key)
         bends = {
-            rank: self._bend(rank, inside, None if rank == own else (*hub, *way.looks))
+            rank: self._bend(rank, inside, None if rank == own else (*hub, *directed.style))
             for rank in ranks
         }
         if label is not None:
             bends[own].along, bends[own].across = self._parts.axes.of_size(label)
-        return Chain(
-            edge=way.edge,
+        return EdgeChain(
+            edge=directed.edge,
             boxes=(begin, *bends.values(), end),
             label=bends[own] if label is not None else None,
-            backward=way.backward,
-            first_offset=self._solids.offset(way.low),
-            last_offset=self._solids.offset(way.high),
+            backward=directed.backward,
+            first_offset=self._units.offset(directed.low),
+            last_offset=self._units.offset(directed.high),
         )
 
     def _bend(self, rank: int, inside: str, shared_by: tuple[object, ...] | None) -> Box:
@@ -165,20 +169,20 @@ def _drop_empty(group: Group) -> None:
 
 
 class _Frames:
-    """Which frames are around which solid."""
+    """The nested frames around each unit."""
 
-    def __init__(self, graph: Graph, solids: Solids) -> None:
+    def __init__(self, graph: Graph, units: LayoutUnits) -> None:
         self._clusters: dict[str, Cluster] = {cluster.key: cluster for cluster in graph.clusters}
-        self._around = {key: solid.cluster for key, solid in solids.all.items()}
+        self._around = {key: unit.cluster for key, unit in units.all.items()}
 
     def around_both(self, first: str, second: str) -> str:
         """Return the innermost cluster that holds both; empty for none."""
         outer = set(self._outwards(first))
         return next((key for key in self._outwards(second) if key in outer), "")
 
-    def _outwards(self, solid: str) -> list[str]:
+    def _outwards(self, unit: str) -> list[str]:
         found = []
-        key = self._around[solid]
+        key = self._around[unit]
         while key:
             found.append(key)
             key = self._clusters[key].parent

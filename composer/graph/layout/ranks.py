@@ -1,4 +1,4 @@
-"""The rank of each vertex: how far along the arrows it stands.
+"""Assign a rank to each vertex: its layer along the arrows.
 
 Arrows lead to a higher rank, but for the few that have to point backwards to break a cycle.
 """
@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 Pair = tuple[str, str]
 
 
-def forward(keys: Sequence[str], pairs: Sequence[Pair]) -> list[Pair]:
-    """Return the pairs with those turned round that close a cycle.
+def break_cycles(keys: Sequence[str], pairs: Sequence[Pair]) -> list[Pair]:
+    """Return the pairs, reversed where they close a cycle.
 
     Which ones is found as Eades, Lin and Smyth (1993) do: take sinks from the end, sources from
     the start, and else the vertex with the most arrows out and the fewest in.
@@ -21,19 +21,19 @@ def forward(keys: Sequence[str], pairs: Sequence[Pair]) -> list[Pair]:
     return [pair if place[pair[0]] <= place[pair[1]] else pair[::-1] for pair in pairs]
 
 
-def ranks(clusters: Mapping[str, str], pairs: Sequence[Pair]) -> dict[str, int]:
+def assign_ranks(clusters: Mapping[str, str], pairs: Sequence[Pair]) -> dict[str, int]:
     """Return the rank of each key of ``clusters``, from 0. ``pairs`` has no cycles.
 
-    What no arrow touches stands in a block together with others of its cluster.
+    Vertices without edges form a block with others of their cluster.
     """
     keys = list(clusters)
-    outgoing = _neighbours(keys, pairs)
-    incoming = _neighbours(keys, [pair[::-1] for pair in pairs])
+    outgoing = _neighbors(keys, pairs)
+    incoming = _neighbors(keys, [pair[::-1] for pair in pairs])
     order = _topological(keys, outgoing, incoming)
     found: dict[str, int] = {}
     for key in order:
         found[key] = max((found[other] + 1 for other in incoming[key]), default=0)
-    for _ in range(4):  # vertices with room to move go where their arrows are shortest
+    for _ in range(4):  # move vertices to the rank with the shortest edges
         for key in reversed(order):
             found[key] = _best_rank(key, found, incoming[key], outgoing[key])
         for key in order:
@@ -45,7 +45,7 @@ def ranks(clusters: Mapping[str, str], pairs: Sequence[Pair]) -> dict[str, int]:
     return {key: rank - lowest for key, rank in found.items()}
 
 
-def _neighbours(keys: Sequence[str], pairs: Sequence[Pair]) -> dict[str, list[str]]:
+def _neighbors(keys: Sequence[str], pairs: Sequence[Pair]) -> dict[str, list[str]]:
     neighbours: dict[str, list[str]] = {key: [] for key in keys}
     for source, target in pairs:
         if source != target:
@@ -54,8 +54,8 @@ def _neighbours(keys: Sequence[str], pairs: Sequence[Pair]) -> dict[str, list[st
 
 
 def _acyclic_order(keys: Sequence[str], pairs: Sequence[Pair]) -> list[str]:
-    outgoing = _neighbours(keys, pairs)
-    incoming = _neighbours(keys, [pair[::-1] for pair in pairs])
+    outgoing = _neighbors(keys, pairs)
+    incoming = _neighbors(keys, [pair[::-1] for pair in pairs])
     left = dict.fromkeys(keys)
     out_degree = {key: len(outgoing[key]) for key in keys}
     in_degree = {key: len(incoming[key]) for key in keys}
@@ -94,7 +94,7 @@ def _topological(
 
 
 def _best_rank(key: str, found: dict[str, int], incoming: list[str], outgoing: list[str]) -> int:
-    """Return the rank between the neighbours on both sides at which the arrows are shortest."""
+    """Return the rank between the neighbors with the shortest edges."""
     if len(incoming) == len(outgoing):
         return found[key]
     if len(incoming) > len(outgoing):
@@ -103,7 +103,7 @@ def _best_rank(key: str, found: dict[str, int], incoming: list[str], outgoing: l
 
 
 def _spread(found: dict[str, int], lonely: list[str]) -> None:
-    """Put vertices into a block that is about as wide as it is high."""
+    """Place vertices in a roughly square block."""
     columns = max(1, round(math.sqrt(len(lonely) / 2)))
     for index, key in enumerate(lonely):
         found[key] = index % columns

@@ -1,10 +1,10 @@
-"""A finished layout: what a renderer draws."""
+"""The result of a layout, for renderers."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from composer.graph.picture import Cluster, Edge
+from composer.graph.diagram import Cluster, Edge
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +15,7 @@ class Point:
     y: float
 
     def moved(self, by: Point) -> Point:
-        """Return the point so much further."""
+        """Return the point moved by an offset."""
         return Point(self.x + by.x, self.y + by.y)
 
 
@@ -28,8 +28,8 @@ class Size:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """A rectangle by its centre."""
+class Rectangle:
+    """A rectangle with its center and size."""
 
     center: Point
     size: Size
@@ -44,29 +44,29 @@ class Place:
         """The y of its upper side."""
         return self.center.y - self.size.height / 2
 
-    def row(self, below_middle: float, height: float) -> Place:
-        """Return the row of it, over all its width, that is so far below its middle."""
+    def row(self, below_middle: float, height: float) -> Rectangle:
+        """Return a row of full width, at an offset below the middle."""
         center = Point(self.center.x, self.center.y + below_middle)
-        return Place(center, Size(self.size.width, height))
+        return Rectangle(center, Size(self.size.width, height))
 
-    def moved(self, by: Point) -> Place:
-        """Return the rectangle so much further."""
-        return Place(self.center.moved(by), self.size)
+    def moved(self, by: Point) -> Rectangle:
+        """Return the rectangle moved by an offset."""
+        return Rectangle(self.center.moved(by), self.size)
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A cluster and the rectangle around what it holds."""
+    """A cluster and its rectangle."""
 
     cluster: Cluster
-    place: Place
+    place: Rectangle
 
 
 @dataclass(frozen=True, slots=True)
 class Path:
     """An edge as cubic Bézier curves: a start, then three points for each curve.
 
-    It begins at the edge's source. ``label`` is the middle of the label, where there is one.
+    It begins at the edge's source. ``label`` is the center of the label, if it has one.
     """
 
     edge: Edge
@@ -74,7 +74,7 @@ class Path:
     label: Point | None
 
     def moved(self, by: Point) -> Path:
-        """Return the path so much further."""
+        """Return the path moved by an offset."""
         return replace(
             self,
             points=tuple(point.moved(by) for point in self.points),
@@ -84,15 +84,15 @@ class Path:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Everything in its place, from (0, 0) to ``size``. Vertices are named by their keys."""
+    """The positions of everything, from (0, 0) to ``size``; vertices by key."""
 
     size: Size
-    vertices: dict[str, Place]
+    vertices: dict[str, Rectangle]
     frames: tuple[Frame, ...]  # outer ones first
     paths: tuple[Path, ...]
 
     def moved(self, by: Point) -> Layout:
-        """Return the layout with everything so much further, and as much bigger."""
+        """Return the layout moved by an offset, and enlarged by it."""
         return Layout(
             size=Size(self.size.width + by.x, self.size.height + by.y),
             vertices={key: place.moved(by) for key, place in self.vertices.items()},

@@ -4,59 +4,66 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.graph.keys import end_key, node_key
+from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
 from composer.graph.labels import rate, short_type
 from composer.graph.namespaces import Namespaces
-from composer.graph.picture import Cluster, Direction, Edge, Graph, Kind, Line, Vertex
-from composer.graph.scene import Actor, Channel, Meeting, Scene, channels
+from composer.graph.scene import (
+    Scene,
+    SceneChannel,
+    SceneEndpoint,
+    SceneNode,
+    channels,
+    node_key,
+    port_key,
+)
 from composer.graph.views.vertices import node_vertex
 from composer.model import ChannelKind
 
 
 def build(scene: Scene) -> Graph:
     """Return the graph of ports: nodes are blocks of their ports, arrows join ports."""
-    namespaces = Namespaces(actor.namespace for actor in scene.actors)
+    namespaces = Namespaces(node.namespace for node in scene.nodes)
     return Graph(
         title=scene.title,
         view="connections",
         direction=Direction.RIGHT,
-        vertices=tuple(vertex for actor in scene.actors for vertex in _ports_of(actor, namespaces)),
-        edges=tuple(edge for channel in channels(scene.actors) for edge in _edges(channel)),
+        vertices=tuple(vertex for node in scene.nodes for vertex in _ports_of(node, namespaces)),
+        edges=tuple(edge for channel in channels(scene.nodes) for edge in _edges(channel)),
         clusters=(
             *namespaces.clusters(),
-            *(_block(actor, namespaces) for actor in scene.actors if actor.ends),
+            *(_block(node, namespaces) for node in scene.nodes if node.ports),
         ),
     )
 
 
-def _block(actor: Actor, namespaces: Namespaces) -> Cluster:
+def _block(node: SceneNode, namespaces: Namespaces) -> Cluster:
     return Cluster(
-        key=node_key(actor),
-        label=actor.name,
-        parent=namespaces.around(actor.namespace),
-        details=actor.details,
+        key=node_key(node),
+        label=node.name,
+        parent=namespaces.around(node.namespace),
+        details=node.details,
         block=True,
-        namespace=actor.namespace,
-        wrong=actor.wrong,
+        namespace=node.namespace,
+        wrong=node.wrong,
     )
 
 
-def _ports_of(actor: Actor, namespaces: Namespaces) -> Iterator[Vertex]:
-    if not actor.ends:
-        yield node_vertex(actor, actor.name, actor.note, namespaces.around(actor.namespace))
-    for end in actor.ends:
+def _ports_of(node: SceneNode, namespaces: Namespaces) -> Iterator[Vertex]:
+    if not node.ports:
+        yield node_vertex(node, node.name, node.note, namespaces.around(node.namespace))
+    for port in node.ports:
         yield Vertex(
-            key=end_key(actor, end),
-            kind=Kind.PORT,
-            lines=(end.name, end.kind.value),
-            cluster=node_key(actor),
-            namespace=actor.namespace,
-            details=end.details,
-            wrong=end.wrong,
+            key=port_key(node, port),
+            kind=VertexKind.PORT,
+            lines=(port.name, port.kind.value),
+            cluster=node_key(node),
+            namespace=node.namespace,
+            details=port.details,
+            wrong=port.wrong,
         )
 
 
-def _edges(channel: Channel) -> Iterator[Edge]:
+def _edges(channel: SceneChannel) -> Iterator[Edge]:
     for source in channel.sources:
         for sink in channel.sinks:
             # A message goes from source to sink, a request from the client to the server.
@@ -67,24 +74,24 @@ def _edges(channel: Channel) -> Iterator[Edge]:
                 key=f"{source_key} -> {target_key}",
                 source=source_key,
                 target=target_key,
-                kind=Line(channel.kind.value),
+                kind=EdgeKind(channel.kind.value),
                 lines=(channel.name, *_said(source, sink)),
-                details=(("from", dict(begin.end.details)), ("to", dict(end.end.details))),
-                wrong=source.end.wrong or sink.end.wrong,
+                details=(("from", dict(begin.port.details)), ("to", dict(end.port.details))),
+                wrong=source.port.wrong or sink.port.wrong,
             )
 
 
-def _said(source: Meeting, sink: Meeting) -> Iterator[str]:
+def _said(source: SceneEndpoint, sink: SceneEndpoint) -> Iterator[str]:
     """Yield the type; of a topic the rate and the QoS of both ends, once where they agree."""
-    yield " / ".join(dict.fromkeys(short_type(end.end.interface) for end in (source, sink)))
-    if source.end.kind.channel is not ChannelKind.TOPIC:
+    yield " / ".join(dict.fromkeys(short_type(end.port.interface) for end in (source, sink)))
+    if source.port.kind.channel is not ChannelKind.TOPIC:
         return
-    if source.end.rate_hz is not None:
-        yield rate(source.end.rate_hz)
-    told = dict.fromkeys(end.end.qos for end in (source, sink) if end.end.qos)
+    if source.port.rate_hz is not None:
+        yield rate(source.port.rate_hz)
+    told = dict.fromkeys(end.port.qos for end in (source, sink) if end.port.qos)
     if told:
         yield " → ".join(told)
 
 
-def _key(meeting: Meeting) -> str:
-    return end_key(meeting.actor, meeting.end)
+def _key(endpoint: SceneEndpoint) -> str:
+    return port_key(endpoint.node, endpoint.port)

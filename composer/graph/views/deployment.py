@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.graph.keys import node_key
-from composer.graph.picture import Cluster, Direction, Edge, Graph, Line
-from composer.graph.scene import Scene, channels
+from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph
+from composer.graph.scene import Scene, channels, node_key
 from composer.graph.views.vertices import node_vertex
 from composer.model import ChannelKind
 
 #: An arrow that stands for more names than these says how many.
-_MOST_NAMES = 3
+_MAX_NAMES = 3
 
 
 def build(scene: Scene) -> Graph:
@@ -21,7 +20,7 @@ def build(scene: Scene) -> Graph:
         view="deployment",
         direction=Direction.RIGHT,
         vertices=tuple(
-            node_vertex(actor, actor.full_name, "", actor.executor) for actor in scene.actors
+            node_vertex(node, node.full_name, "", node.executor) for node in scene.nodes
         ),
         edges=tuple(_edges(scene)),
         clusters=tuple(Cluster(group.key, group.label) for group in scene.executors),
@@ -31,25 +30,25 @@ def build(scene: Scene) -> Graph:
 def _edges(scene: Scene) -> Iterator[Edge]:
     """One arrow for all that goes from one node to another in one way."""
     names: dict[tuple[str, str, ChannelKind], dict[str, None]] = {}
-    for channel in channels(scene.actors):
+    for channel in channels(scene.nodes):
         for source in channel.sources:
             for sink in channel.sinks:
-                ends = (node_key(source.actor), node_key(sink.actor))
+                keys = (node_key(source.node), node_key(sink.node))
                 if channel.kind is not ChannelKind.TOPIC:
-                    ends = ends[::-1]
-                names.setdefault((*ends, channel.kind), {})[channel.name] = None
+                    keys = keys[::-1]
+                names.setdefault((*keys, channel.kind), {})[channel.name] = None
     for (begin, end, kind), joined in sorted(names.items()):
         yield Edge(
             key=f"{begin} -> {end} {kind}",
             source=begin,
             target=end,
-            kind=Line(kind.value),
+            kind=EdgeKind(kind.value),
             lines=_label(tuple(joined), kind),
             details=(("carries", [*joined]),),
         )
 
 
 def _label(names: tuple[str, ...], kind: ChannelKind) -> tuple[str, ...]:
-    if len(names) <= _MOST_NAMES:
+    if len(names) <= _MAX_NAMES:
         return names
-    return (*names[: _MOST_NAMES - 1], f"and {len(names) - _MOST_NAMES + 1} more {kind}s")
+    return (*names[: _MAX_NAMES - 1], f"and {len(names) - _MAX_NAMES + 1} more {kind}s")

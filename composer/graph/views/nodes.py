@@ -4,28 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from composer.graph.diagram import Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
 from composer.graph.facts import channel_facts
-from composer.graph.keys import channel_key, end_key, node_key
 from composer.graph.labels import rate, short_type
 from composer.graph.namespaces import Namespaces, parent_of
-from composer.graph.picture import Direction, Edge, Graph, Kind, Line, Vertex
-from composer.graph.scene import SENDING, Channel, Meeting, Scene, channels
+from composer.graph.scene import (
+    SENDING,
+    Scene,
+    SceneChannel,
+    SceneEndpoint,
+    channel_key,
+    channels,
+    node_key,
+    port_key,
+)
 from composer.graph.views.vertices import node_vertex
 from composer.model import ChannelKind, PortKind
 
 
 def build(scene: Scene) -> Graph:
     """Return the graph of who talks to whom over what. Arrows point where data or requests go."""
-    namespaces = Namespaces(actor.namespace for actor in scene.actors)
-    joined = channels(scene.actors)
+    namespaces = Namespaces(node.namespace for node in scene.nodes)
+    joined = channels(scene.nodes)
     return Graph(
         title=scene.title,
         view="nodes",
         direction=Direction.RIGHT,
         vertices=(
             *(
-                node_vertex(actor, actor.name, actor.note, namespaces.around(actor.namespace))
-                for actor in scene.actors
+                node_vertex(node, node.name, node.note, namespaces.around(node.namespace))
+                for node in scene.nodes
             ),
             *(_channel(channel, namespaces, scene) for channel in joined),
         ),
@@ -34,11 +42,11 @@ def build(scene: Scene) -> Graph:
     )
 
 
-def _channel(channel: Channel, namespaces: Namespaces, scene: Scene) -> Vertex:
+def _channel(channel: SceneChannel, namespaces: Namespaces, scene: Scene) -> Vertex:
     measured = scene.rates_hz.get(channel.name) if channel.kind is ChannelKind.TOPIC else None
     return Vertex(
         key=channel_key(channel),
-        kind=Kind(channel.kind.value),
+        kind=VertexKind(channel.kind.value),
         lines=(
             channel.name,
             " / ".join(dict.fromkeys(map(short_type, channel.types))),
@@ -51,33 +59,33 @@ def _channel(channel: Channel, namespaces: Namespaces, scene: Scene) -> Vertex:
     )
 
 
-def _edges(channel: Channel) -> Iterator[Edge]:
+def _edges(channel: SceneChannel) -> Iterator[Edge]:
     """Yield an arrow for each port: node to channel where it sends, channel to node elsewhere."""
-    for meeting in channel.ends:
-        actor, end = meeting.actor, meeting.end
-        ends = (node_key(actor), channel_key(channel))
-        source, target = ends if end.kind in SENDING else ends[::-1]
+    for endpoint in channel.endpoints:
+        node, port = endpoint.node, endpoint.port
+        keys = (node_key(node), channel_key(channel))
+        source, target = keys if port.kind in SENDING else keys[::-1]
         yield Edge(
-            key=end_key(actor, end),
+            key=port_key(node, port),
             source=source,
             target=target,
-            kind=Line(channel.kind.value),
-            lines=_label(channel, meeting),
-            details=end.details,
-            wrong=end.wrong,
+            kind=EdgeKind(channel.kind.value),
+            lines=_label(channel, endpoint),
+            details=port.details,
+            wrong=port.wrong,
         )
 
 
-def _label(channel: Channel, meeting: Meeting) -> tuple[str, ...]:
+def _label(channel: SceneChannel, endpoint: SceneEndpoint) -> tuple[str, ...]:
     """Say the rate of a publisher, and the QoS; a subscription's only if it differs from that."""
     if channel.kind is not ChannelKind.TOPIC:
         return ()
-    end = meeting.end
+    port = endpoint.port
     lines = []
-    if end.kind is PortKind.PUBLISHER and end.rate_hz is not None:
-        lines.append(rate(end.rate_hz))
-    offered = {source.end.qos for source in channel.sources}
-    is_told = end.kind is PortKind.SUBSCRIPTION and offered == {end.qos}
-    if end.qos and not is_told:
-        lines.append(end.qos)
+    if port.kind is PortKind.PUBLISHER and port.rate_hz is not None:
+        lines.append(rate(port.rate_hz))
+    offered = {source.port.qos for source in channel.sources}
+    is_told = port.kind is PortKind.SUBSCRIPTION and offered == {port.qos}
+    if port.qos and not is_told:
+        lines.append(port.qos)
     return tuple(lines)

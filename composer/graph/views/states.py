@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from composer.graph.picture import Direction, Edge, Graph, Kind, Line, Vertex
+from composer.graph.diagram import Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
 from composer.graph.scene import Scene
 
 _STATES = ("unconfigured", "inactive", "active", "finalized")
@@ -19,12 +19,12 @@ _TRANSITIONS = (
 )
 
 #: A state with more nodes than these says how many more there are.
-_MOST_NODES = 24
+_MAX_NODES = 24
 
 
 def build(scene: Scene) -> Graph:
     """Return the state machine; each state lists the nodes that are in it."""
-    others = sorted({actor.state for actor in scene.actors} - {*_STATES, ""})
+    others = sorted({node.state for node in scene.nodes} - {*_STATES, ""})
     return Graph(
         title=scene.title,
         view="states",
@@ -32,26 +32,26 @@ def build(scene: Scene) -> Graph:
         vertices=tuple(_state(state, scene) for state in (*_STATES, *others)),
         edges=tuple(
             Edge(
-                f"state:{begin} -> state:{end}",
+                f"state:{begin} -> state:{port}",
                 f"state:{begin}",
-                f"state:{end}",
-                Line.TRANSITION,
+                f"state:{port}",
+                EdgeKind.TRANSITION,
                 (name,),
             )
-            for begin, name, end in _TRANSITIONS
+            for begin, name, port in _TRANSITIONS
         ),
     )
 
 
 def _state(state: str, scene: Scene) -> Vertex:
-    actors = [actor for actor in scene.actors if actor.state == state]
-    names = [actor.full_name for actor in actors]
-    shown = names if len(names) <= _MOST_NODES else names[: _MOST_NODES - 1]
+    nodes = [node for node in scene.nodes if node.state == state]
+    names = [node.full_name for node in nodes]
+    shown = names if len(names) <= _MAX_NODES else names[: _MAX_NODES - 1]
     more = [f"and {len(names) - len(shown)} more"] if len(names) > len(shown) else []
     return Vertex(
         key=f"state:{state}",
-        kind=Kind.STATE,
+        kind=VertexKind.STATE,
         lines=(state, *shown, *more),
         details=(("nodes", [*names]),),
-        wrong=next((actor.wrong for actor in actors if actor.wrong), ""),
+        wrong=next((node.wrong for node in nodes if node.wrong), ""),
     )

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from composer.graph.keys import node_key
-from composer.graph.picture import Kind, Vertex
-from composer.graph.scene import Actor
+from composer.graph.diagram import Vertex, VertexKind
+from composer.graph.scene import SceneNode, node_key
 
 
-def node_vertex(actor: Actor, name: str, note: str, cluster: str) -> Vertex:
+def node_vertex(node: SceneNode, name: str, note: str, cluster: str) -> Vertex:
     """Return the vertex of a node, with ``note`` below its name where there is one."""
     return Vertex(
-        key=node_key(actor),
-        kind=Kind.NODE,
+        key=node_key(node),
+        kind=VertexKind.NODE,
         lines=tuple(filter(None, (name, note))),
         cluster=cluster,
-        namespace=actor.namespace,
-        details=actor.details,
-        wrong=actor.wrong,
+        namespace=node.namespace,
+        details=node.details,
+        wrong=node.wrong,
     )

@@ -11,16 +11,16 @@ import sys
 from html.parser import HTMLParser
 
 from composer.graph import View, build_graph, html, scene_of
+from composer.graph.diagram import Graph
+from composer.graph.engines import lay_out
 from composer.graph.output import Engine, Format, render
-from composer.graph.picture import Graph
-from composer.graph.placing import placed
 from composer.loading import load
 from composer.resources import systems_folder
 from tests.unit.graph.test_renderers import EVIL, evil_graph
 
 
 def page_of(*graphs: Graph) -> str:
-    return html.render([(graph, placed(graph, Engine.BUNDLED)) for graph in graphs])
+    return html.render([(graph, lay_out(graph, Engine.BUNDLED)) for graph in graphs])
 
 
 def pipeline_page() -> str:

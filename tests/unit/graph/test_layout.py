@@ -7,9 +7,9 @@ from itertools import combinations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.graph.layout import Layout, Place, arrange
+from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
+from composer.graph.layout import Layout, Rectangle, arrange
 from composer.graph.measure import sizes
-from composer.graph.picture import Cluster, Direction, Edge, Graph, Kind, Line, Vertex
 from tests.examples import examples
 
 
@@ -23,9 +23,11 @@ def graph_of(
         title="test",
         view="nodes",
         direction=direction,
-        vertices=tuple(Vertex(key, Kind.NODE, (key,), around) for key, around in vertices.items()),
+        vertices=tuple(
+            Vertex(key, VertexKind.NODE, (key,), around) for key, around in vertices.items()
+        ),
         edges=tuple(
-            Edge(f"e{number}", begin, end, Line.TOPIC, (f"{begin} to {end}",))
+            Edge(f"e{number}", begin, end, EdgeKind.TOPIC, (f"{begin} to {end}",))
             for number, (begin, end) in enumerate(edges)
         ),
         clusters=tuple(Cluster(key, key, parent) for key, parent in clusters or []),
@@ -36,14 +38,14 @@ def laid_out(graph: Graph) -> Layout:
     return arrange(graph, sizes(graph))
 
 
-def overlap(first: Place, second: Place) -> bool:
+def overlap(first: Rectangle, second: Rectangle) -> bool:
     return (
         abs(first.center.x - second.center.x) * 2 < first.size.width + second.size.width
         and abs(first.center.y - second.center.y) * 2 < first.size.height + second.size.height
     )
 
 
-def holds(outer: Place, inner: Place) -> bool:
+def holds(outer: Rectangle, inner: Rectangle) -> bool:
     return (
         outer.left <= inner.left
         and outer.top <= inner.top
@@ -118,7 +120,7 @@ def test_nothing_overlaps_that_must_not(graph: Graph) -> None:
     for first, second in combinations(places.values(), 2):
         assert not overlap(first, second)
     labels = [
-        Place(path.label, sizes(graph).labels[path.edge.key])
+        Rectangle(path.label, sizes(graph).labels[path.edge.key])
         for path in layout.paths
         if path.label is not None
     ]

@@ -11,10 +11,10 @@ from itertools import combinations
 import pytest
 
 from composer.graph import View
-from composer.graph.layout import Layout, Place, Point, Size
+from composer.graph.diagram import Graph
+from composer.graph.engines import Engine, lay_out
+from composer.graph.layout import Layout, Point, Rectangle, Size
 from composer.graph.measure import label_size, sizes
-from composer.graph.picture import Graph
-from composer.graph.placing import Engine, placed
 from tests.unit.support.fleets import fleet_graph
 
 
@@ -27,7 +27,7 @@ class Box:
     bottom: float
 
     @classmethod
-    def of(cls, what: str, place: Place) -> Box:
+    def of(cls, what: str, place: Rectangle) -> Box:
         right, bottom = place.left + place.size.width, place.top + place.size.height
         return cls(what, place.left, place.top, right, bottom)
 
@@ -54,13 +54,13 @@ def labels(graph: Graph, layout: Layout) -> Iterator[Box]:
     """Yield boxes around what stands at edges and on frames."""
     for path in layout.paths:
         if path.label is not None:
-            yield Box.of(f"label {path.edge.key}", Place(path.label, label_size(path.edge)))
+            yield Box.of(f"label {path.edge.key}", Rectangle(path.label, label_size(path.edge)))
     needed = sizes(graph).frames
     for frame in layout.frames:
         if not frame.cluster.block:
             size = Size(needed[frame.cluster.key].width, 10.0)
             center = Point(frame.place.left + 12.0 + size.width / 2, frame.place.top + 14.0)
-            yield Box.of(f"title {frame.cluster.key}", Place(center, size))
+            yield Box.of(f"title {frame.cluster.key}", Rectangle(center, size))
 
 
 def overlaps(boxes: Sequence[Box]) -> list[tuple[str, str]]:
@@ -80,7 +80,7 @@ def laid_out(count: int, view: View, engine: Engine) -> tuple[Graph, Layout, flo
     """Return a diagram, its layout, and how long the processor worked on that, in seconds."""
     graph = fleet_graph(count, view)
     started_s = time.process_time()
-    layout = placed(graph, engine)
+    layout = lay_out(graph, engine)
     return graph, layout, time.process_time() - started_s
 
 

@@ -8,8 +8,8 @@ import struct
 import pytest
 
 from composer.graph import View, png
-from composer.graph.picture import Graph
-from composer.graph.placing import Engine, placed
+from composer.graph.diagram import Graph
+from composer.graph.engines import Engine, lay_out
 from tests.unit.support.fleets import fleet_graph
 
 
@@ -21,7 +21,7 @@ def size(data: bytes) -> tuple[int, int]:
 
 
 def drawn(graph: Graph) -> bytes:
-    return png.render(graph, placed(graph, Engine.BUNDLED))
+    return png.render(graph, lay_out(graph, Engine.BUNDLED))
 
 
 def without(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
@@ -36,7 +36,7 @@ def test_resvg_draws_it_twice_as_large_as_it_is_laid_out() -> None:
     pytest.importorskip("resvg_py")
     graph = fleet_graph(3, View.NODES)
     width, height = size(drawn(graph))
-    layout = placed(graph, Engine.BUNDLED)
+    layout = lay_out(graph, Engine.BUNDLED)
     assert width == pytest.approx(2 * layout.size.width, abs=2)
     assert height > 2 * layout.size.height  # the title is above
 

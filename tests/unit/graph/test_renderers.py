@@ -13,9 +13,9 @@ import pytest
 
 from composer.graph import View, build_graph, dot, mermaid, scene_of, svg
 from composer.graph import json as graph_json
+from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
+from composer.graph.engines import Engine
 from composer.graph.output import Format, render
-from composer.graph.picture import Cluster, Direction, Edge, Graph, Kind, Line, Vertex
-from composer.graph.placing import Engine
 from composer.loading import load
 from composer.resources import systems_folder
 
@@ -29,10 +29,10 @@ def evil_graph() -> Graph:
         view="nodes",
         direction=Direction.RIGHT,
         vertices=(
-            Vertex(f"one {EVIL}", Kind.NODE, (EVIL, "second line"), cluster=EVIL),
-            Vertex("two", Kind.TOPIC, ("graph",), wrong=EVIL),
+            Vertex(f"one {EVIL}", VertexKind.NODE, (EVIL, "second line"), cluster=EVIL),
+            Vertex("two", VertexKind.TOPIC, ("graph",), wrong=EVIL),
         ),
-        edges=(Edge("edge", f"one {EVIL}", "two", Line.TOPIC, (EVIL,), wrong=EVIL),),
+        edges=(Edge("edge", f"one {EVIL}", "two", EdgeKind.TOPIC, (EVIL,), wrong=EVIL),),
         clusters=(Cluster(EVIL, EVIL),),
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.graph import View, build_graph, live_scene_of, scene_of
-from composer.graph.picture import Graph
+from composer.graph.diagram import Graph
 from composer.model import PortKind
 from composer.qos import QosProfile, Reliability
 from tests.unit.support.resolving import system_of

@@ -4,7 +4,7 @@ from pathlib import Path
 from textwrap import dedent
 
 from composer.graph import View, build_graph, scene_of
-from composer.graph.picture import Graph
+from composer.graph.diagram import Graph
 from composer.loading import load_bytes
 from tests.unit.support.resolving import system_of
 

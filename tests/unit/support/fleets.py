@@ -7,7 +7,7 @@ from pathlib import Path
 
 from composer.diagnostics import Diagnostic
 from composer.graph import View, build_graph, scene_of
-from composer.graph.picture import Graph
+from composer.graph.diagram import Graph
 from composer.loading import load_bytes
 from composer.model import System
 

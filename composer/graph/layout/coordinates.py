@@ -1,4 +1,4 @@
-"""Straight lines: boxes and groups move towards their neighbours as far as others leave room.
+"""Assign coordinates across: move boxes and groups towards their neighbors.
 
 The order stays as it is, and so does every frame: nothing that did not overlap does so after.
 """
@@ -12,28 +12,28 @@ from itertools import groupby
 
 from composer.graph.layout.boxes import Box, Group, Item, space_between
 
-#: Sweeps carry a place over all ranks at once; rounds even out what pulls from both sides.
+#: Sweeps propagate positions over all ranks; rounds balance pulls from both sides.
 _SWEEPS = 4
 _ROUNDS = 24
-#: A round that moves nothing further than this, in pixels, is the last one.
+#: Stop after a round that moves everything less than this, in pixels.
 _STILL = 0.5
-#: A bend wants to lie in line more than a vertex does: long lines look best straight.
+#: Bends have a higher weight than vertices, to keep long edges straight.
 _BEND_WEIGHT = 4.0
 
 
 @dataclass(frozen=True, slots=True)
 class _Pull:
-    """A box of an item, and a neighbour outside it that it wants to be level with."""
+    """A box of an item, and the neighbor to align it with."""
 
     box: Box
     other: Box
-    offset: float  # of the box from the neighbour when the line between them is straight
+    offset: float  # of the box from the neighbor for a straight edge
     weight: float
 
 
 @dataclass(slots=True)
 class _Room:
-    """A child of a group, and what bounds its movement."""
+    """A child of a group, and the limits of its movement."""
 
     item: Item
     group: Group
@@ -44,8 +44,8 @@ class _Room:
     both: list[_Pull] = field(default_factory=list)
 
 
-def straighten(root: Group) -> None:
-    """Move everything towards its neighbours, across."""
+def assign_coordinates(root: Group) -> None:
+    """Move everything towards its neighbors, across."""
     rooms = _rooms(root, root)
     by_rank = sorted(rooms, key=lambda room: room.item.first_rank)
     for number in range(_SWEEPS):
@@ -63,7 +63,7 @@ def straighten(root: Group) -> None:
 
 
 def _sweep(rooms: list[_Room], root: Group, pulls: Callable[[_Room], list[_Pull]]) -> None:
-    """Go over the ranks; on each, first those at one end give way, then those at the other."""
+    """Sweep over the ranks; on each, move items from one end, then from the other."""
     for _, on_rank in groupby(rooms, key=lambda room: room.item.first_rank):
         in_order = sorted(on_rank, key=lambda room: room.item.low)
         for room in (*reversed(in_order), *in_order):
@@ -111,7 +111,7 @@ def _weight(box: Box, other: Box) -> float:
 
 
 def _move(room: _Room, root: Group, pulls: list[_Pull]) -> float:
-    """Move an item to where it is pulled, as far as there is room; return how far, across."""
+    """Move an item towards its pull within its limits; return the distance."""
     weight = wanted = 0.0
     for pull in pulls:
         weight += pull.weight

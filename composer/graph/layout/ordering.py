@@ -1,8 +1,8 @@
-"""The order of boxes across the ranks, found by the barycentre method.
+"""Order the boxes on the ranks with the barycenter method.
 
-Sweeps along the ranks, to and fro, put every box near the middle of its neighbours; a group goes
-as a whole. Of all orders seen, the one with the fewest crossings is kept, and neighbours change
-places wherever that makes it better.
+Sweeps over the ranks in both directions move every box to the mean position of its neighbors;
+groups move as a
+whole. The order with the fewest crossings is kept and improved by transposing neighbors.
 """
 
 from __future__ import annotations
@@ -11,55 +11,55 @@ from collections import deque
 from collections.abc import Callable
 
 from composer.graph.layout.boxes import Box, Group, Item, Link
-from composer.graph.layout.pack import Cost, cost, pack
-from composer.graph.layout.switch import switch
+from composer.graph.layout.packing import Cost, cost, pack
+from composer.graph.layout.transpose import transpose
 
 _SWEEPS = 12
-_VAIN_SWEEPS = 4
+_MAX_SWEEPS_WITHOUT_GAIN = 4
 _ROUNDS = 8
 
 #: The children of every group.
 _Order = list[tuple[Group, list[Item]]]
 
 
-def put_in_order(root: Group) -> None:
+def order_boxes(root: Group) -> None:
     """Sort the children of all groups for few crossings, and give every box a position."""
     by_rank = _by_rank(root)
     found = [_swept(root, by_rank, start) for start in (_as_declared, _as_reached)]
     best = min(found, key=lambda one: one[0])
     _restore(best[1])
-    _switch(root, best)
+    _transpose(root, best)
     pack(root)
 
 
 def _swept(
     root: Group, by_rank: list[list[Box]], start: Callable[[Group], None]
 ) -> tuple[Cost, _Order]:
-    """Return the best order that is met on sweeps from a start; ends when it gets no better."""
+    """Return the best order found by sweeps from a start; stop without improvement."""
     order = _children(root)
     start(root)
     pack(root)
     best = (cost(root), _children(root))
-    vain = 0
+    without_gain = 0
     for sweep in range(_SWEEPS):
         _sweep(by_rank, backwards=bool(sweep % 2))
         _sort(root)
         pack(root)
         reached = cost(root)
-        vain += 1
+        without_gain += 1
         if reached < best[0]:
             best = (reached, _children(root))
-            vain = 0
-        if vain == _VAIN_SWEEPS:
+            without_gain = 0
+        if without_gain == _MAX_SWEEPS_WITHOUT_GAIN:
             break
     _restore(order)
     return best
 
 
-def _switch(root: Group, best: tuple[Cost, _Order]) -> None:
+def _transpose(root: Group, best: tuple[Cost, _Order]) -> None:
     for _ in range(_ROUNDS):
         pack(root)
-        if not switch(root):
+        if not transpose(root):
             break
         pack(root)
         reached = cost(root)
@@ -88,11 +88,11 @@ def _restore(order: _Order) -> None:
 
 
 def _as_declared(root: Group) -> None:
-    """Leave the order as it is."""
+    """Keep the declared order."""
 
 
 def _as_reached(root: Group) -> None:
-    """Sort by the order in which boxes are reached from others: related ones come together."""
+    """Sort in breadth-first order, which keeps related boxes together."""
     number: dict[int, int] = {}
     for start in sorted(root.boxes(), key=lambda box: box.rank):
         waiting = deque([start])
@@ -109,7 +109,7 @@ def _as_reached(root: Group) -> None:
 
 
 def _sweep(by_rank: list[list[Box]], *, backwards: bool) -> None:
-    """Give every box the mean place of its neighbours on the rank before (or behind) it."""
+    """Move every box to the mean position of its neighbors on the previous (or next) rank."""
     for rank in reversed(by_rank) if backwards else by_rank:
         for box in rank:
             places = _behind(box.after) if backwards else _before(box.before)
@@ -128,7 +128,7 @@ def _behind(pieces: list[Link]) -> list[float]:
 
 
 def _push_apart(rank: list[Box]) -> None:
-    """Keep the order and the middle of a rank, and make room for every box."""
+    """Remove overlaps on a rank, keeping its order and its middle."""
     middle = sum(box.position for box in rank) / len(rank) if rank else 0.0
     end = None
     for box in rank:
@@ -141,7 +141,7 @@ def _push_apart(rank: list[Box]) -> None:
 
 
 def _sort(group: Group) -> float:
-    """Sort all children by where they are, groups by their mean; return the group's own."""
+    """Sort all children by position, groups by their mean; return the mean of the group."""
     wanted = {
         id(child): _sort(child) if isinstance(child, Group) else child.position
         for child in group.children

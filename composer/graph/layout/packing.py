@@ -1,4 +1,4 @@
-"""Everything in a given order, as close together as it may be, and what that order costs."""
+"""Pack boxes in a given order, and count the crossings of that order."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Iterable
 
 from composer.graph.layout.boxes import Group, Item, space_between
 
-#: What an order costs: crossings first, then the length of the lines across, in pixels.
+#: The cost of an order: crossings, then the total length of edges across in pixels.
 Cost = tuple[int, float]
 
 
 def pack(group: Group, start: float = 0.0) -> None:
-    """Place the children in their order, each as close to ``start`` as those before it allow."""
+    """Place the children in order, as close to ``start`` as possible."""
     group.low = start
     inside = start + group.padding + group.label
     last: dict[int, Item] = {}
@@ -30,7 +30,7 @@ def pack(group: Group, start: float = 0.0) -> None:
 
 
 def cost(root: Group) -> Cost:
-    """Return how often lines between neighbouring ranks cross, and how far they go across."""
+    """Return the number of crossings between ranks, and the length of edges across."""
     by_rank: dict[int, list[tuple[float, float]]] = {}
     for box in root.boxes():
         for piece in box.after:

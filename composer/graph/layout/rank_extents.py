@@ -1,4 +1,4 @@
-"""How wide each rank is, and where frames begin and end along the arrows."""
+"""Compute the extents of ranks and frames along the arrows."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _RANK_GAP = 22.0
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """From where to where something reaches along the arrows."""
+    """An interval along the arrows."""
 
     begin: float
     end: float
@@ -22,8 +22,8 @@ class Extent:
         return (self.begin + self.end) / 2
 
 
-def columns(root: Group, start: float) -> list[Extent]:
-    """Return the extent of each rank, with room for the frames that begin or end there."""
+def rank_extents(root: Group, start: float) -> list[Extent]:
+    """Return the extent of each rank, with space for frames that begin or end there."""
     widths = [0.0] * (root.last_rank + 1)
     for box in root.boxes():
         widths[box.rank] = max(widths[box.rank], box.along)
@@ -39,12 +39,12 @@ def columns(root: Group, start: float) -> list[Extent]:
     return found
 
 
-def reach(item: Item, ranks: list[Extent]) -> Extent:
+def extent_of(item: Item, ranks: list[Extent]) -> Extent:
     """Return the extent of a box, without the tail for its loops, or of a frame."""
     if isinstance(item, Box):
         middle = ranks[item.rank].middle
         return Extent(middle - item.along / 2, middle + item.along / 2 - item.tail)
-    inside = [reach(child, ranks) for child in item.children]
+    inside = [extent_of(child, ranks) for child in item.children]
     tails = [child.tail if isinstance(child, Box) else 0.0 for child in item.children]
     begin = min(extent.begin for extent in inside) - item.padding - item.label_along
     end = max(map(_end, inside, tails)) + item.padding

@@ -1,7 +1,7 @@
-"""What a diagram shows, before anything decides how it looks: the one value renderers read.
+"""The content of a diagram, independent of its format.
 
 Every view (``views/``) turns a system into a :class:`Graph`; every renderer (``mermaid``, ``dot``,
-``json``, ``svg``) turns a Graph into text. Neither knows of the other.
+``json``, ``svg``) turns a Graph into text.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from composer.tree import Plain
 Details = tuple[tuple[str, Plain], ...]
 
 
-class Kind(StrEnum):
-    """What a vertex stands for; renderers give each its own shape and colour."""
+class VertexKind(StrEnum):
+    """The kind of a vertex, which determines its shape and color."""
 
     NODE = "node"
     TOPIC = "topic"
@@ -26,19 +26,19 @@ class Kind(StrEnum):
     STATE = "state"
 
 
-class Line(StrEnum):
-    """What an edge stands for; renderers give each its own stroke."""
+class EdgeKind(StrEnum):
+    """The kind of an edge, which determines its stroke."""
 
     TOPIC = "topic"
     SERVICE = "service"
     ACTION = "action"
     DEPENDENCY = "dependency"
-    IMPLIED = "implied"  # a dependency that nobody wrote down
+    IMPLIED = "implied"  # a dependency that is not declared
     TRANSITION = "transition"
 
 
 class Direction(StrEnum):
-    """Where the arrows of a diagram mostly point."""
+    """The main direction of the arrows."""
 
     RIGHT = "LR"
     DOWN = "TB"
@@ -46,14 +46,14 @@ class Direction(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Vertex:
-    """Something drawn as a shape. ``key`` is unique in its graph; ``lines`` is the label.
+    """A shape with a label. ``key`` is unique in its graph; ``lines`` are the lines of the label.
 
-    ``cluster`` is the key of the cluster it stands in, empty for none; ``namespace`` is where it
-    belongs by its name. ``wrong`` is the diagnostic that colours it, empty for none.
+    ``cluster`` is the key of its cluster, or empty; ``namespace`` is the namespace of its name.
+    ``wrong`` is the diagnostic that marks it, or empty.
     """
 
     key: str
-    kind: Kind
+    kind: VertexKind
     lines: tuple[str, ...]
     cluster: str = ""
     namespace: str = "/"
@@ -68,7 +68,7 @@ class Edge:
     key: str
     source: str
     target: str
-    kind: Line
+    kind: EdgeKind
     lines: tuple[str, ...] = ()
     details: Details = ()
     wrong: str = ""
@@ -78,7 +78,7 @@ class Edge:
 class Cluster:
     """A frame around vertices and other clusters; ``parent`` is empty for the outermost.
 
-    A ``block`` is a node that shows its ports: they are all it holds, and it stays in one piece.
+    A ``block`` is a node drawn with its ports, which are its only contents.
     """
 
     key: str

@@ -1,4 +1,4 @@
-"""Bends that a line does not need: where nothing is in the way, it goes straight on."""
+"""Remove bends where an edge can run straight without hitting a box."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from composer.graph.layout.boxes import Box
-from composer.graph.layout.columns import Extent
+from composer.graph.layout.rank_extents import Extent
 
-#: A line that takes a short cut keeps so far from everything, in pixels.
+#: Minimum distance of a shortened edge from boxes, in pixels.
 _DISTANCE = 7.0
 _HALVINGS = 12
 
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """A stretch of a line, parallel to the ranks' direction, on a rank."""
+    """A straight section of an edge on a rank, along the arrows."""
 
     begin: float
     end: float
@@ -26,7 +26,7 @@ class Station:
 
 
 class Obstacles:
-    """What stands on each rank: everything but the bends of lines."""
+    """The boxes on each rank, without bends."""
 
     def __init__(self, boxes: Iterable[Box], ranks: list[Extent]) -> None:
         self._ranks = ranks
@@ -34,11 +34,11 @@ class Obstacles:
         for box in boxes:
             if box.across > 0.0:
                 self._solid[box.rank].append((box.low - _DISTANCE, box.high + _DISTANCE))
-        for solid in self._solid:
-            solid.sort()
+        for unit in self._solid:
+            unit.sort()
 
     def shortened(self, stations: list[Station]) -> list[Station]:
-        """Return the stations without those that the line can leave out."""
+        """Return the stations without unnecessary ones."""
         kept = [stations[0]]
         index = 0
         while index < len(stations) - 1:
@@ -47,7 +47,7 @@ class Obstacles:
         return kept
 
     def _furthest(self, stations: list[Station], index: int) -> int:
-        """Return the furthest station that can be reached directly from the one at ``index``."""
+        """Return the furthest station reachable in a straight line from ``index``."""
         reached = index + 1
         while not stations[reached].needed and self._is_free(stations, index, reached + 1):
             reached += 1
@@ -61,15 +61,15 @@ class Obstacles:
         extent = self._ranks[rank]
         at = sorted(_across(begin, end, along) for along in (extent.begin, extent.end))
         solid = self._solid[rank]
-        # Solid stretches do not overlap by more than their distance: the neighbours are enough.
+        # The solid parts of a rank hardly overlap: checking the neighbors is enough.
         place = bisect_left(solid, (at[1], at[1]))
         return all(high <= at[0] or low >= at[1] for low, high in solid[max(place - 2, 0) : place])
 
 
 def _across(begin: Station, end: Station, along: float) -> float:
-    """Return where the curve between two stations is, across, at a point along it.
+    """Return the position across of the curve between two stations, at a point along it.
 
-    It is the cubic that ``routes`` draws: its control points lie halfway along.
+    The curve is the cubic of ``routing``, with control points halfway along.
     """
     span = end.begin - begin.end
     if span <= 0.0:

@@ -1,20 +1,20 @@
-"""Where lines meet a vertex: anywhere on its side, or at one of its rows."""
+"""Units of the layout: vertices, and blocks whose ports are rows."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from composer.graph.diagram import Cluster, Graph, Vertex
 from composer.graph.layout.result import Size
-from composer.graph.picture import Cluster, Graph, Vertex
 
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """How big things are: vertices and clusters by key, the labels of edges by the edge's key.
+    """Sizes of vertices and clusters by key, and of edge labels by the key of the edge.
 
-    ``frames`` has the size of a cluster's label. ``blocks`` has the whole size of a cluster that
-    is a block, and ``rows`` how far below the block's middle each of its vertices stands.
+    ``frames`` are the sizes of cluster labels, ``blocks`` the sizes of whole blocks, and ``rows``
+    the offsets of vertices from the middle of their block.
     """
 
     vertices: Mapping[str, Size]
@@ -25,16 +25,16 @@ class Sizes:
 
 
 @dataclass(frozen=True, slots=True)
-class Solid:
-    """What is laid out in one piece: a vertex that is in no block, or a block."""
+class LayoutUnit:
+    """A block, or a vertex outside blocks."""
 
     key: str
     cluster: str
     size: Size
 
 
-class Solids:
-    """The solids of a graph, and where an edge to a vertex meets one."""
+class LayoutUnits:
+    """The units of a graph, and the positions where edges meet them."""
 
     def __init__(self, graph: Graph, sizes: Sizes) -> None:
         self._blocks: dict[str, Cluster] = {
@@ -42,21 +42,21 @@ class Solids:
         }
         self._rows = sizes.rows
         self._of_vertex = {vertex.key: self._key(vertex) for vertex in graph.vertices}
-        self.all: dict[str, Solid] = {}
+        self.all: dict[str, LayoutUnit] = {}
         for vertex in graph.vertices:
             block = self._blocks.get(vertex.cluster)
             if block is None:
-                solid = Solid(vertex.key, vertex.cluster, sizes.vertices[vertex.key])
+                unit = LayoutUnit(vertex.key, vertex.cluster, sizes.vertices[vertex.key])
             else:
-                solid = Solid(block.key, block.parent, sizes.blocks[block.key])
-            self.all.setdefault(solid.key, solid)
+                unit = LayoutUnit(block.key, block.parent, sizes.blocks[block.key])
+            self.all.setdefault(unit.key, unit)
 
     def key(self, vertex: str) -> str:
-        """Return the key of the solid that a vertex is, or is in."""
+        """Return the key of the unit of a vertex."""
         return self._of_vertex[vertex]
 
     def offset(self, vertex: str) -> float | None:
-        """Return how far below the middle of its solid an edge meets a vertex; None: anywhere."""
+        """Return the offset of a vertex from the middle of its unit; None for any position."""
         return self._rows.get(vertex)
 
     def _key(self, vertex: Vertex) -> str:

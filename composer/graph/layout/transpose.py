@@ -1,15 +1,15 @@
-"""Neighbours change places where that lets fewer lines cross."""
+"""Transpose neighbors where that reduces crossings."""
 
 from __future__ import annotations
 
 from composer.graph.layout.boxes import Box, Group, Item
 
-#: The pieces of line that leave an item: rank of its end, towards which rank, from where, to where.
+#: The segments that leave an item: rank, target rank, and the positions of both ends.
 _Pieces = dict[tuple[int, int], list[tuple[float, float]]]
 
 
-def switch(root: Group) -> bool:
-    """Exchange neighbours in all groups, once each, where that helps; say whether any were.
+def transpose(root: Group) -> bool:
+    """Transpose neighbors in all groups once where that helps; return whether any were.
 
     Positions are read to know the order on each rank. Only the order of the children is to be
     used after: positions are those of the new order as far as it goes without packing.
@@ -31,7 +31,7 @@ def _pass_over(group: Group) -> bool:
 
 
 def _next_in_the_way(children: list[Item], index: int) -> int | None:
-    """Return the next child that shares a rank with the one at ``index``."""
+    """Return the next child that shares a rank with the child at ``index``."""
     item = children[index]
     for other in range(index + 1, len(children)):
         following = children[other]
@@ -41,7 +41,7 @@ def _next_in_the_way(children: list[Item], index: int) -> int | None:
 
 
 def _exchange(children: list[Item], index: int, other: int) -> None:
-    """Move the child at ``index`` behind the one at ``other``; those between share no rank."""
+    """Move the child at ``index`` after the one at ``other``; none in between shares a rank."""
     first, second = children[index], children[other]
     forward, backward = second.high - first.high, first.low - second.low
     first.shift(forward)
@@ -50,7 +50,7 @@ def _exchange(children: list[Item], index: int, other: int) -> None:
 
 
 def _gain(first: Item, second: Item) -> int:
-    """Return how many crossings less there are once the second comes before the first."""
+    """Return the number of crossings saved by putting the second before the first."""
     theirs = _pieces(second)
     gain = 0
     for key, lines in _pieces(first).items():

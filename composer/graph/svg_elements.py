@@ -1,11 +1,12 @@
-"""The parts of a picture as SVG elements: what a vertex, an edge, a frame looks like."""
+"""SVG elements for vertices, edges and frames."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from html import escape
 
-from composer.graph.layout import Frame, Path, Place, Point, Size
+from composer.graph.diagram import EdgeKind, Vertex, VertexKind
+from composer.graph.layout import Frame, Path, Point, Rectangle, Size
 from composer.graph.measure import (
     EDGE_LINE_HEIGHT,
     HEAD_HEIGHT,
@@ -14,12 +15,11 @@ from composer.graph.measure import (
     ROW_INDENT,
     label_size,
 )
-from composer.graph.picture import Kind, Line, Vertex
 
 
 def markers() -> str:
-    """Return arrow heads, one for each colour: a marker cannot take its line's."""
-    kinds = [*(kind.value for kind in Line), "wrong"]
+    """Return arrow heads, one per color, since a marker cannot inherit that of its line."""
+    kinds = [*(kind.value for kind in EdgeKind), "wrong"]
     return "<defs>" + "".join(map(_marker, kinds)) + "</defs>"
 
 
@@ -32,11 +32,12 @@ def _marker(kind: str) -> str:
 
 
 def frame(item: Frame) -> Iterator[str]:
-    """Yield a frame and its name; of a block, its outline and its head."""
+    """Yield a frame with its label, or a block with its outline and head."""
     cluster, place = item.cluster, item.place
     if cluster.block:
         wrong = " wrong" if cluster.wrong else ""
-        yield f"<g {_known(cluster.key, 'node', cluster.namespace)}>{_tooltip(cluster.wrong)}"
+        data = _data_attributes(cluster.key, "node", cluster.namespace)
+        yield f"<g {data}>{_tooltip(cluster.wrong)}"
         yield _rectangle(place, 6.0, f"shape node{wrong}")
         y = place.top + HEAD_HEIGHT / 2 + 4.0
         yield f'<text x="{number(place.center.x)}" y="{number(y)}">{text(cluster.label)}</text>'
@@ -66,77 +67,79 @@ def line(path: Path) -> str:
 
 
 def label(path: Path, middle: Point) -> Iterator[str]:
-    """Yield what stands at an edge, on something that keeps it readable."""
+    """Yield the label of an edge on an opaque background."""
     lines = path.edge.lines
     yield f'<g class="label" data-label="{text(path.edge.key)}">'
-    yield _rectangle(Place(middle, label_size(path.edge)), 3.0, "label-back")
+    yield _rectangle(Rectangle(middle, label_size(path.edge)), 3.0, "label-back")
     top = middle.y - (len(lines) - 1) * EDGE_LINE_HEIGHT / 2 + 3.5
-    for index, said in enumerate(lines):
+    for index, line_text in enumerate(lines):
         y = top + index * EDGE_LINE_HEIGHT
         at = f'x="{number(middle.x)}" y="{number(y)}"'
-        yield f'<text class="edge-label" {at}>{text(said)}</text>'
+        yield f'<text class="edge-label" {at}>{text(line_text)}</text>'
     yield "</g>"
 
 
-def vertex(item: Vertex, place: Place) -> Iterator[str]:
+def vertex(item: Vertex, place: Rectangle) -> Iterator[str]:
     """Yield a vertex: its shape and the lines of text in it."""
     wrong = " wrong" if item.wrong else ""
-    yield f"<g {_known(item.key, item.kind, item.namespace)}>{_tooltip(item.wrong)}"
+    yield f"<g {_data_attributes(item.key, item.kind, item.namespace)}>{_tooltip(item.wrong)}"
     yield _shape(item.kind, place, f"shape {item.kind}{wrong}")
     top = place.center.y - (len(item.lines) - 1) * LINE_HEIGHT / 2 + 4.0
-    for index, said in enumerate(item.lines):
+    for index, line_text in enumerate(item.lines):
         faint = ' class="faint"' if index else ""
         y = top + index * LINE_HEIGHT
-        yield f'<text{faint} x="{number(place.center.x)}" y="{number(y)}">{text(said)}</text>'
+        yield f'<text{faint} x="{number(place.center.x)}" y="{number(y)}">{text(line_text)}</text>'
     yield "</g>"
 
 
-def row(item: Vertex, place: Place) -> Iterator[str]:
-    """Yield a port in its block: the name on the left, what it is on the right."""
+def row(item: Vertex, place: Rectangle) -> Iterator[str]:
+    """Yield a port as a row of its block: its name on the left, its kind on the right."""
     wrong = " wrong" if item.wrong else ""
     name, *others = item.lines
     y = number(place.center.y + 4.0)
-    yield f"<g {_known(item.key, item.kind, item.namespace)}>{_tooltip(item.wrong)}"
+    yield f"<g {_data_attributes(item.key, item.kind, item.namespace)}>{_tooltip(item.wrong)}"
     yield _rectangle(place, 0.0, f"shape {item.kind}{wrong}")
     left, right = number(place.left + ROW_INDENT), place.left + place.size.width - ROW_INDENT
     yield f'<text class="row" x="{left}" y="{y}">{text(name)}</text>'
-    for said in others:
-        yield f'<text class="row-end" x="{number(right)}" y="{y}">{text(said)}</text>'
+    for line_text in others:
+        yield f'<text class="row-end" x="{number(right)}" y="{y}">{text(line_text)}</text>'
     yield "</g>"
 
 
 def number(value: float) -> str:
-    """Write a coordinate with a tenth of a pixel: short, and the same on every machine."""
+    """Format a coordinate with one decimal: short, and the same on every machine."""
     written = f"{value:.1f}".removesuffix(".0")
     return "0" if written == "-0" else written
 
 
-def text(said: str) -> str:
-    """Write a text so that no reader of XML or HTML takes it for more than that."""
-    return escape("".join(letter if _is_shown(letter) else "\ufffd" for letter in said), quote=True)
+def text(line_text: str) -> str:
+    """Escape a text for XML and HTML."""
+    return escape(
+        "".join(letter if _is_shown(letter) else "\ufffd" for letter in line_text), quote=True
+    )
 
 
 def _is_shown(letter: str) -> bool:
-    """Say whether XML has the character at all (Extensible Markup Language 1.0, 2.2)."""
+    """Return whether XML allows the character (XML 1.0, section 2.2)."""
     return letter in "\t\n\r" or (letter >= " " and letter not in "\ufffe\uffff")
 
 
-def _known(key: str, kind: str, namespace: str) -> str:
+def _data_attributes(key: str, kind: str, namespace: str) -> str:
     return f'data-key="{text(key)}" data-kind="{kind}" data-namespace="{text(namespace)}"'
 
 
-def _shape(kind: Kind, place: Place, classes: str) -> str:
-    if kind is Kind.SERVICE:
+def _shape(kind: VertexKind, place: Rectangle, classes: str) -> str:
+    if kind is VertexKind.SERVICE:
         return f'<polygon class="{classes}" points="{_hexagon(place)}"/>'
-    radius = place.size.height / 2 if kind is Kind.TOPIC else 6.0
+    radius = place.size.height / 2 if kind is VertexKind.TOPIC else 6.0
     outline = _rectangle(place, radius, classes)
-    if kind is Kind.ACTION:
-        inner = Place(place.center, Size(place.size.width - 6.0, place.size.height - 6.0))
+    if kind is VertexKind.ACTION:
+        inner = Rectangle(place.center, Size(place.size.width - 6.0, place.size.height - 6.0))
         return outline + _rectangle(inner, 4.0, classes)
     return outline
 
 
-def _rectangle(place: Place, radius: float, classes: str) -> str:
+def _rectangle(place: Rectangle, radius: float, classes: str) -> str:
     round_corners = f' rx="{number(radius)}"' if radius else ""
     return (
         f'<rect class="{classes}" x="{number(place.left)}" y="{number(place.top)}"{round_corners}'
@@ -144,7 +147,7 @@ def _rectangle(place: Place, radius: float, classes: str) -> str:
     )
 
 
-def _hexagon(place: Place) -> str:
+def _hexagon(place: Rectangle) -> str:
     x, y = place.center.x, place.center.y
     half, high = place.size.width / 2, place.size.height / 2
     corners = [
@@ -158,8 +161,8 @@ def _hexagon(place: Place) -> str:
     return " ".join(map(_point, corners))
 
 
-def _tooltip(said: str) -> str:
-    return f"<title>{text(said)}</title>" if said else ""
+def _tooltip(line_text: str) -> str:
+    return f"<title>{text(line_text)}</title>" if line_text else ""
 
 
 def _point(point: Point) -> str:

@@ -1,35 +1,34 @@
-"""The lines: from side to side through the bends, in curves that leave and arrive straight."""
+"""Route edges through their bends as smooth curves."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
 
-from composer.graph.layout.axes import Axes
-from composer.graph.layout.boxes import Box, Chain
-from composer.graph.layout.columns import Extent, reach
+from composer.graph.layout.bend_removal import Obstacles, Station
+from composer.graph.layout.boxes import Axes, Box, EdgeChain
+from composer.graph.layout.rank_extents import Extent, extent_of
 from composer.graph.layout.result import Path
-from composer.graph.layout.shortcuts import Obstacles, Station
 
-#: How much of a vertex's side lines may use, leaving its corners free.
+#: The part of a side that edges may use, without the corners.
 _USED_SIDE = 0.6
 
 
 class Router:
-    """Draws chains once all boxes have their place; ``ranks`` are the extents along the arrows."""
+    """Routes chains after the boxes have positions; ``ranks`` are the extents of ranks."""
 
     def __init__(self, axes: Axes, ranks: list[Extent], obstacles: Obstacles) -> None:
         self._axes = axes
         self._ranks = ranks
         self._obstacles = obstacles
 
-    def paths(self, chains: list[Chain]) -> list[Path]:
-        """Return a path for each chain. Lines that share a side of a vertex are spread over it."""
+    def paths(self, chains: list[EdgeChain]) -> list[Path]:
+        """Return a path for each chain. Edges on a side of a vertex are spread over it."""
         leaving = _spread(chains, lambda chain: (chain.boxes[0], chain.boxes[1]), _first_offset)
         arriving = _spread(chains, lambda chain: (chain.boxes[-1], chain.boxes[-2]), _last_offset)
         return [self._path(chain, leaving[id(chain)], arriving[id(chain)]) for chain in chains]
 
-    def _path(self, chain: Chain, leaving: float, arriving: float) -> Path:
+    def _path(self, chain: EdgeChain, leaving: float, arriving: float) -> Path:
         stations = self._obstacles.shortened(self._stations(chain, leaving, arriving))
         points = _curve(stations)
         if chain.backward:
@@ -43,10 +42,10 @@ class Router:
             else self._axes.point(self._ranks[label.rank].middle, label.position),
         )
 
-    def _stations(self, chain: Chain, leaving: float, arriving: float) -> list[Station]:
-        """Return the stretches on which the line is parallel to the ranks' direction."""
+    def _stations(self, chain: EdgeChain, leaving: float, arriving: float) -> list[Station]:
+        """Return the straight sections of a path, along the arrows."""
         first, last = chain.boxes[0], chain.boxes[-1]
-        begin, end = reach(first, self._ranks).end, reach(last, self._ranks).begin
+        begin, end = extent_of(first, self._ranks).end, extent_of(last, self._ranks).begin
         stations = [Station(begin, begin, leaving, first.rank, needed=True)]
         for box in chain.boxes[1:-1]:
             rank = self._ranks[box.rank]
@@ -56,25 +55,25 @@ class Router:
         return [*stations, Station(end, end, arriving, last.rank, needed=True)]
 
 
-def _first_offset(chain: Chain) -> float | None:
+def _first_offset(chain: EdgeChain) -> float | None:
     return chain.first_offset
 
 
-def _last_offset(chain: Chain) -> float | None:
+def _last_offset(chain: EdgeChain) -> float | None:
     return chain.last_offset
 
 
 def _spread(
-    chains: list[Chain],
-    side: Callable[[Chain], tuple[Box, Box]],
-    fixed: Callable[[Chain], float | None],
+    chains: list[EdgeChain],
+    side: Callable[[EdgeChain], tuple[Box, Box]],
+    fixed: Callable[[EdgeChain], float | None],
 ) -> dict[int, float]:
-    """Return, by chain, where on the side of its vertex the line begins or ends, across.
+    """Return the position of each chain's end on the side of its vertex, across.
 
-    Lines that run on through the same bend leave from the same place.
+    Edges through the same bend share a position.
     """
     found = {}
-    by_box: dict[int, list[Chain]] = {}
+    by_box: dict[int, list[EdgeChain]] = {}
     for chain in chains:
         offset = fixed(chain)
         if offset is None:
