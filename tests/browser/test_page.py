@@ -26,8 +26,8 @@ PLANNER = "node:/planning/planner"
 def written(folder: Path, name: str = "pipeline") -> Path:
     """Write the page of an example system, or of a made-up one (``fleet_30``)."""
     if name.startswith("fleet_"):
-        system, findings = fleet(int(name.removeprefix("fleet_")))
-        scene = scene_of([system], findings)
+        system, diagnostics = fleet(int(name.removeprefix("fleet_")))
+        scene = scene_of([system], diagnostics)
     else:
         loading = load(systems_folder() / f"{name}.yaml")
         assert loading.system is not None
@@ -95,7 +95,7 @@ def test_a_click_on_a_line_shows_the_port_behind_it(page: Page) -> None:
     assert "nav_msgs/msg/Odometry" in page.inner_text("#about")
 
 
-def test_neighbours_are_a_click_away_and_the_rest_is_dimmed(page: Page) -> None:
+def test_neighbors_are_a_click_away_and_the_rest_is_dimmed(page: Page) -> None:
     page.click(thing(PLANNER))
     assert page.locator(f"{NODES} .near").count() > 0
     page.click("#neighbors button:has-text('/sensor_data')")
@@ -107,7 +107,9 @@ def test_neighbours_are_a_click_away_and_the_rest_is_dimmed(page: Page) -> None:
 def test_search_finds_names_and_what_is_known_and_goes_from_one_to_the_next(page: Page) -> None:
     page.keyboard.press("/")
     page.keyboard.type("odometry")
-    assert page.inner_text("#matches") == "4 found"  # the topic, and who publishes or hears it
+    assert (
+        page.inner_text("#matches") == "4 found"
+    )  # the topic, its publishers and its subscriptions
     page.keyboard.press("Enter")
     assert page.inner_text("#matches") == "1 of 4"
     assert page.inner_text("#about h2") == "/sensor_data"  # names come first
@@ -170,7 +172,7 @@ def test_zoom_by_buttons_keys_and_wheel_and_back(page: Page) -> None:
     assert scale(page) == pytest.approx(first, rel=0.01)
 
 
-def test_dragging_moves_the_picture_and_is_no_click(page: Page) -> None:
+def test_dragging_moves_the_picture_and_is_not_a_click(page: Page) -> None:
     box = page.locator(thing(PLANNER)).bounding_box()
     assert box is not None
     page.mouse.move(box["x"] + 5, box["y"] + 5)
@@ -257,7 +259,7 @@ def test_print_has_the_whole_picture_on_white_and_everything_as_text(
     assert page.pdf(prefer_css_page_size=True).startswith(b"%PDF")
 
 
-def test_a_page_with_findings_tells_them(open_file: Open, tmp_path: Path) -> None:
+def test_a_page_with_diagnostics_shows_them(open_file: Open, tmp_path: Path) -> None:
     source = tmp_path / "broken.yaml"
     source.write_text("system: broken\nnodes:\n  one: {lifecycle: {depends_on: [two]}}\n")
     loading = load(source)
@@ -268,7 +270,7 @@ def test_a_page_with_findings_tells_them(open_file: Open, tmp_path: Path) -> Non
     page = open_file(path).page
     assert page.locator("[role=tab]").count() == 0
     page.click(thing("node:/one"))
-    assert "depends on 'two'" in page.inner_text("#details .finding")
+    assert "depends on 'two'" in page.inner_text("#details .diagnostic")
 
 
 @pytest.mark.parametrize("count", [3, 30, 300])
@@ -329,6 +331,6 @@ def test_the_details_do_not_hide_what_they_are_about(
     )
     assert box is not None
     assert panel is not None
-    beside = box["x"] + box["width"] <= panel["x"]
+    is_left = box["x"] + box["width"] <= panel["x"]
     above = box["y"] + box["height"] <= panel["y"]
-    assert beside or above
+    assert is_left or above

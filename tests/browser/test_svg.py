@@ -15,7 +15,7 @@ from tests.browser.conftest import Opened
 
 
 @pytest.mark.parametrize("name", [path.stem for path in sorted(systems_folder().glob("*.yaml"))])
-def test_every_example_is_shown_and_asks_for_nothing(
+def test_every_example_is_shown_and_loads_nothing(
     name: str, open_file: Callable[..., Opened], tmp_path: Path
 ) -> None:
     loading = load(systems_folder() / f"{name}.yaml")

@@ -1,4 +1,4 @@
-"""The base of behaviours has slots, of which those who write behaviours are to notice nothing."""
+"""The base class of behaviors has slots, which do not restrict derived classes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Findings: their order, and what they may echo."""
+"""Diagnostics: their order, and what they may echo."""
 
 from __future__ import annotations
 
@@ -41,16 +41,16 @@ def at(path: str, line: int, column: int) -> Diagnostic:
 
 
 def test_order_is_that_of_the_files() -> None:
-    findings = [at("b", 1, 1), at("a", 10, 1), at("a", 2, 30), at("a", 2, 4)]
-    assert [str(finding.primary) for finding in in_order(findings)] == [
+    diagnostics = [at("b", 1, 1), at("a", 10, 1), at("a", 2, 30), at("a", 2, 4)]
+    assert [str(diagnostic.primary) for diagnostic in in_order(diagnostics)] == [
         "a:2:4", "a:2:30", "a:10:1", "b:1:1",
     ]  # fmt: skip
 
 
-def test_each_finding_once() -> None:
+def test_each_diagnostic_once() -> None:
     assert len(in_order([at("a", 1, 1), at("a", 1, 1)])) == 1
 
 
 def test_same_place_of_two_files_is_two_places() -> None:
-    findings = in_order([at("b", 1, 1), at("a", 1, 1)])
-    assert [finding.primary.file.path for finding in findings] == ["a", "b"]
+    diagnostics = in_order([at("b", 1, 1), at("a", 1, 1)])
+    assert [diagnostic.primary.file.path for diagnostic in diagnostics] == ["a", "b"]

@@ -68,7 +68,7 @@ def test_what_tools_made_is_left_alone(tmp_path: Path, made: str) -> None:
         assert find_files([folder]).files == (folder / "a.yaml",), "who names it, means it"
 
 
-def test_what_is_something_else_is_told_apart(tmp_path: Path) -> None:
+def test_yaml_files_of_other_programs_are_listed_separately(tmp_path: Path) -> None:
     (tmp_path / "other.yaml").write_text("services: {}\n")
     (tmp_path / "composer.yaml").write_text("strict: true\n")
     found = find_files([tmp_path])
@@ -86,8 +86,8 @@ def test_links_are_followed_in_the_project_only(
     (tmp_path / "d.yaml").symlink_to(tmp_path / "d.yaml")
     found = find_files([tmp_path])
     assert found.files == (tmp_path / "a.yaml", tmp_path / "b.yaml")
-    (finding,) = found.diagnostics
-    assert (str(finding.primary), finding.rule.name) == (
+    (diagnostic,) = found.diagnostics
+    assert (str(diagnostic.primary), diagnostic.rule.name) == (
         f"{tmp_path}/c.yaml:1:1",
         "unreadable-file",
     )

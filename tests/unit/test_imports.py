@@ -1,4 +1,4 @@
-"""What import-linter cannot see: the node types are no part of the package."""
+"""Imports that import-linter does not see: the node types are not part of the package."""
 
 from __future__ import annotations
 

@@ -30,9 +30,9 @@ def interfaces() -> Interfaces:
 
 def errors(loading: LoadResult) -> list[str]:
     return [
-        f"{finding.primary.file.path}:{finding.primary.line} {finding.rule.name}"
-        for finding in loading.diagnostics
-        if finding.severity is Severity.ERROR
+        f"{diagnostic.primary.file.path}:{diagnostic.primary.line} {diagnostic.rule.name}"
+        for diagnostic in loading.diagnostics
+        if diagnostic.severity is Severity.ERROR
     ]
 
 
@@ -94,7 +94,7 @@ nodes:
         assert f"{line} {rule}" in found
     assert any(item.startswith(str(tmp_path / "nodes" / "camera.yaml") + ":2 ") for item in found)
     assert not loading.is_runnable
-    places = [finding.sort_key for finding in loading.diagnostics]
+    places = [diagnostic.sort_key for diagnostic in loading.diagnostics]
     assert places == sorted(places)
 
 
@@ -103,7 +103,7 @@ def test_the_command_line_is_checked_like_the_file(tmp_path: Path, interfaces: I
     loading = load(
         path,
         overrides=OverrideOptions(
-            ("talker.speed=9.0", "talker.sped=1.0", "nobody.speed=1.0", "nonsense"), "//"
+            ("talker.speed=9.0", "talker.sped=1.0", "missing.speed=1.0", "nonsense"), "//"
         ),
         interfaces=interfaces,
     )
@@ -142,7 +142,7 @@ def test_a_good_setting_is_taken(tmp_path: Path, interfaces: Interfaces) -> None
         ("\x00", None),
     ],
 )
-def test_what_is_no_file_of_ours_has_a_finding_and_no_system(
+def test_a_file_of_another_kind_has_a_diagnostic_and_no_system(
     tmp_path: Path, interfaces: Interfaces, text: str, rule: str | None
 ) -> None:
     loading = load(write(tmp_path, text), interfaces=interfaces)
@@ -152,10 +152,10 @@ def test_what_is_no_file_of_ours_has_a_finding_and_no_system(
     assert rule in {None, loading.diagnostics[0].rule.name}
 
 
-def test_a_file_that_is_not_there_has_a_finding(tmp_path: Path, interfaces: Interfaces) -> None:
+def test_a_missing_file_has_a_diagnostic(tmp_path: Path, interfaces: Interfaces) -> None:
     loading = load(tmp_path / "missing.yaml", shown="missing.yaml", interfaces=interfaces)
     assert loading.system is None
-    assert [str(finding.primary) for finding in loading.diagnostics] == ["missing.yaml:1:1"]
+    assert [str(diagnostic.primary) for diagnostic in loading.diagnostics] == ["missing.yaml:1:1"]
 
 
 def test_text_from_elsewhere_belongs_to_a_folder(tmp_path: Path, interfaces: Interfaces) -> None:

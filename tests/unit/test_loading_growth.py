@@ -58,7 +58,7 @@ SYSTEMS: dict[str, tuple[list[tuple[str, str]], str]] = {
 
 
 def write(path: Path, parts: list[tuple[str, str]], count: int) -> None:
-    lines = ["system: large\nexecutors: {nobody: {kind: single_threaded}}\n"]
+    lines = ["system: large\nexecutors: {unused: {kind: single_threaded}}\n"]
     for heading, line in parts:
         lines += [heading, *(line.replace("#", str(number)) for number in range(count))]
     path.write_text("".join(lines))
@@ -69,7 +69,7 @@ def seconds(path: Path, rule: str) -> float:
     start_s = time.process_time()
     loading = load(path)
     taken_s = time.process_time() - start_s
-    assert rule in {finding.rule.name for finding in loading.diagnostics}
+    assert rule in {diagnostic.rule.name for diagnostic in loading.diagnostics}
     return taken_s
 
 

@@ -68,7 +68,7 @@ def test_a_link_does_not_lead_out_of_the_project(
     assert node_types.find_outside_project("relay") == link
 
 
-def test_a_folder_of_node_types_is_no_way_out_either(
+def test_a_folder_of_node_types_does_not_lead_out_of_the_project_either(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     elsewhere = tmp_path_factory.mktemp("elsewhere")

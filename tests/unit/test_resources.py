@@ -18,7 +18,7 @@ def test_a_folder_is_where_its_files_are(folder, member) -> None:
     assert (folder / member).is_file()
 
 
-def test_a_wheels_own_share_folder_wins_over_what_stands_beside_the_package(
+def test_the_share_folder_of_a_wheel_wins_over_folders_next_to_the_package(
     tmp_path, monkeypatch
 ) -> None:
     package = tmp_path / "site-packages" / "composer"

@@ -28,7 +28,7 @@ def test_a_slip_is_seen_through_among_few_names_and_among_many(
     assert Vocabulary(["planner", "motor_controller", *others]).close(name) == [meant]
 
 
-def test_numbered_names_are_told_apart_by_their_numbers() -> None:
+def test_numbered_names_differ_by_their_numbers() -> None:
     assert Vocabulary(MANY).close("camera_1234_drivr") == ["camera_1234_driver"]
     assert Vocabulary(MANY).close("amera_1234_driver") == ["camera_1234_driver"]
 

@@ -90,15 +90,15 @@ def test_a_type_alone(project: Path) -> None:
 
 
 def found(*names: str) -> list[str]:
-    findings: list[Diagnostic] = collect_diagnostics(load_files([Path(name) for name in names]))
-    return [f"{item.primary} {item.rule.name}" for item in findings]
+    diagnostics: list[Diagnostic] = collect_diagnostics(load_files([Path(name) for name in names]))
+    return [f"{item.primary} {item.rule.name}" for item in diagnostics]
 
 
 def test_a_type_that_is_extended_only_is_used(project: Path) -> None:
     assert found("s.yaml", "nodes/camera.yaml", "nodes/sensor.yaml") == []
 
 
-def test_a_mistake_is_told_where_it_is_written(project: Path) -> None:
+def test_a_mistake_is_reported_where_it_is_written(project: Path) -> None:
     write(project, "nodes/sensor.yaml", SENSOR.replace('rate_hz: "{par', 'rate_hz: "{prm'))
     write(project, "nodes/camera.yaml", CAMERA.replace("period_ms: 20", "periodms: 20"))
     assert found("nodes/camera.yaml", "s.yaml") == [
@@ -107,7 +107,7 @@ def test_a_mistake_is_told_where_it_is_written(project: Path) -> None:
     ]
 
 
-def test_a_circle_is_one_finding(project: Path) -> None:
+def test_a_cycle_is_one_diagnostic(project: Path) -> None:
     write(project, "nodes/sensor.yaml", "node: sensor\nextends: camera\n")
     assert found("s.yaml", "nodes/sensor.yaml", "nodes/camera.yaml") == [
         "nodes/camera.yaml:2:10 extends-cycle"
@@ -116,8 +116,8 @@ def test_a_circle_is_one_finding(project: Path) -> None:
 
 def test_the_other_type_is_missing(project: Path) -> None:
     write(project, "nodes/camera.yaml", CAMERA.replace("sensor", "sensr"))
-    findings = load(Path("s.yaml")).diagnostics
-    assert [(str(item.primary), item.hint) for item in findings] == [
+    diagnostics = load(Path("s.yaml")).diagnostics
+    assert [(str(item.primary), item.hint) for item in diagnostics] == [
         ("nodes/camera.yaml:2:10", "did you mean 'sensor'?")
     ]
 

@@ -1,4 +1,4 @@
-"""Systems that include systems: what comes of it, and where what is wrong with it is told."""
+"""Systems that include systems: the result, and the places of diagnostics."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_everything_in_a_file_becomes_a_part(tmp_path: Path) -> None:
     assert system.name.value == "whole"
 
 
-def test_what_a_file_says_of_all_nodes_is_said_of_its_nodes_only(tmp_path: Path) -> None:
+def test_wildcards_of_a_parameter_file_apply_to_its_nodes_only(tmp_path: Path) -> None:
     rest = "nodes: {operator: {on_activate: {log: started}}}\n"
     system = system_of(included(tmp_path, "camera.yaml", rest))
     found = {
@@ -123,12 +123,12 @@ include:
     namespace: ${side}
     prefix: ${side}_
 nodes:
-  judge:
+  referee:
     lifecycle: {depends_on: ["*_viewer"]}
     subscriptions:
       images: {type: std_msgs/msg/String, qos: sensor_data, log: "{message.data}"}
 connections:
-  - {topic: left/image, to: judge.images}
+  - {topic: left/image, to: referee.images}
 """
     loading = included(
         tmp_path, "{file: parts/pair.yaml, prefix: first_, namespace: /}", parts__pair=pair
@@ -139,19 +139,19 @@ connections:
         "/pair/left/screen/first_left_viewer",
         "/pair/right/first_right_driver",
         "/pair/right/screen/first_right_viewer",
-        "/pair/first_judge",
+        "/pair/first_referee",
     ]
-    judge = system.nodes[-1]
-    assert [str(item.node) for item in judge.depends_on] == [
+    referee = system.nodes[-1]
+    assert [str(item.node) for item in referee.depends_on] == [
         "first_left_viewer",
         "first_right_viewer",
     ]
-    assert [port.full_name for port in judge.ports] == ["/pair/left/image"]
+    assert [port.full_name for port in referee.ports] == ["/pair/left/image"]
 
 
-def test_arguments_and_where_they_are_told(tmp_path: Path) -> None:
+def test_arguments_and_the_place_of_their_diagnostics(tmp_path: Path) -> None:
     loading = included(tmp_path, "{file: camera.yaml, variables: {rate_hz: often, tpic: x}}")
-    assert told(loading.diagnostics) == [
+    assert reported(loading.diagnostics) == [
         "whole.yaml:3:46 wrong-type",
         "whole.yaml:3:59 unknown-variable",
     ]
@@ -181,17 +181,19 @@ file: camera.yaml
     assert system.executors[0].kind.value == "events"
 
 
-def told(findings: list[Diagnostic]) -> list[str]:
-    return [f"{item.primary} {item.rule.name}" for item in findings if item.rule.name not in QUIET]
+def reported(diagnostics: list[Diagnostic]) -> list[str]:
+    return [
+        f"{item.primary} {item.rule.name}" for item in diagnostics if item.rule.name not in QUIET
+    ]
 
 
-def test_a_finding_shows_the_way_to_its_file(tmp_path: Path) -> None:
+def test_a_diagnostic_shows_the_way_to_its_file(tmp_path: Path) -> None:
     wrong = "system: wrong\nnodes: {a: {lifecycle: {depends_on: [b]}}}\n"
     middle = "system: middle\ninclude: [wrong.yaml]\n"
     loading = included(tmp_path, "parts/middle.yaml", parts__middle=middle, parts__wrong=wrong)
-    [finding] = loading.diagnostics
-    assert str(finding.primary) == "parts/wrong.yaml:2:38"
-    assert [str(label.span) for label in finding.related] == [
+    [diagnostic] = loading.diagnostics
+    assert str(diagnostic.primary) == "parts/wrong.yaml:2:38"
+    assert [str(label.span) for label in diagnostic.related] == [
         "parts/middle.yaml:2:11",
         "whole.yaml:3:5",
     ]
@@ -204,11 +206,13 @@ def test_comments_silence_in_the_file_and_where_it_is_included(tmp_path: Path) -
     plain = included(tmp_path, "part.yaml", part=unheard + "\n")
     there = included(tmp_path, "part.yaml", part=unheard + comment)
     here = included(tmp_path, "part.yaml" + comment.rstrip(), part=unheard + "\n")
-    assert told(plain.diagnostics) == ["part.yaml:3:20 unheard-publisher"]
-    assert (told(there.diagnostics), told(here.diagnostics)) == ([], [])
+    assert reported(plain.diagnostics) == ["part.yaml:3:20 unheard-publisher"]
+    assert (reported(there.diagnostics), reported(here.diagnostics)) == ([], [])
 
 
-def test_a_folder_tells_each_finding_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_reports_each_diagnostic_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     wrong = """\
 system: wrong
@@ -220,7 +224,7 @@ connections:
     twice = "for_each: {side: [left, right]}, namespace: '${side}', prefix: '${side}_'"
     project(tmp_path, whole=f"system: whole\ninclude: [{{file: wrong.yaml, {twice}}}]\n")
     project(tmp_path, wrong=wrong)
-    assert told(collect_diagnostics(load_files([Path("whole.yaml"), Path("wrong.yaml")]))) == [
+    assert reported(collect_diagnostics(load_files([Path("whole.yaml"), Path("wrong.yaml")]))) == [
         "wrong.yaml:3:32 unknown-node",
         "wrong.yaml:5:28 unknown-port",
     ]
@@ -229,19 +233,19 @@ connections:
     assert len(collect_diagnostics(load_files([Path("whole.yaml"), Path("other.yaml")]))) == 2
 
 
-def test_a_circle_is_one_finding_from_wherever(
+def test_a_cycle_is_one_diagnostic_wherever_it_starts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     names = ["c", "a", "b"]
     for name, following in zip(names, ["a", "b", "c"], strict=True):
         project(tmp_path, **{name: f"system: {name}\ninclude: [{following}.yaml]\n"})
-    [finding] = collect_diagnostics(load_files([Path(f"{name}.yaml") for name in names]))
-    assert finding.message == "this includes itself: a.yaml -> b.yaml -> c.yaml -> a.yaml"
-    assert str(finding.primary) == "a.yaml:2:11"
+    [diagnostic] = collect_diagnostics(load_files([Path(f"{name}.yaml") for name in names]))
+    assert diagnostic.message == "this includes itself: a.yaml -> b.yaml -> c.yaml -> a.yaml"
+    assert str(diagnostic.primary) == "a.yaml:2:11"
 
 
-def test_node_types_and_behaviours_are_found_beside_the_included_file(tmp_path: Path) -> None:
+def test_node_types_and_behaviors_are_found_next_to_the_included_file(tmp_path: Path) -> None:
     arm = "system: arm\nnodes:\n  gripper: {type: gripper}\n  lamp: {behavior: 'lamp:Lamp'}\n"
     gripper = "node: gripper\non_activate: {log: ready}\n"
     loading = included(tmp_path, "arm/arm.yaml", arm__arm=arm, arm__nodes__gripper=gripper)
@@ -255,7 +259,7 @@ def test_node_types_and_behaviours_are_found_beside_the_included_file(tmp_path: 
     assert system.nodes[1].behavior.folder == tmp_path / "arm"
 
 
-def test_parameter_files_are_those_beside_the_included_file(tmp_path: Path) -> None:
+def test_parameter_files_are_relative_to_the_included_file(tmp_path: Path) -> None:
     arm = "system: arm\nparameter_files: [arm_parameters.yaml]\nnodes:\n"
     arm += "  arm: {parameters: {speed: {type: double, default: 1.0}}}\n"
     values = "/left/arm: {ros__parameters: {speed: 2.0}}\n"
@@ -270,16 +274,18 @@ def test_parameter_files_are_those_beside_the_included_file(tmp_path: Path) -> N
 
 def test_what_holds_for_the_whole(tmp_path: Path) -> None:
     part = "system: part\nlifecycle: {implied_dependencies: false}\nnodes: {a: {}}\n"
-    assert told(included(tmp_path, "part.yaml", part=part).diagnostics) == [
+    assert reported(included(tmp_path, "part.yaml", part=part).diagnostics) == [
         "part.yaml:2:35 include-conflict"
     ]
     direct = "system: part\ndelivery: dds\nnodes: {a: {}}\n"
-    assert told(included(tmp_path, "part.yaml", part=direct).diagnostics) == [
+    assert reported(included(tmp_path, "part.yaml", part=direct).diagnostics) == [
         "part.yaml:2:11 include-conflict"
     ]
-    assert told(included(tmp_path, "part.yaml", "delivery: dds\n", part=direct).diagnostics) == []
+    assert (
+        reported(included(tmp_path, "part.yaml", "delivery: dds\n", part=direct).diagnostics) == []
+    )
     same = "lifecycle: {implied_dependencies: false}\n"
-    assert told(included(tmp_path, "part.yaml", same, part=part).diagnostics) == []
+    assert reported(included(tmp_path, "part.yaml", same, part=part).diagnostics) == []
 
 
 def test_no_link_leads_out(tmp_path: Path) -> None:
@@ -298,10 +304,13 @@ def test_no_link_leads_out(tmp_path: Path) -> None:
 
 def test_a_file_that_is_included_twice_under_the_same_names(tmp_path: Path) -> None:
     twice = "camera.yaml\n  - {file: camera.yaml, namespace: left}"
-    [finding] = [
+    [diagnostic] = [
         item for item in included(tmp_path, twice).diagnostics if item.rule.name not in QUIET
     ]
-    assert (str(finding.primary), finding.rule.name) == ("whole.yaml:4:12", "duplicate-node-name")
+    assert (str(diagnostic.primary), diagnostic.rule.name) == (
+        "whole.yaml:4:12",
+        "duplicate-node-name",
+    )
     by_name = "camera.yaml, prefix: a_}\n  - {file: camera.yaml, prefix: b_}"
     system_of(included(tmp_path, "{file: " + by_name))
 
@@ -332,10 +341,10 @@ connections:
 """
     circle = "system: circle\ninclude: [whole.yaml]\n"
     loading = included(tmp_path, include, rest, broken="system: [\n", circle=circle)
-    assert [line.split()[1] for line in told(loading.diagnostics)] == [rule]
+    assert [line.split()[1] for line in reported(loading.diagnostics)] == [rule]
 
 
 def test_the_settings_of_the_project_hold_for_what_is_included(tmp_path: Path) -> None:
     unheard = "system: part\nnodes:\n  a: {publishers: {chatter: {type: std_msgs/msg/String, "
     files = {"part": unheard + "qos: command}}}\n", "composer": "ignore: [unheard-publisher]\n"}
-    assert told(included(tmp_path, "part.yaml", **files).diagnostics) == []
+    assert reported(included(tmp_path, "part.yaml", **files).diagnostics) == []

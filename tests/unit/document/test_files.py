@@ -14,24 +14,24 @@ from composer.document import parse_bytes, read_document
 from composer.document.limits import MAX_BYTES
 
 
-def finding_for(path: Path) -> Diagnostic:
-    tree, _, (finding,) = read_document(path, "robot.yaml")
+def diagnostic_for(path: Path) -> Diagnostic:
+    tree, _, (diagnostic,) = read_document(path, "robot.yaml")
     assert tree is None
-    return finding
+    return diagnostic
 
 
 def test_reads_a_file(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
     path.write_text("a: 1\n")
-    tree, source, findings = read_document(path)
+    tree, source, diagnostics = read_document(path)
     assert tree is not None
-    assert (source.path, source.text, findings) == (str(path), "a: 1\n", [])
+    assert (source.path, source.text, diagnostics) == (str(path), "a: 1\n", [])
 
 
-def test_shows_the_name_it_is_told(tmp_path: Path) -> None:
+def test_shows_the_given_name(tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text("a: [")
-    finding = finding_for(tmp_path / "robot.yaml")
-    assert str(finding.primary) == "robot.yaml:1:4"
+    diagnostic = diagnostic_for(tmp_path / "robot.yaml")
+    assert str(diagnostic.primary) == "robot.yaml:1:4"
 
 
 def test_follows_a_symbolic_link(tmp_path: Path) -> None:
@@ -43,59 +43,59 @@ def test_follows_a_symbolic_link(tmp_path: Path) -> None:
 
 def test_missing_file_names_a_similar_one(tmp_path: Path) -> None:
     (tmp_path / "pipeline.yaml").touch()
-    finding = finding_for(tmp_path / "pipline.yaml")
-    assert finding.message == "there is no such file"
-    assert str(finding.hint).endswith("pipeline.yaml'?")
-    assert finding_for(tmp_path / "nowhere" / "x.yaml").hint is None
+    diagnostic = diagnostic_for(tmp_path / "pipline.yaml")
+    assert diagnostic.message == "there is no such file"
+    assert str(diagnostic.hint).endswith("pipeline.yaml'?")
+    assert diagnostic_for(tmp_path / "nowhere" / "x.yaml").hint is None
 
 
 def test_folder(tmp_path: Path) -> None:
-    assert finding_for(tmp_path).message == "expected a file, found a folder"
+    assert diagnostic_for(tmp_path).message == "expected a file, found a folder"
 
 
 def test_link_in_a_circle(tmp_path: Path) -> None:
     link = tmp_path / "link.yaml"
     link.symlink_to(link)
-    assert finding_for(link).message.startswith("this file cannot be read: ")
+    assert diagnostic_for(link).message.startswith("this file cannot be read: ")
 
 
 def test_name_that_cannot_be_one() -> None:
-    assert finding_for(Path("a\0b")).rule.name == "unreadable-file"
-    assert finding_for(Path("a" * 5000)).rule.name == "unreadable-file"
+    assert diagnostic_for(Path("a\0b")).rule.name == "unreadable-file"
+    assert diagnostic_for(Path("a" * 5000)).rule.name == "unreadable-file"
 
 
 @pytest.mark.timeout(20)
 def test_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.yaml")
-    assert finding_for(tmp_path / "pipe.yaml").message == "expected a file, found a pipe"
+    assert diagnostic_for(tmp_path / "pipe.yaml").message == "expected a file, found a pipe"
 
 
 @pytest.mark.timeout(20)
 @pytest.mark.parametrize("device", ["/dev/zero", "/dev/null", "/dev/tty"])
 def test_device_is_not_opened(device: str) -> None:
-    assert finding_for(Path(device)).message == "expected a file, found a device"
+    assert diagnostic_for(Path(device)).message == "expected a file, found a device"
 
 
 def test_socket() -> None:
     # In a folder of its own with a short name: socket names have 107 characters at most.
     with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX) as server:
         server.bind(f"{folder}/s.yaml")
-        assert finding_for(Path(folder) / "s.yaml").message == "expected a file, found a socket"
+        assert diagnostic_for(Path(folder) / "s.yaml").message == "expected a file, found a socket"
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
 def test_no_permission(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
     path.touch(mode=0)
-    assert finding_for(path).message == "this file cannot be read: Permission denied"
+    assert diagnostic_for(path).message == "this file cannot be read: Permission denied"
 
 
 def test_large_file_is_not_read(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
     with path.open("wb") as file:
         file.truncate(100_000_000_000)  # holes: takes no room
-    finding = finding_for(path)
-    assert (finding.rule.name, str(finding.primary)) == ("file-too-large", "robot.yaml:1:1")
+    diagnostic = diagnostic_for(path)
+    assert (diagnostic.rule.name, str(diagnostic.primary)) == ("file-too-large", "robot.yaml:1:1")
 
 
 def test_largest_file(tmp_path: Path) -> None:
@@ -103,7 +103,7 @@ def test_largest_file(tmp_path: Path) -> None:
     path.write_bytes(b"a: 1 #".ljust(MAX_BYTES, b"x"))
     assert read_document(path)[2] == []
     path.write_bytes(b"a: 1 #".ljust(MAX_BYTES + 1, b"x"))
-    assert finding_for(path).rule.name == "file-too-large"
+    assert diagnostic_for(path).rule.name == "file-too-large"
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="there is no /proc")
@@ -126,9 +126,9 @@ def test_file_that_says_it_is_empty_and_is_not() -> None:
     ],
 )
 def test_not_utf8(data: bytes, place: str, message: str) -> None:
-    tree, _, (finding,) = parse_bytes(data, "f")
+    tree, _, (diagnostic,) = parse_bytes(data, "f")
     assert tree is None
-    assert (finding.rule.name, str(finding.primary), finding.message) == (
+    assert (diagnostic.rule.name, str(diagnostic.primary), diagnostic.message) == (
         "not-utf8",
         place,
         message,

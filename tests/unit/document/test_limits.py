@@ -1,4 +1,4 @@
-"""Input that was made to do harm: one finding with a place, at once, and without much memory."""
+"""Input that was made to do harm: one diagnostic with a place, at once, and without much memory."""
 
 from __future__ import annotations
 
@@ -69,43 +69,43 @@ ATTACKS = {
 @pytest.mark.parametrize(("text", "rule"), ATTACKS.values(), ids=ATTACKS)
 def test_attack(text: str, rule: str | None) -> None:
     started = time.process_time()
-    _, findings = parse_document(SourceFile("f", text))
+    _, diagnostics = parse_document(SourceFile("f", text))
     assert time.process_time() - started < SECONDS_ALLOWED
     if rule is None:
-        assert findings == []
+        assert diagnostics == []
     else:
-        assert {finding.rule.name for finding in findings} == {rule}
-        assert all(len(finding.message) < 300 for finding in findings)
+        assert {diagnostic.rule.name for diagnostic in diagnostics} == {rule}
+        assert all(len(diagnostic.message) < 300 for diagnostic in diagnostics)
 
 
 def test_size_is_looked_at_before_the_text() -> None:
-    _, _, findings = parse_bytes(b"\xff" * (MAX_BYTES + 1), "f")
-    assert [finding.rule.name for finding in findings] == ["file-too-large"]
-    _, findings = parse_document(SourceFile("f", " " * (MAX_BYTES + 1)))
-    assert [finding.rule.name for finding in findings] == ["file-too-large"]
+    _, _, diagnostics = parse_bytes(b"\xff" * (MAX_BYTES + 1), "f")
+    assert [diagnostic.rule.name for diagnostic in diagnostics] == ["file-too-large"]
+    _, diagnostics = parse_document(SourceFile("f", " " * (MAX_BYTES + 1)))
+    assert [diagnostic.rule.name for diagnostic in diagnostics] == ["file-too-large"]
 
 
 @pytest.mark.parametrize(("depth", "fits"), [(MAX_DEPTH, True), (MAX_DEPTH + 1, False)])
 def test_depth(depth: int, fits: bool) -> None:
     lists = depth - 1  # within one map
-    tree, findings = parse_document(SourceFile("f", f"a: {'[' * lists}{']' * lists}"))
-    assert (tree is not None, findings == []) == (fits, fits)
+    tree, diagnostics = parse_document(SourceFile("f", f"a: {'[' * lists}{']' * lists}"))
+    assert (tree is not None, diagnostics == []) == (fits, fits)
 
 
 @pytest.mark.parametrize(("lists", "fits"), [(15, True), (16, False)])
 def test_depth_through_an_alias(lists: int, fits: bool) -> None:
     brackets = "[" * 16, "]" * 16
     text = f"a: &a {brackets[0]}{brackets[1]}\nb: {'[' * lists}*a{']' * lists}"
-    tree, findings = parse_document(SourceFile("f", text))
-    assert (tree is not None, findings == []) == (fits, fits)
+    tree, diagnostics = parse_document(SourceFile("f", text))
+    assert (tree is not None, diagnostics == []) == (fits, fits)
 
 
 @pytest.mark.parametrize(("items", "fits"), [(MAX_VALUES // 10, False), (MAX_VALUES // 11, True)])
 def test_values_through_aliases_count_again(items: int, fits: bool) -> None:
     repeated = ", ".join(["*a"] * 9)
     text = f"a: &a [{','.join('x' * items)}]\nb: [{repeated}]"
-    tree, findings = parse_document(SourceFile("f", text))
-    assert (tree is not None, findings == []) == (fits, fits)
+    tree, diagnostics = parse_document(SourceFile("f", text))
+    assert (tree is not None, diagnostics == []) == (fits, fits)
 
 
 @pytest.mark.slow  # reads as much as a file may have

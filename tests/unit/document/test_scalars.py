@@ -63,8 +63,8 @@ from composer.tree import ScalarValue, plain
     ],
 )
 def test_scalar(text: str, value: ScalarValue) -> None:
-    tree, findings = parse_document(SourceFile("f", f"a: {text}"))
-    assert findings == []
+    tree, diagnostics = parse_document(SourceFile("f", f"a: {text}"))
+    assert diagnostics == []
     assert tree is not None
     found = tree.get("a")
     assert found is not None
@@ -87,8 +87,8 @@ def test_scalar(text: str, value: ScalarValue) -> None:
     ],
 )
 def test_refused_number(text: str, message: str) -> None:
-    _, findings = parse_document(SourceFile("f", f"a: {text}"))
-    assert [(finding.rule.name, finding.message) for finding in findings] == [
+    _, diagnostics = parse_document(SourceFile("f", f"a: {text}"))
+    assert [(diagnostic.rule.name, diagnostic.message) for diagnostic in diagnostics] == [
         ("bad-number", message)
     ]
-    assert (findings[0].primary.column, findings[0].primary.length) == (4, len(text))
+    assert (diagnostics[0].primary.column, diagnostics[0].primary.length) == (4, len(text))

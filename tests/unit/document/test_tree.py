@@ -10,8 +10,8 @@ from composer.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
 
 
 def parsed(text: str) -> Mapping:
-    tree, findings = parse_document(SourceFile("robot.yaml", text))
-    assert [finding.message for finding in findings] == []
+    tree, diagnostics = parse_document(SourceFile("robot.yaml", text))
+    assert [diagnostic.message for diagnostic in diagnostics] == []
     assert tree is not None
     return tree
 
@@ -136,8 +136,8 @@ def test_alias_has_the_place_of_what_it_repeats() -> None:
 
 
 def test_byte_order_mark_is_dropped() -> None:
-    tree, source, findings = parse_bytes("\ufeffa: 1".encode(), "robot.yaml")
-    assert (findings, source.text) == ([], "a: 1")
+    tree, source, diagnostics = parse_bytes("\ufeffa: 1".encode(), "robot.yaml")
+    assert (diagnostics, source.text) == ([], "a: 1")
     assert tree is not None
     assert tree.entries[0].key.span.column == 1
 

@@ -17,8 +17,8 @@ SECONDS_ALLOWED = 1.5
 
 
 def tree_of(text: str, name: str = "f") -> Mapping:
-    tree, findings = parse_document(SourceFile(name, text))
-    assert findings == []
+    tree, diagnostics = parse_document(SourceFile(name, text))
+    assert diagnostics == []
     assert tree is not None
     return tree
 
@@ -71,8 +71,8 @@ def at_x(tree: Mapping) -> Tree:
     ],
 )
 def test_value(variables: str, value: str, result: Plain) -> None:
-    tree, findings = expanded(system(variables, value))
-    assert [item.message for item in findings if item.rule.name != "unused-variable"] == []
+    tree, diagnostics = expanded(system(variables, value))
+    assert [item.message for item in diagnostics if item.rule.name != "unused-variable"] == []
     assert repr(plain(at_x(tree))) == repr(result)
 
 
@@ -93,8 +93,8 @@ TYPE = "node: t\nvariables: {a: {description: d}, b: {default: '${c}'}, c: {defa
     ],
 )
 def test_node_type(value: str, given: str, result: Plain) -> None:
-    tree, findings = expanded(TYPE + value, given)
-    assert [item.message for item in findings if item.rule.name != "unused-variable"] == []
+    tree, diagnostics = expanded(TYPE + value, given)
+    assert [item.message for item in diagnostics if item.rule.name != "unused-variable"] == []
     assert plain(at_x(tree)) == result
 
 
@@ -129,8 +129,8 @@ def test_text_keeps_its_own_place() -> None:
 
 def test_what_has_no_variables_stays_the_very_same() -> None:
     source = tree_of("system: s\nx: {y: [1, {z: text}]}")
-    tree, findings = expand(source, {})
-    assert findings == []
+    tree, diagnostics = expand(source, {})
+    assert diagnostics == []
     assert at_x(tree) is at_x(source)
 
 
@@ -179,41 +179,44 @@ def test_what_has_no_variables_stays_the_very_same() -> None:
         ),
     ],
 )  # fmt: skip
-def test_finding(text: str, rule: str, place: str, message: str, hint: str) -> None:
-    _, (finding,) = expanded(text)
-    assert (finding.rule.name, str(finding.primary)) == (rule, place)
-    assert finding.message.startswith(message)
-    assert hint in (finding.hint or "")
+def test_diagnostic(text: str, rule: str, place: str, message: str, hint: str) -> None:
+    _, (diagnostic,) = expanded(text)
+    assert (diagnostic.rule.name, str(diagnostic.primary)) == (rule, place)
+    assert diagnostic.message.startswith(message)
+    assert hint in (diagnostic.hint or "")
 
 
 def test_unknown_argument() -> None:
-    _, findings = expanded("node: relay\nvariables: {type: {}}\nx: ${type}", "{tipe: 1}")
-    assert [(str(item.primary), item.message, item.hint) for item in findings] == [
+    _, diagnostics = expanded("node: relay\nvariables: {type: {}}\nx: ${type}", "{tipe: 1}")
+    assert [(str(item.primary), item.message, item.hint) for item in diagnostics] == [
         ("system:1:8", "'relay' has no variable 'tipe'", "did you mean 'type'?")
     ]
 
 
 def test_misspelt_variable_is_not_unused_too() -> None:
-    _, findings = expanded(system("{rate: 1}", "${rat}"))
-    assert [item.rule.name for item in findings] == ["unknown-variable"]
+    _, diagnostics = expanded(system("{rate: 1}", "${rat}"))
+    assert [item.rule.name for item in diagnostics] == ["unknown-variable"]
 
 
-def test_two_circles_are_two_findings() -> None:
-    _, findings = expanded(system("{a: '${b}', b: '${a}', c: '${d}', d: '${c}'}", "1"))
-    assert [item.message.rpartition(": ")[2] for item in findings] == ["a -> b -> a", "c -> d -> c"]
+def test_two_cycles_are_two_diagnostics() -> None:
+    _, diagnostics = expanded(system("{a: '${b}', b: '${a}', c: '${d}', d: '${c}'}", "1"))
+    assert [item.message.rpartition(": ")[2] for item in diagnostics] == [
+        "a -> b -> a",
+        "c -> d -> c",
+    ]
 
 
 @pytest.mark.parametrize("section", ["5", "[a]", "null"])
-def test_section_of_another_shape_makes_no_findings_here(section: str) -> None:
-    tree, findings = expanded(system(section, "${a}"), "{b: 1}")
-    assert findings == []
+def test_a_section_of_another_shape_has_no_diagnostics_here(section: str) -> None:
+    tree, diagnostics = expanded(system(section, "${a}"), "{b: 1}")
+    assert diagnostics == []
     assert plain(at_x(tree)) == "${a}"
 
 
 @pytest.mark.parametrize("entry", ["5", "[a]", "null", "{}"])
 def test_variable_of_another_shape_has_no_value(entry: str) -> None:
-    tree, findings = expanded(f"node: t\nvariables: {{a: {entry}}}\nx: ${{a}}")
-    assert findings == []
+    tree, diagnostics = expanded(f"node: t\nvariables: {{a: {entry}}}\nx: ${{a}}")
+    assert diagnostics == []
     assert plain(at_x(tree)) == "${a}"
 
 
@@ -239,10 +242,10 @@ def doubling(value: str, last: str) -> str:
 def test_growth_is_bounded(text: str, rule: str, place: str) -> None:
     tree = tree_of(text)
     started = time.process_time()
-    result, findings = expand(tree, {})
+    result, diagnostics = expand(tree, {})
     assert time.process_time() - started < SECONDS_ALLOWED
-    assert [item.rule.name for item in findings] == [rule]
-    assert str(findings[0].primary).startswith(place)
+    assert [item.rule.name for item in diagnostics] == [rule]
+    assert str(diagnostics[0].primary).startswith(place)
     assert result is tree
 
 
@@ -250,8 +253,8 @@ def test_growth_is_bounded(text: str, rule: str, place: str) -> None:
 def test_depth(around: int, fits: bool) -> None:
     value = "[" * 10 + "]" * 10
     uses = "[" * around + "'${a}'" + "]" * around  # within the map that the file is
-    _, findings = expanded(system(f"{{a: {value}}}", uses))
-    assert [item.rule.name for item in findings] == ([] if fits else ["variables-too-large"])
+    _, diagnostics = expanded(system(f"{{a: {value}}}", uses))
+    assert [item.rule.name for item in diagnostics] == ([] if fits else ["variables-too-large"])
 
 
 MANY = 20_000
@@ -278,6 +281,6 @@ MANY = 20_000
 def test_linear(text: str) -> None:
     tree = tree_of(text)
     started = time.process_time()
-    _, findings = expand(tree, {})
+    _, diagnostics = expand(tree, {})
     assert time.process_time() - started < SECONDS_ALLOWED
-    assert all(len(item.message) < 200 and len(item.related) < 10 for item in findings)
+    assert all(len(item.message) < 200 and len(item.related) < 10 for item in diagnostics)

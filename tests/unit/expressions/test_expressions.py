@@ -227,7 +227,7 @@ def test_refusal_is_located(source: str, marked: str, message: str) -> None:
         ("sqrt + 1", "call it: sqrt(...)"),
     ],
 )
-def test_refusal_says_how_to_mend_it(source: str, hint: str) -> None:
+def test_the_error_says_how_to_fix_it(source: str, hint: str) -> None:
     with pytest.raises(ExpressionError) as caught:
         compile_expression(source)
     assert caught.value.hint == hint
@@ -277,6 +277,6 @@ def test_a_condition_holds_or_not(source: str, holds: bool) -> None:
 
 
 @pytest.mark.parametrize("source", ["count", "parameters.name", "nothing", "message"])
-def test_a_condition_that_is_no_truth_value_is_an_error(source: str) -> None:
+def test_a_condition_that_is_not_boolean_is_an_error(source: str) -> None:
     with pytest.raises(EvaluationError, match="where true or false is expected"):
         compile_expression(source).holds(SCOPE)

@@ -61,7 +61,7 @@ def test_a_chain_runs_from_left_to_right_in_a_straight_line() -> None:
     assert len({round(place.center.y, 3) for place in places}) == 1
 
 
-def test_a_chain_runs_downwards_when_asked_to() -> None:
+def test_a_chain_runs_downwards_on_request() -> None:
     graph = graph_of(dict.fromkeys("ab", ""), [("a", "b")], direction=Direction.DOWN)
     first, second = laid_out(graph).vertices.values()
     assert first.center.y < second.center.y

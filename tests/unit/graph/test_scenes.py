@@ -54,7 +54,7 @@ def test_each_system_has_its_own_executors() -> None:
     ]
 
 
-def test_a_node_that_hears_itself_has_an_arrow_to_itself() -> None:
+def test_a_node_that_subscribes_to_itself_has_an_arrow_to_itself() -> None:
     edges = build_graph(scene_of([system_of(TALKING)]), View.DEPLOYMENT).edges
     assert [(edge.source, edge.target) for edge in edges] == [("node:/echo", "node:/echo")]
 
@@ -96,13 +96,13 @@ def seen() -> Snapshot:
     )
 
 
-def test_a_running_graph_has_states_rates_and_the_qos_that_is_told() -> None:
+def test_a_running_graph_has_states_rates_and_reported_qos() -> None:
     graph = build_graph(live_scene_of(seen(), {"/t": 29.96, "/u": 5.0}))
     lines = {vertex.key: vertex.lines for vertex in graph.vertices}
     assert lines["node:/a/one"] == ("one", "active")
     assert lines["node:/a/two"] == ("two", "state unknown")
     assert lines["node:/c"] == ("c",)
-    assert lines["topic:/u"] == ("/u", "String", "5 Hz")  # from whom of two is not told
+    assert lines["topic:/u"] == ("/u", "String", "5 Hz")  # which of the two publishes is unknown
     labels = {edge.key: edge.lines for edge in graph.edges}
     assert labels["publisher:/a/one./t"] == ("30 Hz", "best_effort, volatile")
     assert labels["subscription:/a/two./t"] == ()

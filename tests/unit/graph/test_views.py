@@ -45,7 +45,7 @@ def test_messages_go_from_publisher_to_subscription_and_requests_from_client_to_
     }
 
 
-def test_the_rate_comes_from_the_timer_and_its_parameter_and_the_profile_is_said_once() -> None:
+def test_the_rate_comes_from_the_timer_and_its_parameter_and_the_profile_is_shown_once() -> None:
     lines = arrows(drawn(TALK))
     assert lines["node:/left/talker", "topic:/chatter"] == ("4 Hz", "sensor_data")
     assert lines["topic:/chatter", "node:/right/listener"] == ()
@@ -106,7 +106,7 @@ LIFECYCLE = """
 """
 
 
-def test_the_lifecycle_view_tells_the_steps_and_who_waits_for_whom() -> None:
+def test_the_lifecycle_view_shows_the_steps_and_the_dependencies() -> None:
     graph = drawn(LIFECYCLE, View.LIFECYCLE)
     assert arrows(graph) == {("node:/early", "node:/late"): ("once active",)}
     lines = {vertex.key: vertex.lines for vertex in graph.vertices}
@@ -134,13 +134,13 @@ def test_the_deployment_view_groups_nodes_by_executor() -> None:
     }
 
 
-def test_what_a_finding_points_at_is_marked() -> None:
+def test_the_position_of_a_diagnostic_is_marked() -> None:
     text = """
         system: broken
         nodes:
           fine: {publishers: {out: {type: std_msgs/msg/String, topic: /talk, qos: sensor_data}}}
           strict: {subscriptions: {talk: {type: std_msgs/msg/String, topic: /talk, qos: command}}}
-          lost: {lifecycle: {depends_on: [nobody]}}
+          lost: {lifecycle: {depends_on: [missing]}}
     """
     loading = load_bytes(dedent(text).encode(), Path("/nowhere"), shown="broken.yaml")
     assert loading.system is not None

@@ -1,4 +1,4 @@
-"""The catalogue: where definitions come from, which one wins, and what is read when."""
+"""The index: where definitions come from, which one wins, and what is read when."""
 
 from __future__ import annotations
 
@@ -141,13 +141,13 @@ def test_a_definition_that_cannot_be_read_says_why(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [b"bool \xff", b"#" * 1_000_001])
-def test_a_file_that_is_no_definition_is_not_read(tmp_path: Path, content: bytes) -> None:
+def test_a_file_that_is_not_a_definition_is_not_read(tmp_path: Path, content: bytes) -> None:
     folder = package(tmp_path, "demo_msgs", msg_A="bool ok")
     (folder / "msg" / "A.msg").write_bytes(content)
     assert Interfaces([find_packages([tmp_path])]).find("demo_msgs/msg/A") is None
 
 
-def test_only_what_is_asked_for_is_read(tmp_path: Path) -> None:
+def test_only_requested_packages_are_read(tmp_path: Path) -> None:
     installed = prefix(tmp_path, "demo_msgs", msg_A="bool a", msg_B="bool b")
     interfaces = Interfaces([installed])
     (tmp_path / "share" / "demo_msgs" / "msg" / "B.msg").write_text("nonsense")
@@ -207,6 +207,6 @@ def test_a_package_without_msg_text_is_read_from_its_type_description(tmp_path: 
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"type_description_msg": 3}', "[" * 100_000])
-def test_other_json_is_no_type_description(text: str) -> None:
+def test_other_json_is_not_a_type_description(text: str) -> None:
     with pytest.raises(ValueError, match=r"."):
         read_description("a_msgs/msg/A", text)

@@ -24,7 +24,7 @@ def test_every_interface_is_listed_for_the_generators() -> None:
     assert sorted(listed) == sorted(files)
 
 
-def test_ament_and_pip_tell_the_same_name_and_version() -> None:
+def test_ament_and_pip_have_the_same_name_and_version() -> None:
     package = ElementTree.parse(FOLDER / "package.xml").getroot()
     project = tomllib.loads((FOLDER / "pyproject.toml").read_text("utf-8"))["project"]
 

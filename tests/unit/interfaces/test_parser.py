@@ -136,7 +136,7 @@ def test_mistake_is_named_with_its_line(line: str, message_part: str) -> None:
     "name",
     ["String", "std_msgs/String", "std_msgs/msg/", "/msg/A", "../msg/A", "a/idl/A", "a/msg/a/b"],
 )
-def test_other_names_are_no_interfaces(name: str) -> None:
+def test_other_names_are_not_interfaces(name: str) -> None:
     assert split_name(name) is None
     with pytest.raises(ValueError, match="is not the name of an interface"):
         parse_definition(name, "")

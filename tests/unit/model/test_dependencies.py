@@ -1,4 +1,4 @@
-"""Who needs whom, directly or through others."""
+"""Nodes that depend on a node, directly or through others."""
 
 from __future__ import annotations
 

@@ -148,7 +148,7 @@ def test_servers_start_before_their_clients() -> None:
     assert causes(plan)["server"] == cause
 
 
-def test_what_the_system_says_goes_before_what_its_wiring_implies() -> None:
+def test_declared_dependencies_override_the_wiring() -> None:
     server = SERVING[2].removesuffix("}") + ", lifecycle: {depends_on: [client]}}"
     system = system_of(system_with(SERVING[0], SERVING[1], server))
     assert steps(bring_up(system))[:3] == ["configure client", "configure server", "configure goer"]
@@ -165,7 +165,7 @@ def test_nodes_that_serve_each_other_keep_the_order_they_are_declared_in() -> No
     assert steps(bring_up(system))[:2] == ["configure a", "configure b"]
 
 
-def test_a_node_that_calls_itself_waits_for_nobody() -> None:
+def test_a_node_that_calls_itself_does_not_wait() -> None:
     system = system_of(
         system_with(
             "a: {services: {x: {type: x/srv/X}}, clients: {y: {type: x/srv/X, service: x}}}"
@@ -180,7 +180,7 @@ def test_cycles_are_found_each_once_and_shortest() -> None:
             "free: {lifecycle: {depends_on: [a]}}",
             "c: {lifecycle: {depends_on: [a]}}",
             "b: {lifecycle: {depends_on: [c, a]}}",
-            "a: {lifecycle: {depends_on: [b, nobody]}}",
+            "a: {lifecycle: {depends_on: [b, missing]}}",
             "itself: {lifecycle: {depends_on: [itself]}}",
         )
     )

@@ -63,7 +63,7 @@ def test_where_nodes_are_wanted_while_some_are_held_down(down: tuple[str, ...], 
     assert desired_states(robot(), desired) == states(goals)
 
 
-def test_nobody_is_wanted_further_up_because_another_one_fails() -> None:
+def test_a_fault_raises_the_desired_state_of_no_other_node() -> None:
     desired = DesiredState(states("aiuii"), {"sensor": "silent"})
     assert desired_states(robot(), desired) == states("uiuii")
 
@@ -97,7 +97,7 @@ def test_dependents_pause_before_a_restart_and_resume_behind_it() -> None:
     assert str(reconcile(system, desired, states("uiiaa"), "restart 1 of 5")).splitlines() == UP
 
 
-def test_what_somebody_has_paused_by_hand_stays_paused() -> None:
+def test_a_node_that_a_user_deactivated_stays_inactive() -> None:
     system = robot()
     desired = (
         DesiredState(states("aaaaa"))
@@ -110,10 +110,10 @@ def test_what_somebody_has_paused_by_hand_stays_paused() -> None:
     assert [step.node for step in up.steps] == ["sensor", "sensor", "planner"]
 
 
-def test_nobody_is_sent_up_before_what_somebody_keeps_low_by_hand() -> None:
+def test_no_node_is_activated_before_a_dependency_that_a_user_deactivated() -> None:
     system = robot()
     desired = DesiredState(states("aiaaa"))
-    assert reconcile(system, desired, states("aiaaa"), "").steps == (), "nor is anybody taken down"
+    assert reconcile(system, desired, states("aiaaa"), "").steps == (), "no node is taken down"
     plan = reconcile(system, desired, states("aiuua"), "")
     assert [f"{step.transition} {step.node}" for step in plan.steps] == [
         "configure logger",
@@ -122,11 +122,11 @@ def test_nobody_is_sent_up_before_what_somebody_keeps_low_by_hand() -> None:
     ]
 
 
-def test_a_second_fault_of_a_node_that_is_held_down_is_none() -> None:
+def test_a_second_fault_of_a_failed_node_is_ignored() -> None:
     desired = DesiredState(states("aaaaa")).fail(fault("sensor"))
     assert decide(robot(), desired, fault("sensor"), NOW_S) is None
     assert decide(robot(), desired, fault("camera"), NOW_S) is not None
-    assert decide(robot(), desired, fault("nobody"), NOW_S) is None
+    assert decide(robot(), desired, fault("missing"), NOW_S) is None
 
 
 def test_two_nodes_that_fail_one_after_the_other_come_back_one_after_the_other() -> None:

@@ -31,8 +31,8 @@ ignore = ["RC9"]
 TALKER = "system: talker\nnodes:\n  one: {publishers: {chatter: {type: std_msgs/msg/String}}}\n"
 
 
-def told(findings: tuple[Diagnostic, ...] | list[Diagnostic]) -> list[tuple[int, int, str]]:
-    return [(item.primary.line, item.primary.column, item.message) for item in findings]
+def reported(diagnostics: tuple[Diagnostic, ...] | list[Diagnostic]) -> list[tuple[int, int, str]]:
+    return [(item.primary.line, item.primary.column, item.message) for item in diagnostics]
 
 
 def test_the_root_is_where_the_nearest_settings_are(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_without_anything_it_is_the_folder_itself(tmp_path: Path) -> None:
     assert Project.at(tmp_path).node_folders == ()
 
 
-def test_what_is_chosen_goes_before_what_is_usual(tmp_path: Path) -> None:
+def test_settings_override_the_defaults(tmp_path: Path) -> None:
     for name in ("nodes", "types", "messages", "interfaces"):
         (tmp_path / name).mkdir()
     (tmp_path / "composer.yaml").write_text("nodes: [types, nodes]\ninterfaces: [messages]\n")
@@ -84,7 +84,7 @@ def test_a_table_in_pyproject_says_the_same_with_places(tmp_path: Path) -> None:
     assert [(text.value, severity) for text, severity in settings.severity] == [
         ("unheard-publisher", Severity.WARNING)
     ]
-    ((line, column, message),) = told(project.diagnostics)
+    ((line, column, message),) = reported(project.diagnostics)
     assert (line, column) == (15, 9)
     assert message.endswith("for 'RC412', found text 'eror'")
 
@@ -112,7 +112,7 @@ def test_a_table_in_pyproject_says_the_same_with_places(tmp_path: Path) -> None:
         ("[", (1, 1, "this '[' is not closed")),
     ],
 )
-def test_a_wrong_setting_is_a_finding_at_its_place(
+def test_a_wrong_setting_is_a_diagnostic_at_its_place(
     tmp_path: Path, text: str, place: tuple[int, int, str]
 ) -> None:
     root = tmp_path / "project"
@@ -122,24 +122,24 @@ def test_a_wrong_setting_is_a_finding_at_its_place(
     (root / "composer.yaml").write_text(text)
     (root / "a.yaml").write_text("system: a\nnodes: {one: {}}\n")
     found = load(root / "a.yaml").diagnostics
-    assert told(found) == [place]
+    assert reported(found) == [place]
     assert str(found[0].primary).endswith(f"composer.yaml:{place[0]}:{place[1]}")
 
 
 def test_settings_may_be_looked_at_alone(tmp_path: Path) -> None:
     path = tmp_path / "composer.yaml"
     path.write_text("strict: true\nignore: [nothing-of-the-kind]\n")
-    assert told(load(path).diagnostics) == [(2, 10, "there is no rule 'nothing-of-the-kind'")]
+    assert reported(load(path).diagnostics) == [(2, 10, "there is no rule 'nothing-of-the-kind'")]
     path.write_text("strict: true\n")
     assert load(path).diagnostics == []
 
 
-def test_a_table_beside_a_file_is_not_read(tmp_path: Path) -> None:
+def test_a_table_next_to_a_file_is_not_read(tmp_path: Path) -> None:
     (tmp_path / "composer.yaml").write_text("# nothing yet\n")
     (tmp_path / "pyproject.toml").write_text("[tool.composer]\nstrict = true\n")
     project = Project.at(tmp_path)
     assert not project.settings.strict
-    assert [finding.message for finding in project.diagnostics] == [
+    assert [diagnostic.message for diagnostic in project.diagnostics] == [
         "the table [tool.composer] is ignored: the folder also has a composer.yaml"
     ]
 
@@ -147,11 +147,11 @@ def test_a_table_beside_a_file_is_not_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "line"), [("[tool.composer]\nstrict = yes\n", 2), ("[tool.composer]\n[[[\n", 2)]
 )
-def test_broken_toml_is_a_finding(tmp_path: Path, text: str, line: int) -> None:
+def test_broken_toml_is_a_diagnostic(tmp_path: Path, text: str, line: int) -> None:
     (tmp_path / "pyproject.toml").write_text(text)
-    (finding,) = Project.at(tmp_path).diagnostics
-    assert finding.message.startswith("this is not TOML: ")
-    assert finding.primary.line == line
+    (diagnostic,) = Project.at(tmp_path).diagnostics
+    assert diagnostic.message.startswith("this is not TOML: ")
+    assert diagnostic.primary.line == line
 
 
 @pytest.mark.parametrize(
@@ -176,9 +176,9 @@ def test_settings_are_not_read_from_elsewhere(
     secret = tmp_path_factory.mktemp("elsewhere") / "secret"
     secret.write_text("password: secret\n")
     (tmp_path / "composer.yaml").symlink_to(secret)
-    (finding,) = Project.at(tmp_path).diagnostics
-    assert finding.message == "this is a symbolic link out of the project"
-    assert finding.primary.file.text == ""
+    (diagnostic,) = Project.at(tmp_path).diagnostics
+    assert diagnostic.message == "this is a symbolic link out of the project"
+    assert diagnostic.primary.file.text == ""
 
 
 def test_rules_are_ignored_selected_and_weighed_but_errors_stay(tmp_path: Path) -> None:

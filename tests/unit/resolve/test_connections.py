@@ -100,9 +100,9 @@ def test_a_connection_may_write_its_profile_out() -> None:
     assert system.connections[0].qos is None
 
 
-def test_what_a_connection_names_and_nobody_has_stays_as_written() -> None:
+def test_an_unknown_name_in_a_connection_stays_as_written() -> None:
     system = system_of(
-        NODES + "    connections:\n      - {topic: data, from: nobody.out, to: [b.no, b, '']}\n"
+        NODES + "    connections:\n      - {topic: data, from: missing.out, to: [b.no, b, '']}\n"
     )
     (data,) = system.connections
     assert [str(end.text) for end in data.sinks] == ["b.no", "b", ""]

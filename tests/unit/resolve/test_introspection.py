@@ -35,7 +35,7 @@ def load_system(folder: Path, text: str) -> System:
     return system
 
 
-def test_everything_is_offered_unless_somebody_gives_it_up(tmp_path: Path) -> None:
+def test_everything_is_offered_by_default(tmp_path: Path) -> None:
     system = load_system(tmp_path, "system: robot\nnodes: {plain: {}}\n")
     assert system.nodes[0].introspection == DEFAULT_INTROSPECTION
     assert DEFAULT_INTROSPECTION.left_to_manager == ()

@@ -69,7 +69,7 @@ def test_a_system_says_what_is_in_it() -> None:
     assert quoted(talker.span) == "talker"
     assert listener.executor is None
     assert system.node("listener") is listener
-    assert system.node("nobody") is None
+    assert system.node("missing") is None
 
 
 def test_namespaces_are_below_the_systems_unless_absolute() -> None:
@@ -105,11 +105,11 @@ def test_dependencies_are_a_list_or_a_map() -> None:
     system = system_of("""\
         system: robot
         nodes:
-          a: {lifecycle: {depends_on: [b, nobody]}}
+          a: {lifecycle: {depends_on: [b, missing]}}
           b: {lifecycle: {depends_on: {c: inactive, d: active}, autostart: unconfigured}}
         """)
     a, b = system.nodes
-    assert [item.node.value for item in a.depends_on] == ["b", "nobody"]
+    assert [item.node.value for item in a.depends_on] == ["b", "missing"]
     assert {item.state for item in a.depends_on} == {PrimaryState.ACTIVE}
     span = a.span
     assert b.depends_on == (
@@ -219,10 +219,10 @@ def test_of_an_unknown_type_nothing_is_known() -> None:
     assert (front.ports, front.parameters, front.unknown) == ((), (), ())
 
 
-def test_a_type_file_with_errors_tells_them_once_and_is_not_complete(nodes: Path) -> None:
+def test_a_type_file_with_errors_reports_them_once_and_is_incomplete(nodes: Path) -> None:
     (nodes / "broken.yaml").write_text("node: broken\nservices: [\n")
     (nodes / "system.yaml").write_text("system: robot\n")
-    system, findings = resolve_text(
+    system, diagnostics = resolve_text(
         """\
         system: robot
         nodes:
@@ -233,19 +233,19 @@ def test_a_type_file_with_errors_tells_them_once_and_is_not_complete(nodes: Path
         nodes,
     )
     assert [(node.type_found, node.complete) for node in system.nodes] == [(True, False)] * 3
-    paths = [Path(finding.primary.file.path).name for finding in findings]
+    paths = [Path(diagnostic.primary.file.path).name for diagnostic in diagnostics]
     assert paths == ["broken.yaml", "system.yaml"]
-    assert findings[1].rule.name == "wrong-kind-of-file"
-    assert "is a system, not a node type" in findings[1].message
+    assert diagnostics[1].rule.name == "wrong-kind-of-file"
+    assert "is a system, not a node type" in diagnostics[1].message
 
 
-def test_an_error_in_an_expression_of_a_type_is_told_once(nodes: Path) -> None:
+def test_an_error_in_an_expression_of_a_type_is_reported_once(nodes: Path) -> None:
     (nodes / "broken.yaml").write_text(
         "node: broken\nvariables: {text: {default: a}}\ndescription: ${text}\n"
         "timers: {tick: {period_ms: 5, when: 1 +}}\n"
         "publishers: {out: {type: std_msgs/msg/String}}\n"
     )
-    _, findings = resolve_text(
+    _, diagnostics = resolve_text(
         """\
         system: robot
         nodes:
@@ -255,7 +255,7 @@ def test_an_error_in_an_expression_of_a_type_is_told_once(nodes: Path) -> None:
         """,
         nodes,
     )
-    assert [finding.rule.name for finding in findings] == ["invalid-expression"]
+    assert [diagnostic.rule.name for diagnostic in diagnostics] == ["invalid-expression"]
 
 
 def test_a_node_type_alone_is_a_system_of_one(nodes: Path) -> None:
@@ -287,21 +287,21 @@ def test_a_variable_without_value_makes_nothing_wrong() -> None:
     assert len(relay.timers) == 1
 
 
-def test_a_file_that_is_neither_has_a_finding(tmp_path: Path) -> None:
+def test_a_file_of_neither_kind_has_a_diagnostic(tmp_path: Path) -> None:
     source = SourceFile("compose.yaml", "nodes: {}\n")
     tree, _ = parse_document(source)
     assert tree is not None
-    system, (finding,) = resolve(tree, source, NodeTypes.for_file(tmp_path / "compose.yaml"))
+    system, (diagnostic,) = resolve(tree, source, NodeTypes.for_file(tmp_path / "compose.yaml"))
     assert system is None
-    assert finding.message == "'compose.yaml' is neither a system nor a node type"
-    assert quoted(finding.primary) == "nodes"
+    assert diagnostic.message == "'compose.yaml' is neither a system nor a node type"
+    assert quoted(diagnostic.primary) == "nodes"
 
 
 def test_a_variable_without_default_must_be_given(tmp_path: Path) -> None:
     (tmp_path / "relay.yaml").write_text(
         "node: relay\nvariables: {kind: {}}\nsubscriptions: {in: {type: '${kind}'}}\n"
     )
-    system, findings = resolve_text(
+    system, diagnostics = resolve_text(
         """\
         system: robot
         nodes:
@@ -311,13 +311,13 @@ def test_a_variable_without_default_must_be_given(tmp_path: Path) -> None:
         """,
         tmp_path,
     )
-    assert [(finding.rule.name, finding.primary.line) for finding in findings] == [
+    assert [(diagnostic.rule.name, diagnostic.primary.line) for diagnostic in diagnostics] == [
         ("missing-variable", 4),
         ("missing-variable", 5),
     ]
-    assert findings[0].message == "node type 'relay' needs a value for its variable 'kind'"
-    assert quoted(findings[0].primary) == "relay"
-    assert quoted(findings[0].related[0].span) == "kind"
+    assert diagnostics[0].message == "node type 'relay' needs a value for its variable 'kind'"
+    assert quoted(diagnostics[0].primary) == "relay"
+    assert quoted(diagnostics[0].related[0].span) == "kind"
     assert [node.ports[0].interface.value for node in system.nodes] == [
         "x/msg/X",
         "${kind}",
@@ -325,12 +325,12 @@ def test_a_variable_without_default_must_be_given(tmp_path: Path) -> None:
     ]
 
 
-def test_what_is_wrong_in_an_argument_is_told_at_every_argument(tmp_path: Path) -> None:
+def test_a_mistake_in_an_argument_is_reported_at_every_argument(tmp_path: Path) -> None:
     (tmp_path / "filter.yaml").write_text(
         "node: filter\nvariables: {condition: {}, count: {default: 1}}\n"
         "subscriptions: {in: {type: x/msg/X, when: '${condition}', required: '${count}'}}\n"
     )
-    _, findings = resolve_text(
+    _, diagnostics = resolve_text(
         """\
         system: robot
         nodes:
@@ -341,5 +341,5 @@ def test_what_is_wrong_in_an_argument_is_told_at_every_argument(tmp_path: Path) 
         """,
         tmp_path,
     )
-    assert [finding.primary.line for finding in findings] == [3, 4, 5, 6]
-    assert {finding.primary.file.path for finding in findings} == {"robot.yaml"}
+    assert [diagnostic.primary.line for diagnostic in diagnostics] == [3, 4, 5, 6]
+    assert {diagnostic.primary.file.path for diagnostic in diagnostics} == {"robot.yaml"}

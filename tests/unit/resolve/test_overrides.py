@@ -39,8 +39,8 @@ def test_of_two_settings_the_last_counts() -> None:
     ("text", "value"), [("true", True), ("'2'", "2"), ("NO", "NO"), ("a=b", "a=b"), ("0x10", 16)]
 )
 def test_values_are_yaml(text: str, value: object) -> None:
-    overrides, findings = read_overrides(OverrideOptions((f"planner.flag={text}",)))
-    assert findings == []
+    overrides, diagnostics = read_overrides(OverrideOptions((f"planner.flag={text}",)))
+    assert diagnostics == []
     scalar = overrides.by_node["planner"]["flag"].value
     assert scalar.value == value
     assert quoted(scalar.span).strip("'") == str(text).strip("'")
@@ -57,16 +57,16 @@ def test_what_is_not_there_is_unknown() -> None:
 
 @pytest.mark.parametrize("text", ["", "=", "planner", "planner=1", "planner.=1", ".x=1", "a.b"])
 def test_what_has_no_such_form_is_refused(text: str) -> None:
-    _, findings = resolve_text(SYSTEM, settings=["planner.max_velocity=2.0", text])
-    assert [finding.rule.name for finding in findings] == ["invalid-override"]
-    assert findings[0].primary.line == 2
+    _, diagnostics = resolve_text(SYSTEM, settings=["planner.max_velocity=2.0", text])
+    assert [diagnostic.rule.name for diagnostic in diagnostics] == ["invalid-override"]
+    assert diagnostics[0].primary.line == 2
 
 
-def test_a_value_that_is_not_yaml_is_a_finding_at_its_place() -> None:
-    _, findings = resolve_text(SYSTEM, settings=["planner.max_velocity=[1, 2"])
-    assert findings
-    assert all(finding.primary.file.path == "--set" for finding in findings)
-    assert findings[0].primary.file.line(1) == "planner.max_velocity=[1, 2"
+def test_a_value_that_is_not_yaml_is_a_diagnostic_at_its_place() -> None:
+    _, diagnostics = resolve_text(SYSTEM, settings=["planner.max_velocity=[1, 2"])
+    assert diagnostics
+    assert all(diagnostic.primary.file.path == "--set" for diagnostic in diagnostics)
+    assert diagnostics[0].primary.file.line(1) == "planner.max_velocity=[1, 2"
 
 
 def test_a_setting_of_a_node_type_alone() -> None:

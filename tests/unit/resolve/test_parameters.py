@@ -17,7 +17,7 @@ def start_value(parameter: Parameter) -> Plain:
     return parameter.value.value if parameter.value is not None else None
 
 
-def test_a_declaration_says_all_there_is_to_a_parameter() -> None:
+def test_a_declaration_describes_the_whole_parameter() -> None:
     system = system_of("""\
         system: robot
         nodes:
@@ -98,7 +98,7 @@ def test_a_bare_value_declares_a_parameter_of_its_type(
     ("written", "kind"),
     [("null", "${}"), ("'${x}'", "${}"), ("['${x}']", "${}"), ("[]", ""), ("[1, a]", "")],
 )
-def test_a_bare_value_may_tell_no_type(written: str, kind: str) -> None:
+def test_a_bare_value_may_have_no_type(written: str, kind: str) -> None:
     system = system_of(f"system: robot\nnodes: {{robot: {{parameters: {{p: {written}}}}}}}\n")
     assert parameters(system)["p"].type.value == kind
 

@@ -49,7 +49,7 @@ def test_a_port_is_called_as_its_kind_of_channel_says() -> None:
     assert [port.full_name for port in node.ports] == ["/plans", "/going"]
 
 
-def test_clients_wait_five_seconds_unless_told_otherwise() -> None:
+def test_clients_wait_five_seconds_by_default() -> None:
     node = node_of(
         "{clients: {a: {type: a/srv/B}, b: {type: a/srv/B, timeout_ms: 200}},"
         " action_clients: {c: {type: a/action/B, result_timeout_ms: 60000}},"
@@ -164,13 +164,13 @@ def test_a_timer_says_how_often(written: str, value: object, unit: PeriodUnit) -
         ('{action_servers: {g: {type: x/action/X, accept: "__import__"}}}', "__import__"),
     ],
 )
-def test_what_does_not_compile_is_told_where_it_stands(body: str, at: str) -> None:
-    _, findings = resolve_text(f"system: robot\nnodes:\n  robot: {body}\n")
-    assert [finding.rule.name for finding in findings] == ["invalid-expression"]
-    assert at in quoted(findings[0].primary) or quoted(findings[0].primary) in at
+def test_a_syntax_error_is_reported_at_its_place(body: str, at: str) -> None:
+    _, diagnostics = resolve_text(f"system: robot\nnodes:\n  robot: {body}\n")
+    assert [diagnostic.rule.name for diagnostic in diagnostics] == ["invalid-expression"]
+    assert at in quoted(diagnostics[0].primary) or quoted(diagnostics[0].primary) in at
 
 
-def test_a_node_keeps_what_is_right_beside_what_is_wrong() -> None:
+def test_a_node_keeps_the_valid_ports() -> None:
     system, _ = resolve_text("""\
         system: robot
         nodes:
@@ -182,7 +182,7 @@ def test_a_node_keeps_what_is_right_beside_what_is_wrong() -> None:
         connections: {a: b}
         """)
     robot, other = system.nodes
-    # What is judged by nobody stands for what is missing: one mistake, one finding.
+    # An unchecked placeholder replaces the missing part: one mistake, one diagnostic.
     assert [str(port.interface) for port in robot.ports] == ["${}", "${}", "x/msg/X"]
     assert [timer.name.value for timer in robot.timers] == ["t", "u"]
     assert other.ports == ()

@@ -48,7 +48,7 @@ def test_ports_take_profiles_by_name_or_inline() -> None:
     assert port(system, "plain").qos.profile == QosProfile(depth=3)
 
 
-def test_what_is_left_out_is_rclpys_default_and_known_to_be_implicit() -> None:
+def test_omitted_policies_have_rclpys_default_and_are_implicit() -> None:
     system = system_of(PROFILES)
     implicit = port(system, "implicit").qos
     assert (implicit.profile, implicit.explicit) == (PRESETS["command"], False)
@@ -94,7 +94,7 @@ def test_profiles_that_extend_each_other_in_a_circle_still_give_something() -> N
     assert profiles["lost"] == QosProfile(depth=8)
 
 
-def test_a_long_chain_of_profiles_is_no_trouble() -> None:
+def test_a_long_chain_of_profiles_is_resolved() -> None:
     lines = [f"  p{number}: {{extends: p{number + 1}}}" for number in range(5000)]
     text = "\n".join(["system: robot", "qos_profiles:", *lines, "  p5000: {depth: 3}"])
     system = system_of(text + "\nnodes: {robot: {}}\n")

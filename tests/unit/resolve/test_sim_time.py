@@ -1,4 +1,4 @@
-"""``use_sim_time``: who says it, and who goes before whom."""
+"""``use_sim_time``: where it may be set, and what takes precedence."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def value(system: System, name: str) -> Plain:
     return parameter.value.value if parameter.value is not None else None
 
 
-def test_a_node_that_nobody_told_has_no_value(tmp_path: Path) -> None:
+def test_a_node_without_the_parameter_has_no_value(tmp_path: Path) -> None:
     text = "system: s\nnodes: {inline: {}, other: {type: plain}}\n"
     assert values(tmp_path, text) == {"inline": None, "other": None}
 
@@ -87,7 +87,7 @@ def test_the_command_line_says_the_same(tmp_path: Path) -> None:
     assert not loaded(tmp_path, text, OverrideOptions()).use_sim_time
 
 
-def test_a_setting_goes_before_everything(tmp_path: Path) -> None:
+def test_a_setting_overrides_everything(tmp_path: Path) -> None:
     text = f"system: s\nuse_sim_time: true\n{NODES}"
     found = values(tmp_path, text, "silent.use_sim_time=false", "given.use_sim_time=true")
     assert found == OF_ALL | {"silent": False, "given": True}

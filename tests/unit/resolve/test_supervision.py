@@ -1,4 +1,4 @@
-"""How nodes are kept up: what a node says goes before what its system says, key by key."""
+"""Supervision: a node overrides its system, key by key."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_what_the_system_says_holds_for_nodes_that_say_nothing() -> None:
     assert of("plain").restart == RestartBudget(max_attempts=3, backoff_ms=100)
 
 
-def test_what_a_node_says_goes_before_it_key_by_key() -> None:
+def test_a_node_overrides_it_key_by_key() -> None:
     own = of("own")
     assert (own.timeout_ms, own.policy) == (500, OnFailure.SHUTDOWN)
     assert own.restart == RestartBudget(max_attempts=3, window_ms=1000, backoff_ms=100)

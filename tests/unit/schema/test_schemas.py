@@ -102,11 +102,11 @@ def test_unknown_schema() -> None:
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.name)
 def test_shipped_file(path: Path) -> None:
-    tree, _, findings = read_document(path)
+    tree, _, diagnostics = read_document(path)
     assert tree is not None
     kind = kind_of(tree)
     assert kind is not None
-    assert [item.message for item in (*findings, *check_schema(tree, kind))] == []
+    assert [item.message for item in (*diagnostics, *check_schema(tree, kind))] == []
     # An editor has plain JSON Schema, without the composer's stricter idea of an integer.
     assert Draft7Validator(schema(kind)).is_valid(plain(tree))
 
@@ -140,8 +140,8 @@ def large_system(nodes: int) -> str:
 
 def seconds_to_check(text: str, times: int = 1) -> float:
     """Return the shortest CPU time of ``times`` checks, in seconds."""
-    tree, findings = parse_document(SourceFile("f", text))
-    assert findings == []
+    tree, diagnostics = parse_document(SourceFile("f", text))
+    assert diagnostics == []
     assert tree is not None
     durations_s = []
     for _ in range(times):

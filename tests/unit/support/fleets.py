@@ -1,4 +1,4 @@
-"""Systems of any size, made up: areas with a chain of nodes each, and what everybody hears."""
+"""Synthetic systems of any size: areas with a chain of nodes each, and a topic for all nodes."""
 
 from __future__ import annotations
 
@@ -60,5 +60,5 @@ def fleet(count: int) -> tuple[System, tuple[Diagnostic, ...]]:
 
 def fleet_graph(count: int, view: View) -> Graph:
     """Return a diagram of such a system."""
-    system, findings = fleet(count)
-    return build_graph(scene_of([system], findings), view)
+    system, diagnostics = fleet(count)
+    return build_graph(scene_of([system], diagnostics), view)

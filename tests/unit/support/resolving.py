@@ -26,8 +26,8 @@ def resolve_text(
 ) -> tuple[System, list[Diagnostic]]:
     """Resolve a text; node types are looked for in ``folder``."""
     source = SourceFile("robot.yaml", dedent(text))
-    tree, findings = parse_document(source)
-    assert tree is not None, [finding.message for finding in findings]
+    tree, diagnostics = parse_document(source)
+    assert tree is not None, [diagnostic.message for diagnostic in diagnostics]
     expanded, _ = expand(tree, {})
     overrides, found = read_overrides(OverrideOptions(tuple(settings), namespace))
     system, more = resolve(
@@ -48,8 +48,8 @@ def system_of(
     namespace: str | None = None,
 ) -> System:
     """Resolve a text that has nothing wrong in it."""
-    system, findings = resolve_text(text, folder, settings, namespace)
-    assert [finding.message for finding in findings] == []
+    system, diagnostics = resolve_text(text, folder, settings, namespace)
+    assert [diagnostic.message for diagnostic in diagnostics] == []
     return system
 
 

@@ -1,4 +1,4 @@
-"""Calls at a time that is told: in order, once each, whatever time does."""
+"""Timers in simulated time: in order, once each, whatever the clock does."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from composer.runtime.clock.sim_timers import NANOSECONDS, SimTimers
 
 
 class Loop:
-    """Calls when it is told to."""
+    """A clock whose time the test sets."""
 
     def __init__(self) -> None:
         self.soon: deque[Callable[[], object]] = deque()
@@ -88,7 +88,7 @@ def test_a_little_jump_backward_shifts_nothing(bench: Bench) -> None:
     assert bench.pass_to(100.9, 100.5, 100.9, 100.6, 101.0) == [101.0]
 
 
-def test_a_call_that_is_under_way_when_time_jumps_back_begins_anew(bench: Bench) -> None:
+def test_a_pending_call_restarts_when_time_jumps_back(bench: Bench) -> None:
     bench.pass_to(100.0)
 
     def jump_back() -> None:
@@ -156,7 +156,7 @@ def test_what_is_due_now_is_called_while_time_stands(bench: Bench, delay_s: floa
 
 
 @pytest.mark.parametrize("delay_s", [1e12, math.inf])
-def test_a_delay_may_be_longer_than_anybody_waits(bench: Bench, delay_s: float) -> None:
+def test_a_delay_may_be_very_long(bench: Bench, delay_s: float) -> None:
     bench.calls.add(delay_s, bench.note)
     bench.calls.add(1.0, bench.note)
     assert bench.pass_to(1.0, 2.0, 1.5, 3.0) == [2.0]

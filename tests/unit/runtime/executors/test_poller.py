@@ -65,7 +65,7 @@ def test_a_time_that_is_over_is_not_waited_for(poller: Poller, written: int) -> 
 
 
 @pytest.mark.parametrize("until_s", [0.0, _LONG_S, inf])
-def test_tells_of_what_was_written_until_it_is_read(
+def test_reports_written_data_until_it_is_read(
     poller: Poller, written: int, until_s: float
 ) -> None:
     poller.register(written)
@@ -75,7 +75,7 @@ def test_tells_of_what_was_written_until_it_is_read(
     assert not poller.poll()
 
 
-def test_tells_no_more_of_what_is_forgotten(poller: Poller, written: int) -> None:
+def test_reports_no_events_of_removed_descriptors(poller: Poller, written: int) -> None:
     poller.register(written)
     poller.unregister(written)
     assert not poller.poll()
@@ -92,7 +92,7 @@ def test_another_thread_ends_the_wait(poller: Poller, until_s: float) -> None:
 
 
 @pytest.mark.parametrize("until_s", [_LONG_S, inf])
-def test_who_is_woken_before_does_not_wait(poller: Poller, until_s: float) -> None:
+def test_a_wake_up_before_the_wait_ends_it(poller: Poller, until_s: float) -> None:
     began_s = monotonic()
     poller.wake()
     poller.wait(began_s + until_s)

@@ -60,7 +60,7 @@ def test_garbage_is_collected_afterwards_as_before(collects: bool) -> None:
         (gc.enable if before else gc.disable)()
 
 
-def test_who_looks_at_the_same_time_waits_so_that_nobody_turns_it_on_too_early() -> None:
+def test_concurrent_use_does_not_enable_the_collector_too_early() -> None:
     seen = []
 
     def look() -> None:
@@ -77,7 +77,7 @@ def test_who_looks_at_the_same_time_waits_so_that_nobody_turns_it_on_too_early()
     assert gc.isenabled()
 
 
-def test_a_look_keeps_nothing_of_what_it_has_seen() -> None:
+def test_a_stack_trace_keeps_no_frame_alive() -> None:
     """Else what a callback holds, an image of some megabytes, waits for the garbage collector."""
     is_there, may_go = threading.Event(), threading.Event()
     held: list[weakref.ref[set[int]]] = []

@@ -24,7 +24,7 @@ class Call:
 
 
 class Loop:
-    """Calls until nothing is left to call; its time passes when told."""
+    """A loop that runs until it is idle; the test advances its time."""
 
     def __init__(self) -> None:
         self.calls: deque[Callable[[], object]] = deque()
@@ -131,14 +131,14 @@ class TestFuture:
         with ThreadPoolExecutor(4) as pool:
             for _ in range(200):
                 future: Future[int] = Future()
-                told: list[Future[int]] = []
-                future.add_done_callback(told.append)
+                called: list[Future[int]] = []
+                future.add_done_callback(called.append)
                 won = list(pool.map(future.set_result, range(4)))
                 assert won.count(True) == 1
                 assert won[future.result()]
-                assert told == [future]
+                assert called == [future]
 
-    def test_an_exception_nobody_asks_for_is_reported_when_the_future_goes(self) -> None:
+    def test_an_unretrieved_exception_is_reported_when_the_future_is_deleted(self) -> None:
         reports: list[BaseException] = []
         noticed: Future[int] = Future(reports.append)
         noticed.set_exception(ValueError("noticed"))
@@ -176,18 +176,18 @@ class TestTask:
         loop.run()
         assert outcome.result() == "open"
 
-    def test_a_future_that_is_done_is_no_wait(self, loop: Loop) -> None:
+    def test_a_done_future_does_not_wait(self, loop: Loop) -> None:
         gate: Future[str] = Future()
         gate.set_result("open")
         assert loop.start(wait_for(gate)).result() == "open"
 
-    def test_an_exception_reaches_who_awaits_and_is_not_reported(self, loop: Loop) -> None:
+    def test_an_exception_reaches_the_awaiting_task_and_is_not_reported(self, loop: Loop) -> None:
         inner = loop.task(fail()).future
         outer = loop.start(wait_for(inner))
         assert isinstance(outer.exception(), ValueError)
         assert loop.reports == []
 
-    def test_an_exception_nobody_awaits_is_reported_by_the_coroutine_s_name(
+    def test_an_unawaited_exception_is_reported_with_the_name_of_the_coroutine(
         self, loop: Loop
     ) -> None:
         loop.start(fail())
@@ -246,7 +246,7 @@ class TestTask:
         assert loop.start(recover()).result() == "well"
 
 
-class TestCancelling:
+class TestCanceling:
     def test_throws_into_the_coroutine_where_it_awaits(self, loop: Loop) -> None:
         seen: list[str] = []
         gate: Future[None] = Future()
@@ -383,7 +383,7 @@ class TestWaiting:
             outcome.result()
         assert gate.cancelled()
 
-    def test_who_is_cancelled_while_waiting_cancels_the_future(self, loop: Loop) -> None:
+    def test_a_canceled_waiting_task_cancels_the_future(self, loop: Loop) -> None:
         gate: Future[str] = Future()
         loop.start(within(loop, gate, 1.0)).cancel()
         loop.run()

@@ -102,7 +102,7 @@ def test_a_sooner_time_is_kept_though_a_later_one_was_there_first(
     assert later.done()
 
 
-def test_without_a_limit_there_is_no_timer_and_the_end_ends_it(
+def test_without_a_limit_there_is_no_timer_and_closing_ends_it(
     clock: Clock, pending: PendingFutures
 ) -> None:
     unlimited, limited = pending.add(Future()), hold(pending, 103.0)
@@ -126,9 +126,7 @@ def test_what_is_done_is_let_go(pending: PendingFutures) -> None:
     assert not pending._futures
 
 
-def test_who_waits_again_when_his_time_is_up_is_held_again(
-    clock: Clock, pending: PendingFutures
-) -> None:
+def test_waiting_again_after_a_timeout_holds_again(clock: Clock, pending: PendingFutures) -> None:
     seen: list[Future[str]] = []
     hold(pending, 101.0).add_done_callback(lambda _: seen.append(hold(pending, 102.0)))
     clock.pass_s(1.0)
@@ -137,9 +135,7 @@ def test_who_waits_again_when_his_time_is_up_is_held_again(
     assert [future.done() for future in seen] == [True]
 
 
-def test_a_time_that_has_passed_ends_it_at_the_next_look(
-    clock: Clock, pending: PendingFutures
-) -> None:
+def test_a_passed_deadline_ends_it_at_the_next_poll(clock: Clock, pending: PendingFutures) -> None:
     future = hold(pending, 99.0)
     assert not future.done()
     clock.pass_s(0.0)
@@ -155,7 +151,7 @@ def test_none_is_forgotten_while_threads_hold_and_the_timer_looks() -> None:
 
     with ThreadPoolExecutor(3) as pool:
         making = [pool.submit(hold_some, number) for number in range(3)]
-        # In this order: who is through makes nothing due any more.
+        # In this order: a completed request is not due any more.
         while not all(made.done() for made in making) or due:
             if due:
                 due.pop(0)()

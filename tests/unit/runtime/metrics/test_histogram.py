@@ -59,7 +59,7 @@ def test_times_that_settle_together_come_into_the_buckets_of_each() -> None:
     assert durations._buckets == one_by_one
 
 
-def test_the_ends_of_the_scale_are_no_limits() -> None:
+def test_values_beyond_the_scale_are_counted() -> None:
     durations = counted(0.0, 1e-9, 5000.0)
     assert durations.count == 3
     assert durations.percentile_s(1.0) == durations.longest_s == 5000.0
@@ -81,7 +81,7 @@ def test_a_time_can_stand_for_several() -> None:
     assert (durations.count, durations.total_s) == (18, 4.75)
 
 
-def test_who_asks_while_others_count_loses_nothing() -> None:
+def test_reading_during_counting_loses_nothing() -> None:
     durations = Histogram()
     asked: list[int] = []
     counting = threading.Thread(target=lambda: [durations.add(0.001) for _ in range(20_000)])
@@ -92,7 +92,7 @@ def test_who_asks_while_others_count_loses_nothing() -> None:
     assert asked == sorted(asked)
 
 
-def test_a_callback_is_counted_on_after_its_node_was_configured_anew() -> None:
+def test_counting_continues_after_a_node_was_configured_again() -> None:
     statistics = Statistics()
     statistics.callback("timer", "tick").times.add(0.25)
     statistics.callback("timer", "tick").times.add(0.5)
@@ -161,7 +161,7 @@ def two_reports() -> tuple[Any, Any]:
         (SortKey.NODE, "/a"),
     ],
 )
-def test_top_puts_first_what_is_asked_for(sorting: SortKey, first: str) -> None:
+def test_top_sorts_by_the_requested_column(sorting: SortKey, first: str) -> None:
     assert sorted_rates(*two_reports(), sorting)[0].figures.node == first
 
 
