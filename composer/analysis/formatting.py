@@ -80,6 +80,6 @@ def _is_safe(character: str) -> bool:
     return character.isascii() and (character.isalnum() or character == "_")
 
 
-def port_name(end: PortOfNode) -> str:
+def port_name(endpoint: PortOfNode) -> str:
     """Return the name of a port in connections: ``planner.sensor_data``."""
-    return f"{end.node.name}.{end.port.name}"
+    return f"{endpoint.node.name}.{endpoint.port.name}"

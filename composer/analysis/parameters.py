@@ -81,7 +81,7 @@ def type_problem(value: Plain, kind: str) -> str | None:
 
 
 def range_problem(parameter: Parameter, value: Plain) -> RangeProblem | None:
-    """Return the first number in ``value`` outside the parameter's range, or None."""
+    """Return the problem of the first number outside the parameter's range, or None."""
     for item in numbers(value):
         problem = _range_problem(parameter, item)
         if problem is not None:

@@ -80,10 +80,10 @@ def _in_order_of_cause(
     """
     missing_causes: dict[str, int] = {}
     effects: dict[str, list[str]] = {}
-    for name, ends in publishers.items():
+    for name, endpoints in publishers.items():
         causing = {
             cause.port.full_name
-            for endpoint in ends
+            for endpoint in endpoints
             for cause in known.get(_key(endpoint), ())
             if cause.port is not None and cause.port.full_name in publishers
         }

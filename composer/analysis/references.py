@@ -1,11 +1,14 @@
-"""How a system refers to ports and to ROS names."""
+"""How a system refers to ports, ROS names and QoS profiles."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+from composer.analysis.context import Context, is_unresolved
 from composer.model import Endpoint, Node, Port, Remapping, System
 from composer.names import expand_name
+from composer.qos import PRESETS
+from composer.source import Located
 
 
 def endpoints(system: System) -> Iterator[Endpoint]:
@@ -28,3 +31,21 @@ def matched_ports(node: Node, remapping: Remapping) -> Iterator[Port]:
     for port in node.ports:
         if own_name(node, port.ros_name.value) == source:
             yield port
+
+
+def unknown_profiles(context: Context) -> tuple[Located[str], ...]:
+    """Return the references to profiles that do not exist."""
+    known = known_profiles(context)
+    if context.is_partial:
+        return ()
+    return tuple(
+        reference.name
+        for reference in context.system.qos_references
+        if reference.name.value not in known and not is_unresolved(reference.name.value)
+    )
+
+
+def known_profiles(context: Context) -> frozenset[str]:
+    """Return the names of the system's own profiles and of the presets."""
+    own = (profile.name.value for profile in context.system.qos_profiles)
+    return frozenset((*own, *PRESETS))

@@ -11,11 +11,11 @@ from composer.interfaces.definitions import (
     PRIMITIVES,
     TEXTS,
     Action,
-    Constant,
     Field,
     FieldType,
     Interface,
     Message,
+    MessageConstant,
     Service,
 )
 from composer.interfaces.index import Interfaces, InvalidDefinition
@@ -27,7 +27,6 @@ __all__ = [
     "PRIMITIVES",
     "TEXTS",
     "Action",
-    "Constant",
     "DefinitionError",
     "Field",
     "FieldType",
@@ -35,6 +34,7 @@ __all__ = [
     "Interfaces",
     "InvalidDefinition",
     "Message",
+    "MessageConstant",
     "Service",
     "parse_definition",
     "split_name",

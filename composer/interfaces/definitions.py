@@ -70,7 +70,7 @@ class Field:
 
 
 @dataclass(frozen=True, slots=True)
-class Constant:
+class MessageConstant:
     """A named value in a message definition."""
 
     name: str
@@ -84,7 +84,7 @@ class Message:
 
     name: str
     fields: tuple[Field, ...] = ()
-    constants: tuple[Constant, ...] = ()
+    constants: tuple[MessageConstant, ...] = ()
 
     @cached_property
     def _by_name(self) -> Mapping[str, Field]:

@@ -1,4 +1,4 @@
-"""The catalogue of interfaces: finds a definition by its name and reads it once."""
+"""The index of interfaces: finds a definition by name and reads it once."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from composer.interfaces.share_json import read_description
 from composer.interfaces.sources import (
     Bundle,
     Definition,
-    Source,
+    InterfaceSource,
     find_packages,
     installed_prefixes,
 )
@@ -38,18 +38,18 @@ class InvalidDefinition:
 
 
 class Interfaces:
-    """All interfaces known here. A definition is read when it is first asked for."""
+    """All known interfaces. A definition is read on first use."""
 
-    def __init__(self, sources: Iterable[Source]) -> None:
+    def __init__(self, sources: Iterable[InterfaceSource]) -> None:
         self._sources = tuple(sources)
         self._found: dict[str, Interface | InvalidDefinition | None] = {}
 
     @classmethod
     def load(cls, folders: Iterable[Path] = ()) -> Interfaces:
-        """Return the catalogue of the packages in ``folders``, what is installed, and the snapshot.
+        """Return the interfaces in ``folders``, in installed packages, and in the snapshot.
 
-        The first that has a definition wins: a project's own packages are about to be built and
-        installed; an installed package is what will run; the snapshot stands in where ROS is not
+        The first source with a definition wins: packages of the project are about to be built and
+        installed, installed packages are used at run time, and the snapshot is used if ROS is not
         installed.
         """
         return cls((find_packages(folders), *installed_prefixes(), Bundle()))

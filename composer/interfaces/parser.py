@@ -17,11 +17,11 @@ from composer.interfaces.definitions import (
     PRIMITIVES,
     TEXTS,
     Action,
-    Constant,
     Field,
     FieldType,
     Interface,
     Message,
+    MessageConstant,
     Service,
 )
 from composer.tree import Plain, ScalarValue
@@ -119,13 +119,13 @@ def _parts(text: str) -> list[_Lines]:
 
 def _message(name: str, package: str, lines: _Lines) -> Message:
     fields: list[Field] = []
-    constants: list[Constant] = []
+    constants: list[MessageConstant] = []
     for number, line in lines:
         try:
             item = _member(line, package)
         except ValueError as error:
             raise DefinitionError(str(error), number) from None
-        known: Iterable[Field | Constant] = (*fields, *constants)
+        known: Iterable[Field | MessageConstant] = (*fields, *constants)
         if any(item.name == other.name for other in known):
             raise DefinitionError(f"'{item.name}' is defined twice", number)
         if isinstance(item, Field):
@@ -135,7 +135,7 @@ def _message(name: str, package: str, lines: _Lines) -> Message:
     return Message(name, tuple(fields), tuple(constants))
 
 
-def _member(line: str, package: str) -> Field | Constant:
+def _member(line: str, package: str) -> Field | MessageConstant:
     type_text, _, rest = line.partition(" ")
     rest = rest.strip()
     if not rest:
@@ -150,12 +150,12 @@ def _member(line: str, package: str) -> Field | Constant:
     return Field(name, type_, _default(type_, default.strip()) if default.strip() else None)
 
 
-def _constant(type_: FieldType, name: str, value: str) -> Constant:
+def _constant(type_: FieldType, name: str, value: str) -> MessageConstant:
     if type_.is_array or not type_.is_primitive:
         raise ValueError(f"a constant has a primitive type, not {type_}")
     if not _CONSTANT_NAME.fullmatch(name):
         raise ValueError(f"'{name}' is not a constant's name: upper case letters, digits, '_'")
-    return Constant(name, type_, _value(type_, value))
+    return MessageConstant(name, type_, _value(type_, value))
 
 
 def _type(text: str, package: str) -> FieldType:

@@ -35,7 +35,7 @@ class Definition:
     is_json: bool = False
 
 
-class Source(Protocol):
+class InterfaceSource(Protocol):
     """A place that definitions come from."""
 
     def packages(self) -> frozenset[str]:

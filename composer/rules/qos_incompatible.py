@@ -64,9 +64,9 @@ def _one_type(channel: Channel) -> bool:
     return len({endpoint.port.interface.value for endpoint in channel.ends}) == 1
 
 
-def _by_profile(ends: Iterable[PortOfNode]) -> Groups:
+def _by_profile(endpoints: Iterable[PortOfNode]) -> Groups:
     groups: dict[QosProfile, list[PortOfNode]] = defaultdict(list)
-    for endpoint in ends:
+    for endpoint in endpoints:
         if endpoint.port.qos.known:
             groups[endpoint.port.qos.profile].append(endpoint)
     return groups

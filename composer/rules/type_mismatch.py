@@ -58,8 +58,8 @@ def _channel(context: Context, channel: Channel) -> Iterator[Diagnostic]:
         return
     common = max(by_type, key=lambda name: len(by_type[name]))  # the first one in case of a tie
     usual = by_type.pop(common)[0]
-    for name, ends in by_type.items():
-        odd = ends[0]
+    for name, endpoints in by_type.items():
+        different = endpoints[0]
         labels = [
             Label(usual.port.interface.span, f"{usual.port.kind} '{port_name(usual)}': {common}")
         ]
@@ -68,12 +68,12 @@ def _channel(context: Context, channel: Channel) -> Iterator[Diagnostic]:
                 endpoint.port.interface.span,
                 f"{endpoint.port.kind} '{port_name(endpoint)}' too: {name}",
             )
-            for endpoint in ends[1 : 1 + _SHOWN]
+            for endpoint in endpoints[1 : 1 + _SHOWN]
         ]
         yield Diagnostic(
             RULE,
-            f"{odd.port.kind} '{port_name(odd)}' has type '{name}', "
+            f"{different.port.kind} '{port_name(different)}' has type '{name}', "
             f"but {channel.kind} '{channel.name}' has '{common}'",
-            odd.port.interface.span,
+            different.port.interface.span,
             tuple(labels),
         )

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_unresolved
+from composer.analysis.context import Context
+from composer.analysis.references import known_profiles, unknown_profiles
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
-from composer.qos import PRESETS
-from composer.source import Located
 
 RULE = register(
     Rule(
@@ -44,21 +43,3 @@ def check(context: Context) -> Iterator[Diagnostic]:
             else suggestion(name.value, known_profiles(context))
         )
         yield Diagnostic(RULE, f"there is no QoS profile '{name}'", name.span, hint=hint)
-
-
-def unknown_profiles(context: Context) -> tuple[Located[str], ...]:
-    """Return the references to profiles that do not exist."""
-    known = known_profiles(context)
-    if context.is_partial:
-        return ()
-    return tuple(
-        reference.name
-        for reference in context.system.qos_references
-        if reference.name.value not in known and not is_unresolved(reference.name.value)
-    )
-
-
-def known_profiles(context: Context) -> frozenset[str]:
-    """Return the names of the system's own profiles and of the presets."""
-    own = (profile.name.value for profile in context.system.qos_profiles)
-    return frozenset((*own, *PRESETS))

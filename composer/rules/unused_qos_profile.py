@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
+from composer.analysis.references import unknown_profiles
 from composer.diagnostics import Diagnostic, Rule, Severity, register
-from composer.rules.unknown_qos_profile import unknown_profiles
 
 RULE = register(
     Rule(

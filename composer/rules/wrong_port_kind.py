@@ -103,25 +103,25 @@ class _Slot:
 
 
 def _connection(context: Context, connection: Connection) -> Iterator[Diagnostic]:
-    ends = list(_ends(context, connection))
-    wrong = [end for end in ends if end.port.kind is not end.expected]
-    kinds = {end.port.kind.channel for end in wrong}
-    if len(wrong) > 1 and len(wrong) == len(ends) and len(kinds) == 1:
+    slots = list(_slots(context, connection))
+    wrong = [slot for slot in slots if slot.port.kind is not slot.expected]
+    kinds = {slot.port.kind.channel for slot in wrong}
+    if len(wrong) > 1 and len(wrong) == len(slots) and len(kinds) == 1:
         yield _all_wrong(connection, wrong, kinds.pop())
         return
-    for end in wrong:
-        actual = end.port.kind
+    for slot in wrong:
+        actual = slot.port.kind
         yield Diagnostic(
             RULE,
-            f"'{end.key}' of {connection.kind} '{connection.name}' needs {a(end.expected)}, "
-            f"but '{end.endpoint.text}' is {a(actual)}",
-            end.endpoint.text.span,
-            (Label(end.port.name.span, f"declared as {a(actual)}"),),
+            f"'{slot.key}' of {connection.kind} '{connection.name}' needs {a(slot.expected)}, "
+            f"but '{slot.endpoint.text}' is {a(actual)}",
+            slot.endpoint.text.span,
+            (Label(slot.port.name.span, f"declared as {a(actual)}"),),
             _belongs(connection, actual),
         )
 
 
-def _ends(context: Context, connection: Connection) -> Iterator[_Slot]:
+def _slots(context: Context, connection: Connection) -> Iterator[_Slot]:
     groups = (connection.sources, connection.sinks)
     for endpoints, (key, kind) in zip(groups, _ENDS[connection.kind], strict=True):
         for endpoint in endpoints:
@@ -130,7 +130,7 @@ def _ends(context: Context, connection: Connection) -> Iterator[_Slot]:
                 yield _Slot(endpoint, key, kind, port)
 
 
-def _all_wrong(connection: Connection, ends: list[_Slot], kind: ChannelKind) -> Diagnostic:
+def _all_wrong(connection: Connection, slots: list[_Slot], kind: ChannelKind) -> Diagnostic:
     """Report one diagnostic for a connection whose endpoints are all wrong."""
     (source_key, _), (sink_key, _) = _ENDS[connection.kind]
     if kind is connection.kind:
@@ -143,7 +143,7 @@ def _all_wrong(connection: Connection, ends: list[_Slot], kind: ChannelKind) -> 
         )
         (source_key, _), (sink_key, _) = _ENDS[kind]
         hint = f"write '{kind}:', '{source_key}:' and '{sink_key}:'"
-    labels = tuple(end.label for end in ends)
+    labels = tuple(slot.label for slot in slots)
     return Diagnostic(RULE, message, connection.span, labels, hint)
 
 

@@ -1,4 +1,4 @@
-"""The catalogue against what is installed: ROS's parser, its type descriptions, its classes."""
+"""The interfaces compared with the installed ones: parser, type descriptions and classes."""
 
 from __future__ import annotations
 

@@ -6,11 +6,11 @@ import pytest
 
 from composer.interfaces import (
     Action,
-    Constant,
     DefinitionError,
     Field,
     FieldType,
     Message,
+    MessageConstant,
     Service,
     parse_definition,
     split_name,
@@ -65,14 +65,14 @@ def test_field(line: str, field: Field) -> None:
 @pytest.mark.parametrize(
     ("line", "constant"),
     [
-        ("uint8 LEFT=1", Constant("LEFT", FieldType("uint8"), 1)),
-        ("uint8 LEFT_2   =   255  # comment", Constant("LEFT_2", FieldType("uint8"), 255)),
-        ("float64 HALF=0.5", Constant("HALF", FieldType("float64"), 0.5)),
-        ('string NAME="a=b"', Constant("NAME", FieldType("string"), "a=b")),
-        ("bool ON=True", Constant("ON", FieldType("bool"), True)),
+        ("uint8 LEFT=1", MessageConstant("LEFT", FieldType("uint8"), 1)),
+        ("uint8 LEFT_2   =   255  # comment", MessageConstant("LEFT_2", FieldType("uint8"), 255)),
+        ("float64 HALF=0.5", MessageConstant("HALF", FieldType("float64"), 0.5)),
+        ('string NAME="a=b"', MessageConstant("NAME", FieldType("string"), "a=b")),
+        ("bool ON=True", MessageConstant("ON", FieldType("bool"), True)),
     ],
 )
-def test_constant(line: str, constant: Constant) -> None:
+def test_constant(line: str, constant: MessageConstant) -> None:
     assert message(line).constants == (constant,)
 
 
