@@ -54,8 +54,8 @@ class Transition:
 
 
 @dataclass(frozen=True, slots=True)
-class TransitionResult:
-    """The primary states before and after a transition."""
+class CompletedTransition:
+    """The primary states before and after one or more transitions."""
 
     node: str
     before: str
@@ -160,7 +160,7 @@ class LifecycleClient:
             for item in response.available_transitions
         )
 
-    def change_state(self, node: str, label: str) -> TransitionResult:
+    def change_state(self, node: str, label: str) -> CompletedTransition:
         """Request the transition ``label`` of a node.
 
         Raises TransitionError with the available transitions; NoResponseError.
@@ -177,9 +177,9 @@ class LifecycleClient:
             raise TransitionError(
                 f"'{label}' of {node} failed: it is {after} now", "see its log for the reason"
             )
-        return TransitionResult(node, before, after)
+        return CompletedTransition(node, before, after)
 
-    def go_to_state(self, node: str, goal: str) -> TransitionResult:
+    def go_to_state(self, node: str, goal: str) -> CompletedTransition:
         """Take a node to a primary state in as many transitions as it needs.
 
         Raises TransitionError if the state cannot be reached or a transition fails;
@@ -197,7 +197,7 @@ class LifecycleClient:
             if reached == state:
                 raise TransitionError(f"{node} is still {state} after '{label}'")
             state = reached
-        return TransitionResult(node, before, state)
+        return CompletedTransition(node, before, state)
 
     def _request(self, node: str, before: str, transition: Transition) -> tuple[bool, str]:
         """Request a transition; return whether it succeeded, and the state after it."""

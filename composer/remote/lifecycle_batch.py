@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from composer.remote.lifecycle import LifecycleClient, TransitionResult
+from composer.remote.lifecycle import CompletedTransition, LifecycleClient
 from composer.remote.session import Deadline, RosError, Session
 from composer.remote.systems import Systems
 
@@ -25,7 +25,7 @@ class LifecycleRequest:
 class NodeOutcome:
     """The result of a request for one node, or the error."""
 
-    result: TransitionResult | None
+    result: CompletedTransition | None
     error: RosError | None
 
 
@@ -62,7 +62,9 @@ def change_each(
             yield NodeOutcome(None, error)
 
 
-def _change_one(client: LifecycleClient, node: str, request: LifecycleRequest) -> TransitionResult:
+def _change_one(
+    client: LifecycleClient, node: str, request: LifecycleRequest
+) -> CompletedTransition:
     if request.state is not None:
         return client.go_to_state(node, request.state)
     return client.change_state(node, request.transition or "")

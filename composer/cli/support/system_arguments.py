@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -157,6 +156,8 @@ def running_system_name(text: str) -> str:
 
 def _matching_paths(incomplete: str) -> Iterable[str]:
     """Yield the folders and YAML files that start with ``incomplete``, written the same way."""
+    import glob
+
     typed, _, last = incomplete.rpartition("/")
     prefix = f"{typed}/" if "/" in incomplete else ""
     for path in sorted(Path(prefix or ".").glob(f"{glob.escape(last)}*")):
