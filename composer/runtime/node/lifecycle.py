@@ -57,12 +57,12 @@ class Hooks(Protocol):
     async def on_error(self, cause: BaseException) -> None:
         """Clean up after a transition that raised ``cause``. Raising finalizes the node."""
 
-    def on_transition_end(self, result: TransitionResult) -> None:
+    def on_transition_end(self, result: TransitionOutcome) -> None:
         """Adapt to the primary state that a transition ended in."""
 
 
 @dataclass(frozen=True, slots=True)
-class TransitionResult:
+class TransitionOutcome:
     """How a requested transition ended, in which state, and why it did not succeed."""
 
     transition: str
@@ -142,7 +142,7 @@ class Lifecycle:
             if transition_id in _NAMES
         }
 
-    async def change(self, transition: str) -> TransitionResult:
+    async def change(self, transition: str) -> TransitionOutcome:
         """Run ``transition`` as soon as no other one runs. Raises nothing."""
         while (current := self._acquire()) is not None:
             await current
@@ -174,7 +174,7 @@ class Lifecycle:
         if current is not None:
             current.set_result(None)
 
-    async def _run(self, transition: str) -> TransitionResult:
+    async def _run(self, transition: str) -> TransitionOutcome:
         """Run a transition; the state machine has been acquired, and is released at the end."""
         try:
             return await self._transition(transition)
@@ -183,11 +183,11 @@ class Lifecycle:
         except BaseException as error:
             # Exceptions of user code do not get here: rcl failed, maybe without its context.
             self._log.error(f"'{transition}' was not completed: {traceback_of(error)}")
-            return TransitionResult(transition, self.state, success=False, reason=describe(error))
+            return TransitionOutcome(transition, self.state, success=False, reason=describe(error))
         finally:
             self._release()
 
-    async def _transition(self, transition: str) -> TransitionResult:
+    async def _transition(self, transition: str) -> TransitionOutcome:
         start = self.state
         transition_id = self.available.get(transition)
         if transition_id is None:
@@ -204,7 +204,7 @@ class Lifecycle:
         else:
             self._machine.trigger_transition_by_label(_SUCCESS, True)
         reason = "" if cause is None else describe(cause)
-        result = TransitionResult(transition, self.state, success=cause is None, reason=reason)
+        result = TransitionOutcome(transition, self.state, success=cause is None, reason=reason)
         self._hooks.on_transition_end(result)
         return result
 
@@ -258,11 +258,11 @@ class Lifecycle:
             if task is None:
                 work.close()
 
-    def _refuse(self, transition: str, why: str) -> TransitionResult:
+    def _refuse(self, transition: str, why: str) -> TransitionOutcome:
         available = ", ".join(self.available) or "none"
         reason = f"refused '{transition}': {why}; available transitions: {available}"
         self._log.warn(reason)
-        return TransitionResult(transition, self.state, success=False, reason=reason)
+        return TransitionOutcome(transition, self.state, success=False, reason=reason)
 
     # --- the services
 

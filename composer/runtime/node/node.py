@@ -35,7 +35,7 @@ from composer.runtime.node.behavior_loader import (
     named_ports,
 )
 from composer.runtime.node.entities import NodeEntities, RunningPort
-from composer.runtime.node.lifecycle import FINALIZED, Lifecycle, TransitionResult
+from composer.runtime.node.lifecycle import FINALIZED, Lifecycle, TransitionOutcome
 from composer.runtime.node.options import NodeOptions
 from composer.runtime.node.parameters import NodeParameters
 from composer.runtime.node.ros_node import make_ros_node
@@ -57,7 +57,7 @@ class WrongReturn(Exception):
 class NodeListener(Protocol):
     """Receives what a node reports, on the threads of the node's loop. It must not block."""
 
-    def on_transition_end(self, result: TransitionResult) -> None:
+    def on_transition_end(self, result: TransitionOutcome) -> None:
         """Receive the end of a transition."""
 
     def on_error(self, callback: str, text: str) -> None:
@@ -214,7 +214,7 @@ class RunningNode:
         self._context.gate.waiting = True
         await self._call_handler("error", cause)
 
-    def on_transition_end(self, result: TransitionResult) -> None:
+    def on_transition_end(self, result: TransitionOutcome) -> None:
         """Open or close the gates for the new state, and report it."""
         state = result.state
         if state == "active":

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from composer.model import LogLevel, Node, PrimaryState
 from composer.plan import Fault, FaultKind
-from composer.runtime.node.lifecycle import FINALIZED, TransitionResult
+from composer.runtime.node.lifecycle import FINALIZED, TransitionOutcome
 from composer.runtime.supervision import events
 from composer.runtime.supervision.main_queue import ExternalTransition, Item, MainQueue
 from composer.runtime.supervision.status import Status
@@ -45,7 +45,7 @@ class SupervisionListener:
         self._status = status
         self._reporter = reporter
 
-    def on_transition_end(self, result: TransitionResult) -> None:
+    def on_transition_end(self, result: TransitionOutcome) -> None:
         """Report the new state."""
         at_s = self._reporter.elapsed_s
         transition, state = result.transition, result.state

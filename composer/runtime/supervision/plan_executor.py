@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from composer.plan import Plan, Step
 from composer.runtime.executors.futures import Future
-from composer.runtime.node.lifecycle import TransitionResult
+from composer.runtime.node.lifecycle import TransitionOutcome
 from composer.runtime.supervision.interruption import running_callbacks
 from composer.runtime.supervision.main_queue import Item, MainQueue
 from composer.runtime.supervision.node_set import NodeSet
@@ -69,7 +69,7 @@ class _RunningStep:
 
     step: Step
     loop: str
-    future: Future[TransitionResult]
+    future: Future[TransitionOutcome]
     started_s: float
     limit_s: float
     end_s: float
