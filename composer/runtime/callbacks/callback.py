@@ -14,8 +14,8 @@ from composer.runtime.metrics.statistics import CallbackStatistics
 from composer.source import Located
 
 _LAST = BATCH_SIZE - 1  # the call that completes a batch
-#: The message of a handler without an argument.
-NO_ARGUMENT: Final = object()
+#: The message for a handler without an argument.
+EMPTY: Final = object()
 
 
 class Callback(CallbackTimer):
@@ -45,7 +45,7 @@ class Callback(CallbackTimer):
         else:
             began_s = monotonic()
         try:
-            result = self._handle() if message is NO_ARGUMENT else self._handle(message)
+            result = self._handle() if message is EMPTY else self._handle(message)
         except BaseException as error:
             self._context.error_log.exception(self._name, error)
             result = None

@@ -9,7 +9,7 @@ from composer.model import Channel, ChannelKind, Delivery, Port, System, channel
 from composer.qos import Liveliness, QosProfile, incompatibilities
 from composer.runtime.ros.manager_protocol import CALLBACKS_TOPIC, NAME, STATE_TOPIC
 
-#: Topics that the runtime and rclpy publish themselves, not through ports.
+#: Topics that the runtime and rclpy publish themselves, without ports.
 _NOT_BY_PORTS = frozenset({"/rosout", "/parameter_events", "/diagnostics"})
 _ENDINGS_NOT_BY_PORTS = (
     "/transition_event",

@@ -1,4 +1,4 @@
-"""One topic within the process: its local publishers and subscriptions, and who needs DDS."""
+"""One topic within the process: its local publishers and subscriptions, and the need for DDS."""
 
 from __future__ import annotations
 

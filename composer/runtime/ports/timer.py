@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from composer.model import Timer, TimerClock
-from composer.runtime.callbacks.callback import NO_ARGUMENT, Callback
+from composer.runtime.callbacks.callback import EMPTY, Callback
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
@@ -39,7 +39,7 @@ class TimerPort(Callback):
         statistics = context.statistics.callback("timer", name)
         self._lateness = statistics.lateness if context.statistics.tracing else None
         react = mutation_checked(context.mutations, statistics, self._react)
-        handle: Callable[[], Any] = partial(react, NO_ARGUMENT)
+        handle: Callable[[], Any] = partial(react, EMPTY)
         if handler and not (reaction or context.mutations):
             handle = handler  # without a frame in between
         super().__init__(context, f"on_{name}", handle, statistics, timer.budget_ms)
@@ -83,7 +83,7 @@ class TimerPort(Callback):
             return
         if self._lateness is not None and self._scheduled is not None:
             self._lateness.add(self._scheduled.late_s)
-        if self._queue.put(NO_ARGUMENT) is not None:
+        if self._queue.put(EMPTY) is not None:
             self._context.statistics.skipped += 1
             self._statistics.dropped += 1
 
