@@ -1,4 +1,4 @@
-"""How long data takes on declared chains."""
+"""Latencies of declared chains."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ def test_data_is_followed_from_the_first_publisher_to_the_last(more: str, tmp_pa
         stop, see = chain(system, "stop"), chain(system, "see")
         wait_until(lambda: stop.times.count > 10)
         counted = stop.times.count  # first: both grow
-        # What is sent again without anything new having been heard does not count.
+        # A message without new data does not count.
         assert counted <= system.node("lidar").sent("scan")
     assert stop.late == stop.times.count
     assert see.late == 0
     assert see.times.mean_s > 0.003
-    # Not the mean: what comes late to the motor it may hear together with what comes next.
+    # Not the mean: the motor may receive a late message together with the next one.
     assert stop.times.percentile_s(0.5) > see.times.percentile_s(0.5)
     told = {item.chain: item for item in system.stop().chains}
     assert told["stop"].count == stop.times.count

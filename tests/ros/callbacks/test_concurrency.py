@@ -36,7 +36,7 @@ class Slow(Behavior):
 """
 
 
-def test_messages_wait_for_a_handler_that_awaits_and_the_oldest_makes_room(
+def test_messages_wait_while_a_handler_awaits_and_the_oldest_is_dropped(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(SLOW.replace("REENTRANT", "false"), tmp_path, slow=SLOW_MODULE) as system:
@@ -68,8 +68,10 @@ def test_runs_of_a_reentrant_port_overlap(tmp_path: Path, peer: Peer) -> None:
 
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
-def test_what_comes_while_a_node_rests_does_not_wait_for_it(tmp_path: Path, kind: str) -> None:
-    """A handler of before still awaits something, so that nobody takes what comes out of the queue.
+def test_messages_that_arrive_while_a_node_is_inactive_do_not_wait_for_it(
+    tmp_path: Path, kind: str
+) -> None:
+    """An earlier handler still awaits, so that messages stay in the queue.
 
     Nothing of it may be left for when the node is active again.
     """
@@ -114,7 +116,7 @@ def test_what_comes_while_a_node_rests_does_not_wait_for_it(tmp_path: Path, kind
         output.publish(Int64(data=2))
         system.change("sink", "activate")
         output.publish(Int64(data=3))
-        assert "begin 3" not in system.log_text()  # one at a time, also from before
+        assert "begin 3" not in system.log_text()  # one at a time, including earlier ones
         sink._behavior.release.set_result(None)
         system.wait_for_log("end 3")
         counted = system.summary("/sink")
@@ -161,14 +163,16 @@ def test_reentrant_callbacks_run_at_once_on_several_threads(tmp_path: Path) -> N
             system.wait_for_log(f"met {number}")
 
 
-def test_the_callbacks_of_a_node_take_turns_on_several_threads(tmp_path: Path, peer: Peer) -> None:
+def test_the_callbacks_of_a_node_run_one_at_a_time_on_several_threads(
+    tmp_path: Path, peer: Peer
+) -> None:
     text = """
     system: turns
     executors: {several: {kind: multi_threaded, threads: 4}}
     nodes:
       turns:
         executor: several
-        behavior: turns:SerialStrand
+        behavior: turns:OneAtATime
         subscriptions:
           input: {type: std_msgs/msg/Int64, external: true}
         timers:
@@ -180,7 +184,7 @@ def test_the_callbacks_of_a_node_take_turns_on_several_threads(tmp_path: Path, p
     from time import sleep
     from composer.behavior import Behavior
 
-    class SerialStrand(Behavior):
+    class OneAtATime(Behavior):
         def on_configure(self):
             self.inside = 0
             self.most = 0

@@ -1,4 +1,4 @@
-"""``--check-mutation`` names who changes what is shared, and nobody else."""
+"""``--check-mutation`` names the callbacks that change shared messages, and no others."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Source(Behavior):
         self.publishers.numbers.publish(Int64(data=1))
 
     def on_tock(self):
-        self.text.data += "x"  # the one that was published before
+        self.text.data += "x"  # published before
         self.publishers.texts.publish(self.text)
 
 class Forger(Behavior):
@@ -59,7 +59,7 @@ FORGERY = "subscription 'numbers': has changed a message (Int64) after it was re
 USED_AGAIN = "timer 'tock': has changed a message (String) after it was published by 'texts'"
 
 
-def test_who_changes_a_message_is_named_and_nobody_else(tmp_path: Path) -> None:
+def test_callbacks_that_change_a_message_are_named(tmp_path: Path) -> None:
     options = HostOptions(check_mutation=True)
     with running(TEXT, tmp_path, options=options, changing=MODULE) as system:
         system.wait_for_log(FORGERY)
@@ -74,7 +74,7 @@ def test_who_changes_a_message_is_named_and_nobody_else(tmp_path: Path) -> None:
     assert all(line.startswith((FORGERY, USED_AGAIN)) for line in said)
 
 
-def test_without_the_check_nobody_looks(tmp_path: Path) -> None:
+def test_without_the_option_there_is_no_check(tmp_path: Path) -> None:
     with running(TEXT, tmp_path, changing=MODULE) as system:
         reader = system.behavior("reader")
         wait_until(lambda: reader.heard > 10)
@@ -82,7 +82,7 @@ def test_without_the_check_nobody_looks(tmp_path: Path) -> None:
     assert "has changed" not in system.log_text()
 
 
-def test_people_ask_for_it_on_the_command_line(tmp_path: Path) -> None:
+def test_the_option_of_the_command_line(tmp_path: Path) -> None:
     path = tmp_path / "changing.yaml"
     path.write_text(TEXT, encoding="utf-8")
     path.with_name("changing.py").write_text(MODULE, encoding="utf-8")

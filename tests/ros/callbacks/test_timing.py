@@ -1,4 +1,4 @@
-"""What is counted of callbacks of every kind while a system runs."""
+"""Timing of all kinds of callbacks in a running system."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def counted(system: RunningSystem, node: str) -> dict[str, CallbackStatistics]:
     return {kind: callback for (kind, _), callback in callbacks.items()}
 
 
-def test_every_kind_of_callback_is_timed_and_held_against_its_budget(tmp_path: Path) -> None:
+def test_every_kind_of_callback_is_timed_and_checked_against_its_budget(tmp_path: Path) -> None:
     with running(EVERY_KIND, tmp_path, traced=SERVER) as system:
         server, client = counted(system, "server"), counted(system, "client")
         every = [*server.values(), *client.values()]
@@ -80,17 +80,17 @@ def test_every_kind_of_callback_is_timed_and_held_against_its_budget(tmp_path: P
     for callback in every:
         assert callback.overruns <= callback.times.count
         assert f"{callback} took " in text
-    # What an async callback waits does not count, and what it does after waiting does.
+    # The time that an async callback awaits does not count; its work after that does.
     times = server["subscription"].times
     assert times.longest_s >= 0.004
-    assert times.percentile_s(0.5) < 0.36  # right within a tenth; the machine may stand still once
+    assert times.percentile_s(0.5) < 0.36  # right within a tenth; the machine may stall once
     assert client["timer"].lateness.count == client["timer"].times.count
     outcome = system.stop()
     told = {(item.node, item.kind): item for item in outcome.callbacks}
     assert told["/server", "service"].count == server["service"].times.count
 
 
-def test_without_tracing_only_what_has_a_budget_is_timed(tmp_path: Path) -> None:
+def test_without_tracing_only_callbacks_with_a_budget_are_timed(tmp_path: Path) -> None:
     text = """
     system: untraced
     nodes:
@@ -135,8 +135,8 @@ class Sink:
 """
 
 
-def test_of_what_comes_often_each_call_counts_once_also_where_it_awaits(tmp_path: Path) -> None:
-    """While they come often, one of sixteen is timed and stands for them, where none awaits."""
+def test_of_frequent_callbacks_each_call_counts_once_even_if_it_awaits(tmp_path: Path) -> None:
+    """If frequent, one of sixteen calls is timed with their weight, unless one awaits."""
     with running(FLOOD, tmp_path, flood=SOURCE_AND_SINK) as system:
         node = system.node("sink")
         wait_until(lambda: node.statistics.received == 4100, "all are there")

@@ -1,4 +1,4 @@
-"""What is known of callbacks and chains is right, and the same wherever it is told."""
+"""Figures of callbacks and chains are right, and the same in every view."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Worker(Behavior):
 
     def on_work(self):
         self.calls += 1
-        # The callback is to take so long: that is what is measured.
+        # The duration of the callback is what is measured.
         time.sleep(0.005 if self.calls % 10 else 0.04)
 
 class Source(Behavior):
@@ -80,7 +80,7 @@ def system(
 
 
 def verify(callbacks: list[dict[str, Any]]) -> bool:
-    """Hold figures against what the nodes do; say whether there are enough of them yet."""
+    """Compare figures with what the nodes do; return whether there are enough yet."""
     found = {(item["node"], item["name"]): item for item in callbacks}
     work, tick = found["/worker", "work"], found["/victim", "tick"]
     if int(work["count"]) < ENOUGH:
@@ -90,12 +90,14 @@ def verify(callbacks: list[dict[str, Any]]) -> bool:
     assert 36.0 <= p99_ms <= longest_ms * 1.1  # a percentile is right within a tenth
     assert longest_ms >= 40.0
     assert 2 <= int(work["overruns"]) <= int(work["count"])
-    # It has to wait for the worker, and for its long calls so long that it misses some.
+    # It waits for the worker, and during its long calls it misses some.
     assert float(tick["late_longest_ms"]) > 20.0
     assert float(tick["late_p99_ms"]) <= float(tick["late_longest_ms"]) * 1.1
     burst = found["/sink", "burst"]
     assert int(burst["dropped"]) > 0
-    assert int(burst["dropped"]) >= int(burst["count"]) * 1.4  # three of five go, two are received
+    assert (
+        int(burst["dropped"]) >= int(burst["count"]) * 1.4
+    )  # three of five are dropped, two received
     return True
 
 
@@ -126,7 +128,7 @@ def test_diagnostics(system: RunningSystem, peer: Peer) -> None:
     work = told()["timed: /worker timer 'work'"]
     assert work.level == DiagnosticStatus.WARN
     assert work.message.endswith("over budget, 0 dropped")
-    # Of the last second, in which the process may have had no processor for a while.
+    # Of the last second, in which the process may have been preempted.
     wait_until(lambda: float(values("timed: /worker")["busy"]) > 0.03, "the share")
     assert values("timed: /worker")["slowest"].startswith("timer 'work' ")
     assert int(values("timed: /sink")["queue_drops"]) > 0

@@ -1,4 +1,4 @@
-"""Nodes in simulated time: what they do follows /clock and nothing else."""
+"""Nodes in simulated time follow /clock only."""
 
 from __future__ import annotations
 
@@ -34,37 +34,35 @@ nodes:
 
 
 def ticks(system: RunningSystem) -> list[float]:
-    """When the timer in simulated time was called."""
+    """Return when the timer in simulated time was called."""
     return [float(line.removeprefix("at ")) for line in system.log() if line.startswith("at ")]
 
 
 def wait_for_ticks(system: RunningSystem, *times_s: float) -> None:
-    """Wait until the timer was called at these times and waits for the next one."""
+    """Wait until the timer was called at these times and waits again."""
     wait_until(lambda: ticks(system) == list(times_s), f"calls at {times_s}")
     wait_for_timer(system)
 
 
 def wait_for_timer(system: RunningSystem) -> None:
-    """Wait until the timer in simulated time waits: what jumps before that it does not see."""
+    """Wait until the timer in simulated time waits: it would miss an earlier jump."""
     clock = system.node("a")._context.clock
     wait_until(lambda: clock._sim_timers._waiting, "a timer that waits")
 
 
 def let_real_time_pass(system: RunningSystem) -> None:
-    """Wait until the timer in real time was called some times more."""
+    """Wait until the timer in real time was called a few more times."""
     before = system.log().count("real")
     wait_until(lambda: system.log().count("real") >= before + 5, "a timer on the steady clock")
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_timers_stand_start_pause_and_jump_with_the_clock(
-    tmp_path: Path, peer: Peer, kind: str
-) -> None:
+def test_timers_start_pause_and_jump_with_the_clock(tmp_path: Path, peer: Peer, kind: str) -> None:
     with running(SYSTEM.format(kind=kind), tmp_path) as system:
         let_real_time_pass(system)
         assert system.node("a").now_s() == 0.0
         simulator = Simulator(peer, system)
-        simulator.tell(1000.0)  # the first time there is: the first period begins
+        simulator.tell(1000.0)  # the first time: the first period begins
         let_real_time_pass(system)
         assert ticks(system) == []
         simulator.tell(1000.05, 1000.1)
@@ -86,7 +84,7 @@ def test_timers_stand_start_pause_and_jump_with_the_clock(
 
 @pytest.mark.parametrize("factor", [1.0, 10.0])
 @pytest.mark.parametrize("kind", KINDS)
-def test_timers_are_as_quick_as_the_clock(
+def test_timers_are_as_fast_as_the_clock(
     tmp_path: Path, peer: Peer, kind: str, factor: float
 ) -> None:
     with running(SYSTEM.format(kind=kind), tmp_path) as system:
@@ -94,7 +92,7 @@ def test_timers_are_as_quick_as_the_clock(
         with simulator.runs(1_700_000_000.0, factor):
             wait_until(lambda: len(ticks(system)) >= 11)
         found = ticks(system)
-    # Whatever the first call is late, the next ones are due at different multiples of the period.
+    # Even if the first call is late, the next ones are due at multiples of the period.
     assert found[10] - found[0] >= 0.899
     gaps_s = [late - early for early, late in itertools.pairwise(found)]
     assert min(gaps_s) > 0.0
@@ -142,8 +140,8 @@ def test_a_coroutine_sleeps_in_simulated_time(tmp_path: Path, peer: Peer, kind: 
         system.wait_for_log("awake 55.0")
         go.publish(String())
         system.wait_for_log("asleep 55.0")
-        let_real_time_pass(system)  # until he is
-        simulator.tell(10.0, 14.0)  # nobody sleeps until it is 60 again
+        let_real_time_pass(system)  # until it sleeps
+        simulator.tell(10.0, 14.0)  # it does not sleep until 60
         let_real_time_pass(system)
         assert system.log_text().count("awake") == 1
         simulator.tell(15.0)
@@ -151,9 +149,9 @@ def test_a_coroutine_sleeps_in_simulated_time(tmp_path: Path, peer: Peer, kind: 
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_node_that_is_deactivated_waits_no_more(tmp_path: Path, peer: Peer, kind: str) -> None:
+def test_deactivation_ends_a_sleep(tmp_path: Path, peer: Peer, kind: str) -> None:
     with running(SLEEPING.format(kind=kind), tmp_path, sleeper=SLEEPER) as system:
-        peer.publisher(String, "/go").publish(String())  # before there is any time at all
+        peer.publisher(String, "/go").publish(String())  # before the first time
         system.wait_for_log("asleep 0.0")
         let_real_time_pass(system)
         simulator = Simulator(peer, system)
@@ -177,7 +175,7 @@ def test_the_parameter_switches_a_running_node(tmp_path: Path, peer: Peer, kind:
         assert min(ticks(system)) > 1e9
         assert peer.set_parameter("/a", "use_sim_time", True) == ""
         wait_for_timer(system)
-        simulator.tell(30.0)  # it was 20 for the others all the time
+        simulator.tell(30.0)  # it was 20 for the other nodes
         wait_until(lambda: ticks(system)[-1] == 30.0)
         wait_for_timer(system)
         before = len(ticks(system))
@@ -190,7 +188,7 @@ def test_the_parameter_switches_a_running_node(tmp_path: Path, peer: Peer, kind:
         wait_until(lambda: ticks(system)[before:] == [30.1, 30.2])
 
 
-def test_a_sleeping_coroutine_goes_along_when_time_is_switched(tmp_path: Path, peer: Peer) -> None:
+def test_a_sleeping_coroutine_follows_a_switch_of_time(tmp_path: Path, peer: Peer) -> None:
     module = SLEEPER.replace("sleep(5.0)", "sleep(0.05)")
     with running(SLEEPING.format(kind="events"), tmp_path, sleeper=module) as system:
         go = peer.publisher(String, "/go")
@@ -215,7 +213,7 @@ nodes:
 """
 
 
-def test_one_subscription_serves_all_nodes_and_goes_with_the_last(
+def test_one_subscription_serves_all_nodes_and_is_destroyed_with_the_last(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(MANY, tmp_path) as system:
@@ -230,7 +228,7 @@ def test_one_subscription_serves_all_nodes_and_goes_with_the_last(
         wait_until(lambda: listeners(peer) == [])
         assert peer.set_parameter("/real", "use_sim_time", True) == ""
         simulator = Simulator(peer, system)
-        assert system.node("real").now_s() == 0.0  # what it was is long ago
+        assert system.node("real").now_s() == 0.0  # the old time is outdated
         simulator.tell(200.0, node="real")
 
 
@@ -253,11 +251,11 @@ SIMULATED_NS = range(1000 * NANOSECONDS, 10**9 * NANOSECONDS)
 
 
 def stamp_ns(message: Any) -> int:
-    """Return the time in a header, or in what has a stamp as one."""
+    """Return the time in a header or a stamp."""
     return int(message.stamp.sec * NANOSECONDS + message.stamp.nanosec)
 
 
-def test_stamps_are_simulated_and_the_manager_tells_the_parameter_for_nodes_without_services(
+def test_stamps_are_simulated_and_the_manager_has_the_parameter_of_nodes_without_services(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(STAMPED, tmp_path) as system:
@@ -267,13 +265,13 @@ def test_stamps_are_simulated_and_the_manager_tells_the_parameter_for_nodes_with
         simulator = Simulator(peer, system)
         tenths = itertools.count(10_000)
 
-        def is_told_by_all() -> object:
-            """Let a tenth of a second pass: what was sent before all were found is lost."""
+        def is_published_by_all() -> object:
+            """Wait a tenth of a second: messages before discovery are lost."""
             simulator.tell(next(tenths) / 10)
             stamps_ns = [stamp_ns(array.header) for array in told]
             return heard and logged and any(stamp in SIMULATED_NS for stamp in stamps_ns)
 
-        wait_until(is_told_by_all)
+        wait_until(is_published_by_all)
         for message in (*heard, *logged):
             assert stamp_ns(message) in SIMULATED_NS
             assert stamp_ns(message) % (NANOSECONDS // 10) == 0
@@ -292,7 +290,7 @@ def test_stamps_are_simulated_and_the_manager_tells_the_parameter_for_nodes_with
         wait_until(lambda: heard[-1].stamp.sec > 10**9, "a stamp of today")
 
 
-def test_a_parameter_file_says_it_for_all_nodes(tmp_path: Path, peer: Peer) -> None:
+def test_a_parameter_file_sets_it_for_all_nodes(tmp_path: Path, peer: Peer) -> None:
     tmp_path.joinpath("simulation.yaml").write_text("/**: {ros__parameters: {use_sim_time: true}}")
     text = "system: files\nparameter_files: [simulation.yaml]\nnodes: {a: {}, b: {}}\n"
     with running(text, tmp_path) as system:
@@ -314,7 +312,7 @@ nodes:
 """
 
 
-def test_silence_counts_while_the_simulation_goes_on(tmp_path: Path, peer: Peer) -> None:
+def test_silence_counts_while_the_simulation_runs(tmp_path: Path, peer: Peer) -> None:
     with running(WATCHED, tmp_path) as system:
         simulator = Simulator(peer, system)
         let_real_time_pass(system)  # no time yet
@@ -330,7 +328,9 @@ def test_silence_counts_while_the_simulation_goes_on(tmp_path: Path, peer: Peer)
             wait_until(lambda: "/a unconfigured" in system.states(), "the node has failed")
 
 
-def test_a_node_that_holds_up_its_loop_holds_up_nobody_s_time(tmp_path: Path, peer: Peer) -> None:
+def test_a_node_that_blocks_its_loop_does_not_block_the_time_of_others(
+    tmp_path: Path, peer: Peer
+) -> None:
     text = """
     system: held
     use_sim_time: true

@@ -36,7 +36,7 @@ def server(on: Bench) -> Iterator[ActionServer]:
 
 
 class serving:  # noqa: N801
-    """An action server that goes in three steps, or on and on when it is slow."""
+    """An action server that takes three steps, or continues forever if it is slow."""
 
     def __init__(self, on: Bench, **options: Any) -> None:
         self.on = on
@@ -104,11 +104,11 @@ def wait_for(future: Any) -> Any:
     return future.result()
 
 
-def test_a_client_that_is_destroyed_while_the_loop_looks_at_it_is_no_error(on: Bench) -> None:
-    """rclpy finds that it is destroyed, and adds it to its wait set nonetheless."""
+def test_destroying_a_client_while_the_loop_polls_it_is_not_an_error(on: Bench) -> None:
+    """rclpy adds it to its wait set although it is destroyed."""
     client = ActionClient(on.node, Navigate, "nowhere", callback_group=ReentrantCallbackGroup())
     on.loop.add_action_client(client)
-    client._client_handle.destroy_when_not_in_use()  # as destroy begins, and an executor comes by
+    client._client_handle.destroy_when_not_in_use()  # the first step of destroy
     for _ in range(3):
         on.loop.run(lambda: None)
     on.loop.remove(client)
@@ -116,10 +116,10 @@ def test_a_client_that_is_destroyed_while_the_loop_looks_at_it_is_no_error(on: B
     assert on.errors() == []
 
 
-def test_an_answer_waits_until_its_request_is_noted_down(
+def test_an_early_response_waits_until_its_request_is_registered(
     on: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """rclpy does that after sending, in several steps: what is done in between never goes."""
+    """rclpy registers a request after sending it, in several steps."""
     monkeypatch.setattr(actions, "_RETRIES", 5000)
     has_come = threading.Event()
     is_early = actions.ActionSource._is_early
@@ -182,7 +182,7 @@ def test_a_goal_whose_acceptance_raises_is_rejected(on: Bench, error: type[BaseE
     assert on.errors() == [error]
 
 
-def test_a_goal_that_is_taken_but_not_started_is_aborted_when_that_raises(on: Bench) -> None:
+def test_a_goal_whose_accepted_callback_raises_is_aborted(on: Bench) -> None:
     def fall_over(goal: Any) -> None:
         raise ValueError("broken")
 
@@ -195,7 +195,7 @@ def test_a_goal_that_is_taken_but_not_started_is_aborted_when_that_raises(on: Be
     assert on.errors() == [ValueError]
 
 
-def test_a_cancellation_whose_callback_raises_is_refused(on: Bench) -> None:
+def test_a_cancellation_whose_callback_raises_is_rejected(on: Bench) -> None:
     refused: list[bool] = []
 
     def fall_over(goal: Any) -> CancelResponse:
@@ -218,7 +218,7 @@ def test_a_cancellation_whose_callback_raises_is_refused(on: Bench) -> None:
     assert on.errors() == [ValueError]
 
 
-def test_results_nobody_fetched_expire(on: Bench) -> None:
+def test_results_that_are_not_fetched_expire(on: Bench) -> None:
     with serving(on, result_timeout=0.2) as server:
         client = own_client(on)
         handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=1.0)))
@@ -232,7 +232,7 @@ def test_results_nobody_fetched_expire(on: Bench) -> None:
 
 
 def answers(asking: Any) -> bool:
-    """Tell whether the answers of a server get here: it may find us later than we found it."""
+    """Return whether responses of a server arrive: it may discover this process later."""
     future = asking.call_async(ListParameters.Request())
     until = time.monotonic() + 1.0
     while not future.done() and time.monotonic() < until:
@@ -248,7 +248,7 @@ class TestClient:
         with peer("navigate", "navigate") as process:
             wait_for_line(process, "serving")
             client = own_client(on)
-            # Announced in order: who knows of this one knows of all that the client is made of.
+            # Discovered in order: with this one, all entities of the client are known.
             last = on.client(ListParameters, f"peer_{process.pid}/list_parameters")
             wait_until(last.service_is_ready)
             wait_until(lambda: answers(last), "the server knows of the client")
@@ -278,5 +278,5 @@ class TestClient:
         assert len(wait_for(handle.cancel_goal_async()).goals_canceling) == 1
         assert wait_for(result).status == GoalStatus.STATUS_CANCELED
 
-    def test_hears_of_a_rejection(self, client: ActionClient) -> None:
+    def test_is_notified_of_a_rejection(self, client: ActionClient) -> None:
         assert not wait_for(client.send_goal_async(Navigate.Goal(max_velocity=0.0))).accepted

@@ -24,11 +24,11 @@ def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
         yield running
 
 
-def test_is_called_what_the_system_calls_it(on: Bench) -> None:
+def test_has_the_name_of_the_system_file(on: Bench) -> None:
     assert on.loop.name == "default"
 
 
-def test_calls_from_another_thread_begin_in_order(on: Bench) -> None:
+def test_calls_from_another_thread_start_in_order(on: Bench) -> None:
     seen: list[int] = []
     lock = threading.Lock()
 
@@ -50,10 +50,10 @@ def test_calls_after_a_delay_and_not_before(on: Bench) -> None:
     assert called_at[0] - begin >= 0.05
 
 
-def test_a_cancelled_call_does_not_come(on: Bench) -> None:
+def test_a_canceled_call_is_not_made(on: Bench) -> None:
     seen: list[str] = []
     release = threading.Event()
-    for _ in range(3):  # as many as there are threads: the call is cancelled before its time
+    for _ in range(3):  # one per thread: the call is canceled before it is due
         on.loop.call_soon(release.wait)
     on.loop.call_later(0.01, lambda: seen.append("cancelled")).cancel()
     release.set()
@@ -63,7 +63,7 @@ def test_a_cancelled_call_does_not_come(on: Bench) -> None:
 
 
 @pytest.mark.parametrize("delay_s", [1e12, float("inf")])
-def test_a_delay_may_be_longer_than_anybody_waits(on: Bench, delay_s: float) -> None:
+def test_a_delay_may_be_very_long(on: Bench, delay_s: float) -> None:
     on.loop.call_later(delay_s, lambda: None)
     called: list[int] = []
     on.loop.call_later(0.01, lambda: called.append(1))
@@ -78,11 +78,11 @@ def test_a_timer_keeps_its_rate(on: Bench) -> None:
     wait_until(lambda: len(at) >= 50)
     timer.cancel()
     assert at[49] - at[0] > 0.4
-    # The median: all may stand still for a moment on a busy machine.
+    # The median: a busy machine may stall for a moment.
     assert median(later - earlier for earlier, later in pairwise(at)) < 0.02
 
 
-def test_a_late_timer_skips_and_keeps_its_beat(on: Bench) -> None:
+def test_a_late_timer_skips_and_keeps_its_phase(on: Bench) -> None:
     period_s = 0.1
     at: list[float] = []
 
@@ -96,7 +96,7 @@ def test_a_late_timer_skips_and_keeps_its_beat(on: Bench) -> None:
     wait_until(lambda: len(at) >= 8)
     timer.cancel()
     assert at[1] - at[0] >= 3.2 * period_s
-    assert at[3] - at[1] > period_s  # not bunched to make up for those missed
+    assert at[3] - at[1] > period_s  # no burst for the missed periods
     # Still at multiples of the period: one call at least is not late, however busy the machine.
     assert min((time_s - begin) % period_s for time_s in at[1:]) < 0.15 * period_s
 
@@ -134,7 +134,7 @@ def test_runs_a_task_to_its_result(on: Bench) -> None:
     assert future.result() == "slept"
 
 
-def test_cancelling_a_task_s_future_ends_the_coroutine(on: Bench) -> None:
+def test_canceling_the_future_of_a_task_ends_the_coroutine(on: Bench) -> None:
     seen: list[str] = []
     begun: list[bool] = []
 
@@ -153,7 +153,7 @@ def test_cancelling_a_task_s_future_ends_the_coroutine(on: Bench) -> None:
     assert on.reports == []
 
 
-def test_a_task_nobody_awaits_reports_its_exception(on: Bench) -> None:
+def test_an_unawaited_task_reports_its_exception(on: Bench) -> None:
     async def work() -> None:
         raise ValueError("broken")
 
@@ -163,7 +163,7 @@ def test_a_task_nobody_awaits_reports_its_exception(on: Bench) -> None:
 
 
 @pytest.mark.parametrize("error", [ValueError, SystemExit, KeyboardInterrupt])
-def test_an_exception_in_a_call_is_reported_and_the_loop_goes_on(
+def test_an_exception_in_a_call_is_reported_and_the_loop_continues(
     on: Bench, error: type[BaseException]
 ) -> None:
     def fall_over() -> None:
@@ -191,22 +191,22 @@ class TestRun:
     def test_on_the_loop_it_calls_at_once(self, on: Bench) -> None:
         assert on.loop.run(lambda: on.loop.run(lambda: "inner", 5.0), 5.0) == "inner"
 
-    def test_names_what_takes_too_long_and_where(self, on: Bench) -> None:
+    def test_a_timeout_names_the_function_and_its_stack(self, on: Bench) -> None:
         release = threading.Event()
 
         def take_too_long() -> None:
             release.wait()
 
         with pytest.raises(TimeoutError) as caught:
-            on.loop.run(take_too_long, 1.0)  # so long it may take until it is begun
+            on.loop.run(take_too_long, 1.0)  # time until it starts
         release.set()
         assert "take_too_long' is still running after 1 s" in str(caught.value)
         assert "release.wait()" in str(caught.value)
 
-    def test_what_was_not_begun_in_time_is_not_begun(self, on: Bench) -> None:
+    def test_a_function_that_did_not_start_in_time_never_starts(self, on: Bench) -> None:
         release = threading.Event()
         seen: list[str] = []
-        for _ in range(3):  # as many as there are threads
+        for _ in range(3):  # one per thread
             on.loop.call_soon(release.wait)
         wait_until(on.loop.current_stack)
         with pytest.raises(TimeoutError, match="was not started"):
@@ -216,7 +216,7 @@ class TestRun:
         assert seen == []
 
 
-class TestWhere:
+class TestCurrentStack:
     def test_shows_the_callback_that_runs(self, on: Bench) -> None:
         release = threading.Event()
 
@@ -241,31 +241,31 @@ def used_s(on: Bench) -> float:
 def test_idle_costs_nothing(on: Bench) -> None:
     on.loop.run(lambda: None, 5.0)
     before_s = used_s(on)
-    time.sleep(1.0)  # so long it is measured
+    time.sleep(1.0)  # the time of the measurement
     assert used_s(on) - before_s < 0.3  # a spinning loop would use it all
 
 
 def test_waiting_for_a_busy_thread_costs_nothing(on: Bench) -> None:
     release = threading.Event()
-    for _ in range(6):  # more than there are threads
+    for _ in range(6):  # more than the threads
         on.loop.call_soon(release.wait)
     wait_until(on.loop.current_stack)
     before_s = used_s(on)
-    time.sleep(0.5)  # so long it is measured
+    time.sleep(0.5)  # the time of the measurement
     meanwhile_s = used_s(on) - before_s
     release.set()
     assert meanwhile_s < 0.2
     assert on.loop.run(lambda: "alive", 5.0) == "alive"
 
 
-def test_a_busy_loop_starves_no_other_thread(on: Bench) -> None:
-    # Letting go of the interpreter's lock for a moment is not enough: nobody else is awake by then.
+def test_a_busy_loop_does_not_starve_other_threads(on: Bench) -> None:
+    # Releasing the interpreter's lock is not enough: no other thread is awake by then.
     on.loop.run_task(_never_idle(on))
     took_s: list[float] = []
-    while len(took_s) < 3 and not (took_s and took_s[-1] < 2.0):  # slow by chance is not so thrice
+    while len(took_s) < 3 and not (took_s and took_s[-1] < 2.0):  # not slow by chance three times
         began_s = time.monotonic()
         for _ in range(50):
-            time.sleep(0.001)  # each time the thread needs the lock to go on
+            time.sleep(0.001)  # each time the thread needs the lock to continue
         took_s.append(time.monotonic() - began_s)
     assert min(took_s) < 2.0
 
@@ -287,7 +287,7 @@ class TestStopping:
             rclpy.shutdown()
 
     @pytest.mark.parametrize("kind", KINDS)
-    def test_a_busy_loop_does_not_hold_up_who_stops_it(self, kind: ExecutorKind) -> None:
+    def test_stopping_a_busy_loop_does_not_block(self, kind: ExecutorKind) -> None:
         rclpy.init()
         release = threading.Event()
         try:
@@ -297,7 +297,7 @@ class TestStopping:
             wait_until(loop.current_stack)
             begin = time.monotonic()
             assert not loop.stop(0.2)
-            assert time.monotonic() - begin < 10.0  # it waits for ever
+            assert time.monotonic() - begin < 10.0  # the callback waits forever
             assert "wait" in loop.current_stack()
             release.set()
             wait_until(lambda: loop.stop(0.2))
@@ -306,7 +306,7 @@ class TestStopping:
             rclpy.shutdown()
 
     @pytest.mark.parametrize("kind", KINDS)
-    def test_tasks_are_cancelled_and_clean_up(self, kind: ExecutorKind) -> None:
+    def test_tasks_are_canceled_and_clean_up(self, kind: ExecutorKind) -> None:
         seen: list[str] = []
         with bench(kind) as on:
             begun: list[bool] = []
@@ -316,7 +316,7 @@ class TestStopping:
                 try:
                     await Future()
                 finally:
-                    await sleep(on.loop, 60.0)  # nobody waits that long
+                    await sleep(on.loop, 60.0)  # longer than the test
                     seen.append("too late")
 
             async def clean() -> None:

@@ -52,7 +52,7 @@ def test_an_rclpy_future_is_not_polled() -> None:
     assert calls.called == 2
 
 
-def test_an_rclpy_future_is_not_polled_in_turns_either() -> None:
+def test_an_rclpy_future_is_not_polled_on_a_strand_either() -> None:
     calls = Calls()
     foreign = RclpyFuture()
     outcome = start(calls, foreign, SerialStrand(calls.waiting.append))
@@ -86,7 +86,7 @@ def test_a_wrapped_future_has_the_outcome_of_the_rclpy_future() -> None:
     assert isinstance(failed.exception(), ValueError)
 
 
-def test_cancelling_goes_both_ways_through_a_wrapped_future() -> None:
+def test_canceling_works_in_both_directions_of_a_wrapped_future() -> None:
     foreign = RclpyFuture()
     wrap_future(foreign).cancel()
     assert foreign.cancelled()

@@ -1,4 +1,4 @@
-"""What only the composer's own loop promises: fairness, precise waits, nothing left behind."""
+"""Properties of the composer's own loop only: fairness, precise waits, no leaks."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def on() -> Iterator[Bench]:
         yield running
 
 
-def test_calls_keep_their_order_among_many_threads(on: Bench) -> None:
+def test_calls_of_each_thread_keep_their_order(on: Bench) -> None:
     seen: list[tuple[int, int]] = []
 
     def post(thread: int) -> None:
@@ -45,7 +45,7 @@ def test_calls_keep_their_order_among_many_threads(on: Bench) -> None:
         assert [what[1] for what in seen if what[0] == number] == list(range(500))
 
 
-def test_waking_it_takes_far_less_than_a_millisecond(on: Bench) -> None:
+def test_a_wake_up_takes_far_less_than_a_millisecond(on: Bench) -> None:
     delays_s: list[float] = []
     for _ in range(50):
         time.sleep(0.002)  # until it sleeps
@@ -54,7 +54,7 @@ def test_waking_it_takes_far_less_than_a_millisecond(on: Bench) -> None:
     assert sorted(delays_s)[25] < 0.002  # the median; the machine may be busy
 
 
-def test_timers_do_not_wait_for_whole_milliseconds(on: Bench) -> None:
+def test_timers_are_not_rounded_to_milliseconds(on: Bench) -> None:
     at: list[float] = []
     timer = on.loop.call_every(0.0005, lambda: at.append(time.monotonic()))
     wait_until(lambda: len(at) > 400)
@@ -64,7 +64,7 @@ def test_timers_do_not_wait_for_whole_milliseconds(on: Bench) -> None:
 
 
 @pytest.mark.parametrize("post", ["call_soon", "call_later in the past", "call_later at once"])
-def test_a_call_posting_itself_starves_nobody(on: Bench, post: str) -> None:
+def test_a_call_that_posts_itself_starves_nothing(on: Bench, post: str) -> None:
     stop: list[bool] = []
     seen: list[int] = []
     ticks: list[int] = []
@@ -103,11 +103,11 @@ def test_a_full_queue_starves_no_other_subscription(on: Bench) -> None:
     on.loop.run(publish_all, 10.0)
     wait_until(lambda: len(flood) == 2000)
     assert len(served_at) == 1
-    assert served_at[0] < 200  # not behind the two thousand
+    assert served_at[0] < 200  # not after the two thousand
 
 
-def test_an_answer_behind_those_for_others_is_found_at_once(on: Bench) -> None:
-    """A client is sent all answers of its service, and a take passes over one for another."""
+def test_a_response_behind_those_to_other_clients_is_taken_at_once(on: Bench) -> None:
+    """A client receives all responses of its service, and a take skips those to others."""
     requests: list[Any] = []
     on.serve(Trigger, "ask", lambda _, reply: requests.append(reply))
     clients = [on.client(Trigger, "ask") for _ in range(2)]
@@ -121,7 +121,7 @@ def test_an_answer_behind_those_for_others_is_found_at_once(on: Bench) -> None:
     answers_there.attach(probe.handle, readiness.RESPONSE)
     seen: list[int] = []
 
-    def answer_all() -> None:  # and keep the loop from looking until everybody has got them
+    def answer_all() -> None:  # and block the loop until all of them have arrived
         for number, reply in enumerate(requests):
             reply(Trigger.Response(message=str(number)))
         until_s = time.monotonic() + 5.0
@@ -135,15 +135,15 @@ def test_an_answer_behind_those_for_others_is_found_at_once(on: Bench) -> None:
     on.node.destroy_client(probe)
 
 
-def slot_of(on: Bench, subscription: object) -> SourceGroup:
+def group_of(on: Bench, subscription: object) -> SourceGroup:
     assert isinstance(on.loop, EventLoop)
     return on.loop._group_of[subscription]
 
 
-def takes_of(slot: SourceGroup) -> list[bool]:
-    """Return what says from now on, for each take of the slot's source, whether something came."""
+def takes_of(group: SourceGroup) -> list[bool]:
+    """Return a list that records, for each take of the group's source, whether it took an item."""
     takes: list[bool] = []
-    source: Any = slot.sources[0]
+    source: Any = group.sources[0]
     take = source.take
 
     def counted() -> Any:
@@ -155,12 +155,12 @@ def takes_of(slot: SourceGroup) -> list[bool]:
     return takes
 
 
-def test_what_a_full_queue_dropped_is_not_looked_for_again(on: Bench) -> None:
+def test_messages_that_a_full_queue_dropped_are_not_taken_again(on: Bench) -> None:
     seen: list[int] = []
     subscription = on.subscribe(
         Int64, "numbers", lambda message: seen.append(message.data), depth=3
     )
-    takes = takes_of(slot_of(on, subscription))
+    takes = takes_of(group_of(on, subscription))
     publisher = on.node.create_publisher(Int64, "numbers", 50)
     wait_until(publisher.get_subscription_count)
 
@@ -173,31 +173,31 @@ def test_what_a_full_queue_dropped_is_not_looked_for_again(on: Bench) -> None:
     on.loop.run(lambda: None, 5.0)
     assert seen == [47, 48, 49]
     assert takes.count(True) == 3
-    assert takes.count(False) <= 2, "one look into the empty queue, and perhaps one at the start"
+    assert takes.count(False) <= 2, "one take from the empty queue, and perhaps one at the start"
 
 
-def test_a_message_is_taken_once_and_nothing_is_looked_for_after_it(on: Bench) -> None:
+def test_a_message_needs_a_single_take(on: Bench) -> None:
     seen: list[int] = []
     subscription = on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
     publisher = on.node.create_publisher(Int64, "numbers", 10)
     wait_until(publisher.get_subscription_count)
-    for _ in range(2):  # once round, so that it has looked for what came before
+    for _ in range(2):  # a full round, so that earlier messages have been taken
         on.loop.run(lambda: None, 5.0)
-    takes = takes_of(slot_of(on, subscription))
+    takes = takes_of(group_of(on, subscription))
     for number in range(20):
         publisher.publish(Int64(data=number))
         wait_until(lambda number=number: seen[-1:] == [number])
     assert takes == [True] * 20
 
 
-class Striking(tuple[EntitySource, ...]):
-    """Sources that cannot be gone through the first time, as if the thread were struck there."""
+class RaisingOnce(tuple[EntitySource, ...]):
+    """Sources whose first iteration raises, as an asynchronous exception would."""
 
-    struck = False
+    has_raised = False
 
     def __iter__(self) -> Iterator[EntitySource]:
-        if not self.struck:
-            self.struck = True
+        if not self.has_raised:
+            self.has_raised = True
             raise SystemExit
         return super().__iter__()
 
@@ -207,8 +207,8 @@ def test_an_exception_between_two_callbacks_loses_nothing(on: Bench) -> None:
     subscription = on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
     publisher = on.node.create_publisher(Int64, "numbers", 10)
     wait_until(publisher.get_subscription_count)
-    slot = slot_of(on, subscription)
-    slot.sources = Striking(slot.sources)
+    group = group_of(on, subscription)
+    group.sources = RaisingOnce(group.sources)
 
     def publish() -> None:
         for number in range(5):
@@ -219,8 +219,8 @@ def test_an_exception_between_two_callbacks_loses_nothing(on: Bench) -> None:
     assert on.errors() == [SystemExit]
 
 
-def test_destroying_before_removing_is_survived(on: Bench) -> None:
-    """The wrong order: the destruction is put off until the loop has let go."""
+def test_destroying_before_removing_is_harmless(on: Bench) -> None:
+    """The wrong order: the destruction is postponed until the loop releases the entity."""
     for _ in range(20):
         subscription = on.subscribe(Int64, "numbers", lambda message: None)
         publisher = on.node.create_publisher(Int64, "numbers", 10)
@@ -254,7 +254,7 @@ def test_a_callback_may_remove_and_destroy_its_own_subscription(on: Bench) -> No
     assert on.reports == []
 
 
-def test_no_file_descriptor_is_left_behind() -> None:
+def test_no_file_descriptor_leaks() -> None:
     def descriptors() -> int:
         return len(os.listdir("/proc/self/fd"))  # noqa: PTH208  a directory of links that vanish
 
@@ -273,7 +273,7 @@ def test_no_file_descriptor_is_left_behind() -> None:
 
 
 def test_stopping_in_a_flood_ends_cleanly() -> None:
-    with peer("flood", "flood", 10_000_000, 10):  # never over: it is killed
+    with peer("flood", "flood", 10_000_000, 10):  # it never ends and is killed
         for _ in range(3):
             with bench(ExecutorKind.EVENTS) as on:
                 seen: list[int] = []
@@ -282,8 +282,8 @@ def test_stopping_in_a_flood_ends_cleanly() -> None:
             assert on.reports == []
 
 
-def test_taking_under_a_flood_of_another_process_never_locks_up(on: Bench) -> None:
-    """With a Python callback on the middleware's thread this stood still within a second."""
+def test_taking_under_a_flood_of_another_process_does_not_deadlock(on: Bench) -> None:
+    """With a Python callback on the middleware's thread it deadlocked within a second."""
     seen: list[int] = []
     on.subscribe(Int64, "flood", lambda message: seen.append(message.data), depth=10)
     with peer("flood", "flood", 20_000, 10) as process:
@@ -293,7 +293,7 @@ def test_taking_under_a_flood_of_another_process_never_locks_up(on: Bench) -> No
     assert seen == sorted(seen)
 
 
-def test_a_cancelled_task_in_a_stopping_loop_is_not_reported() -> None:
+def test_a_canceled_task_in_a_stopping_loop_is_not_reported() -> None:
     with bench(ExecutorKind.EVENTS) as on:
 
         async def wait() -> None:

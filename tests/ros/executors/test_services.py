@@ -32,7 +32,7 @@ def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
 
 
 def call(on: Bench, client: Any, request: Any) -> Any:
-    """Call from a task of the loop and wait for the answer."""
+    """Call from a task of the loop and wait for the response."""
 
     async def ask() -> Any:
         return await client.call_async(request)
@@ -49,7 +49,7 @@ def test_a_request_of_another_process_is_answered(on: Bench) -> None:
         assert json.loads(last_line(process)) == [[True, "now"]] * 3
 
 
-def test_answers_may_come_later_and_in_any_order(on: Bench) -> None:
+def test_responses_may_be_sent_later_and_in_any_order(on: Bench) -> None:
     waiting: list[Any] = []
 
     def keep(request: Trigger.Request, reply: Any) -> None:
@@ -84,7 +84,7 @@ def test_a_request_is_answered_once(on: Bench) -> None:
 
 
 @pytest.mark.parametrize("error", ERRORS)
-def test_when_the_callback_raises_the_caller_gets_an_answer(
+def test_if_the_callback_raises_the_client_gets_a_response(
     on: Bench, error: type[BaseException]
 ) -> None:
     def fall_over(request: Trigger.Request, reply: Any) -> None:
@@ -94,12 +94,12 @@ def test_when_the_callback_raises_the_caller_gets_an_answer(
     client = on.client(Trigger, "ask")
     for _ in range(2):
         assert not call(on, client, Trigger.Request()).success
-    wait_until(lambda: len(on.reports) == 2)  # on several threads an answer may be faster
+    wait_until(lambda: len(on.reports) == 2)  # on several threads the response may be faster
     assert on.errors() == [error] * 2
     assert "service 'ask'" in on.reports[0][0]
 
 
-def test_a_client_gets_the_answer_of_another_process(on: Bench) -> None:
+def test_a_client_gets_the_response_of_another_process(on: Bench) -> None:
     client = on.client(Trigger, "ask")
     with peer("serve", "ask") as process:
         wait_for_line(process, "serving")
@@ -116,7 +116,7 @@ def test_a_client_gets_the_answer_of_another_process(on: Bench) -> None:
     assert set(seen) == {"from the peer"}
 
 
-def test_a_call_nobody_answers_times_out_and_is_forgotten(on: Bench) -> None:
+def test_a_call_without_a_response_times_out_and_is_forgotten(on: Bench) -> None:
     on.serve(Trigger, "ask", lambda _, reply: None)
     client = on.client(Trigger, "ask")
     wait_until(client.service_is_ready)
@@ -132,7 +132,7 @@ def test_a_call_nobody_answers_times_out_and_is_forgotten(on: Bench) -> None:
     wait_until(lambda: not client._pending_requests)
 
 
-def test_an_answer_after_the_timeout_harms_nobody(on: Bench) -> None:
+def test_a_response_after_the_timeout_is_ignored(on: Bench) -> None:
     replies: list[Any] = []
     on.serve(Trigger, "ask", lambda _, reply: replies.append(reply))
     client = on.client(Trigger, "ask")
@@ -193,26 +193,26 @@ def managed(on: Bench) -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("managed")
-class TestWhatALifecycleNodeBringsAlong:
+class TestServicesOfALifecycleNode:
     def test_lifecycle_services_answer(self, on: Bench) -> None:
         client = on.client(GetState, "managed/get_state")
         assert call(on, client, GetState.Request()).current_state.label == "unconfigured"
 
     @pytest.mark.parametrize("transition_id", [3, 250])
-    def test_an_illegal_transition_is_refused_and_ends_nothing(
+    def test_an_illegal_transition_is_refused_and_the_loop_continues(
         self, on: Bench, transition_id: int
     ) -> None:
         client = on.client(ChangeState, "managed/change_state")
         request = ChangeState.Request()
         request.transition.id = transition_id
         assert not call(on, client, request).success
-        wait_until(lambda: on.reports)  # on several threads the answer may be faster
+        wait_until(lambda: on.reports)  # on several threads the response may be faster
         assert len(on.reports) == 1
         state = call(on, on.client(GetState, "managed/get_state"), GetState.Request())
         assert state.current_state.label == "unconfigured"
 
 
-class TestWhatEveryNodeBringsAlong:
+class TestServicesOfEveryNode:
     def test_parameters_can_be_set(self, on: Bench) -> None:
         on.node.declare_parameter("speed", 1.0)
         client = on.client(SetParameters, "bench/set_parameters")
@@ -221,12 +221,12 @@ class TestWhatEveryNodeBringsAlong:
         assert call(on, client, request).results[0].successful
         assert on.node.get_parameter("speed").value == 2.5
 
-    def test_logger_levels_can_be_asked_for(self, on: Bench) -> None:
+    def test_logger_levels_can_be_read(self, on: Bench) -> None:
         client = on.client(GetLoggerLevels, "bench/get_logger_levels")
         answer = call(on, client, GetLoggerLevels.Request(names=["bench"]))
         assert [level.name for level in answer.levels] == ["bench"]
 
-    def test_types_can_be_asked_for(self, on: Bench) -> None:
+    def test_type_descriptions_can_be_read(self, on: Bench) -> None:
         client = on.client(GetTypeDescription, "bench/get_type_description")
         request = GetTypeDescription.Request(type_name="std_srvs/srv/Trigger", type_hash="wrong")
         assert "parse type hash" in call(on, client, request).failure_reason
@@ -239,9 +239,7 @@ class TestWhatEveryNodeBringsAlong:
         wait_until(lambda: on.node.get_clock().now().nanoseconds == 1234 * 10**9)
 
     @pytest.mark.parametrize("kind", ["plain", "async"])
-    def test_a_service_the_node_came_with_is_served_by_its_own_callback(
-        self, on: Bench, kind: str
-    ) -> None:
+    def test_a_service_that_was_not_added_uses_its_own_callback(self, on: Bench, kind: str) -> None:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             response.message = "plain"
             return response

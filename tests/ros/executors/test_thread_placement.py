@@ -1,4 +1,4 @@
-"""Executors with CPUs and priorities of their own, on Linux as it is."""
+"""Executors with their own CPUs and priorities, on the real Linux."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def ros() -> Iterator[None]:
 
 @pytest.mark.usefixtures("ros")
 @pytest.mark.parametrize("kind", list(ExecutorKind))
-def test_every_thread_of_an_executor_is_put_in_its_place(kind: ExecutorKind) -> None:
+def test_every_thread_of_an_executor_is_placed(kind: ExecutorKind) -> None:
     wanted = executor(kind, cpus=(CPU,), priority=7, threads=3)
     loop = make_loop(wanted)
     loop.start()
@@ -61,7 +61,7 @@ def test_every_thread_of_an_executor_is_put_in_its_place(kind: ExecutorKind) -> 
         loop.stop(1.0)
 
 
-def test_a_cpu_that_is_not_there_is_a_warning_and_the_system_runs(tmp_path: Path) -> None:
+def test_a_missing_cpu_is_a_warning_and_the_system_runs(tmp_path: Path) -> None:
     text = """
     system: pinned
     executors: {control: {cpus: [1023]}}

@@ -46,7 +46,7 @@ def test_messages_reach_another_process(on: Bench) -> None:
     assert seen == [f"text {first + further}" for further in range(5)]
 
 
-def test_a_late_joiner_gets_what_was_latched(on: Bench) -> None:
+def test_a_late_joiner_gets_the_latched_messages(on: Bench) -> None:
     with peer("latched", "state", "kept") as process:
         wait_for_line(process, "published")
         seen: list[str] = []
@@ -61,14 +61,14 @@ def test_a_late_joiner_gets_what_was_latched(on: Bench) -> None:
     assert seen == ["kept"]
 
 
-def test_what_arrived_before_the_subscription_was_added_is_served(on: Bench) -> None:
+def test_messages_from_before_the_subscription_was_added_are_served(on: Bench) -> None:
     arrived = on.loop.run(lambda: _publish_before_adding(on), 10.0)
     wait_until(lambda: len(arrived) == 3)
     assert arrived == [0, 1, 2]
 
 
 def _publish_before_adding(on: Bench) -> list[int]:
-    """Runs on the loop, which therefore serves nothing meanwhile."""
+    """Run on the loop, which serves nothing meanwhile."""
     arrived: list[int] = []
     publisher = on.node.create_publisher(Int64, "early", 10)
     subscription = on.node.create_subscription(Int64, "early", lambda _: None, 10)
@@ -79,7 +79,7 @@ def _publish_before_adding(on: Bench) -> list[int]:
     return arrived
 
 
-def test_keep_all_loses_nothing_of_a_burst(on: Bench) -> None:
+def test_keep_all_loses_no_message_of_a_burst(on: Bench) -> None:
     seen: list[int] = []
     on.subscribe(
         Int64, "burst", lambda message: seen.append(message.data), history=HistoryPolicy.KEEP_ALL
@@ -90,7 +90,7 @@ def test_keep_all_loses_nothing_of_a_burst(on: Bench) -> None:
 
 
 @pytest.mark.parametrize("error", [ValueError, SystemExit, KeyboardInterrupt])
-def test_an_exception_in_a_callback_is_reported_and_the_next_message_comes(
+def test_an_exception_in_a_callback_is_reported_and_the_next_message_arrives(
     on: Bench, error: type[BaseException]
 ) -> None:
     seen: list[int] = []
@@ -109,7 +109,7 @@ def test_an_exception_in_a_callback_is_reported_and_the_next_message_comes(
     assert all("'numbers'" in what and "fall_over" in what for what, _ in on.reports)
 
 
-def test_after_removal_no_message_comes(on: Bench) -> None:
+def test_after_removal_no_message_arrives(on: Bench) -> None:
     seen: list[int] = []
     subscription = on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
     kept: list[int] = []
@@ -126,7 +126,7 @@ def test_after_removal_no_message_comes(on: Bench) -> None:
     on.node.destroy_subscription(subscription)
 
 
-def test_a_slow_subscription_does_not_hold_up_a_timer(on: Bench) -> None:
+def test_a_slow_subscription_does_not_delay_a_timer(on: Bench) -> None:
     """A flood of messages, each of them slow, against a timer of 100 Hz."""
     flood: list[int] = []
     ticks: list[float] = []
@@ -142,7 +142,7 @@ def test_a_slow_subscription_does_not_hold_up_a_timer(on: Bench) -> None:
         before = len(ticks)
         wait_until(lambda: len(flood) > 1000)
         meanwhile = ticks[before:]
-    # The median: all may stand still for a moment on a busy machine.
+    # The median: a busy machine may stall for a moment.
     assert median(later - earlier for earlier, later in pairwise(meanwhile)) < 0.02
 
 
@@ -158,12 +158,12 @@ def test_qos_events_reach_their_callback(on: Bench) -> None:
     on.node.create_publisher(String, "latched", 10)
     wait_until(lambda: policies)
     assert policies[0].total_count == 1  # type: ignore[attr-defined]
-    time.sleep(0.05)  # nothing more is to come: there is no state to wait for
+    time.sleep(0.05)  # no further event: there is no state to wait for
     assert len(policies) == 1
 
 
-def test_entities_come_and_go_in_a_flood(on: Bench) -> None:
-    """Created, added, removed and destroyed on other threads while messages pour in."""
+def test_entities_are_created_and_destroyed_during_a_flood(on: Bench) -> None:
+    """Created, added, removed and destroyed on other threads while messages arrive."""
     stop = threading.Event()
     total: list[int] = []
 

@@ -1,4 +1,4 @@
-"""Actions between co-located nodes: straight, with the same outcomes as by DDS."""
+"""Actions between co-located nodes: in-process, with the same outcomes as by DDS."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ connections:
 
 
 def go(system: RunningSystem, max_velocity: float) -> Any:
-    """Have the client send a goal and return its behaviour; 0 m/s never arrives."""
+    """Make the client send a goal and return its behavior; 0 m/s never arrives."""
     client = system.node("client")
     client._behavior.feedback.clear()
     client._behavior.sent = None
@@ -90,7 +90,7 @@ def go(system: RunningSystem, max_velocity: float) -> Any:
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 @pytest.mark.parametrize("delivery", ["auto", "dds"])
-def test_every_outcome_of_a_goal_is_the_same_either_way(
+def test_goals_have_the_same_outcomes_in_process_and_by_dds(
     tmp_path: Path, kind: str, delivery: str
 ) -> None:
     text = TEXT.replace("KIND", kind).replace("DELIVERY", delivery)
@@ -109,7 +109,7 @@ def test_every_outcome_of_a_goal_is_the_same_either_way(
         assert client.outcomes[-1] == "GoalRejected"
 
         go(system, 0.0)
-        wait_until(lambda: client.feedback and client.sent)  # feedback may be the first to come
+        wait_until(lambda: client.feedback and client.sent)  # feedback may arrive first
         system.node("client")._context.spawn(client.turn_back())
         wait_until(lambda: len(client.outcomes) == 3)
         assert client.outcomes[-1] == ("canceled", "turned back")
@@ -130,10 +130,10 @@ def test_every_outcome_of_a_goal_is_the_same_either_way(
         wait_until(lambda: len(client.outcomes) == 6)
         assert client.outcomes[-1] == "CallCancelled"
         goals = system.node("server")._entities.action_servers["go"]._goals
-        wait_until(lambda: not goals, "the end of the goal nobody waits for")
+        wait_until(lambda: not goals, "the end of the unawaited goal")
 
 
-def test_somebody_outside_can_cancel_a_goal_of_the_process(tmp_path: Path) -> None:
+def test_an_external_node_can_cancel_a_goal_of_the_process(tmp_path: Path) -> None:
     text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto")
     with running(text, tmp_path, going=MODULE) as system:
         client = go(system, 0.0)
@@ -150,7 +150,7 @@ def test_somebody_outside_can_cancel_a_goal_of_the_process(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 @pytest.mark.parametrize("copied", [False, True])
-def test_the_ends_hold_the_same_objects_unless_copies_are_asked_for(
+def test_both_endpoints_have_the_same_objects_unless_isolated(
     tmp_path: Path, kind: str, copied: bool
 ) -> None:
     text = TEXT.replace("KIND", kind).replace("DELIVERY", "auto") + (COPIED if copied else "")

@@ -1,4 +1,4 @@
-"""Copies of messages for ``isolation: copy``: equal, and nothing of them is shared."""
+"""Copies of messages for ``isolation: copy``: equal, and nothing is shared."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MESSAGES = [
 
 
 def parts(value: Any) -> list[object]:
-    """Return everything in a message that can be changed."""
+    """Return all mutable parts of a message."""
     if isinstance(value, str | bytes | int | float):
         return []
     if hasattr(value, "get_fields_and_field_types"):
@@ -35,7 +35,7 @@ def parts(value: Any) -> list[object]:
 
 
 @pytest.mark.parametrize("message", MESSAGES, ids=lambda message: type(message).__name__)
-def test_a_copy_is_equal_and_shares_nothing_that_can_change(message: Any) -> None:
+def test_a_copy_is_equal_and_shares_nothing_mutable(message: Any) -> None:
     copy = copy_of(message)
     assert copy == message
     assert type(copy) is type(message)
@@ -43,7 +43,7 @@ def test_a_copy_is_equal_and_shares_nothing_that_can_change(message: Any) -> Non
     assert not shared
 
 
-def test_a_change_of_the_copy_stays_there() -> None:
+def test_changing_the_copy_does_not_change_the_original() -> None:
     path = Path(poses=[PoseStamped(pose=Pose())])
     copy_of(path).poses[0].pose.position.x = 1.0
     assert path.poses[0].pose.position.x == 0.0

@@ -1,4 +1,4 @@
-"""Delivery in the process has the same semantics as by DDS: the same table for both."""
+"""In-process delivery has the same semantics as DDS: one table for both."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Sink(Behavior):
 
 
 def text_of(delivery: str, executor: str) -> str:
-    """A source with a topic for each row, and a sink for each."""
+    """Return a system with a topic and a sink for each row."""
     publishers = "".join(
         f"      {name}: {{type: std_msgs/msg/Int64, topic: /{name}, qos: {offered}}}\n"
         for name, (offered, _, _) in TABLE.items()
@@ -75,7 +75,7 @@ def text_of(delivery: str, executor: str) -> str:
 
 @pytest.mark.parametrize("delivery", ["auto", "dds"])
 @pytest.mark.parametrize("executor", ["events", "single_threaded"])
-def test_every_combination_of_qos_delivers_the_same_either_way(
+def test_every_combination_of_qos_delivers_the_same_in_process_and_by_dds(
     tmp_path: Path, executor: str, delivery: str
 ) -> None:
     with running(text_of(delivery, executor), tmp_path, table=MODULE) as system:
@@ -84,7 +84,7 @@ def test_every_combination_of_qos_delivers_the_same_either_way(
         for name, (_, _, wanted) in TABLE.items():
             sink = system.behavior(name)
             wait_until(lambda sink=sink, wanted=wanted: len(sink.heard) >= len(wanted), name)
-        # Whatever came too late or too often would have come by now: this goes the same way.
+        # Sent last, by the same path: late or duplicate messages would have arrived before.
         source.loop.run(lambda: source._behavior.send(["deep"], 1))
         deep = system.behavior("deep")
         wait_until(lambda: len(deep.heard) == SENT + 1)
@@ -116,7 +116,7 @@ connections:
 """
 
 
-def test_a_connection_may_ask_for_copies_or_for_dds(tmp_path: Path) -> None:
+def test_a_connection_may_require_copies_or_dds(tmp_path: Path) -> None:
     options = HostOptions(log_level=LogLevel.DEBUG)
     with running(COPIED, tmp_path, options=options, table=MODULE) as system:
         source = system.node("source")
@@ -179,7 +179,7 @@ class Changer(Behavior):
 """
 
 
-def test_each_receiver_has_a_copy_of_its_own_also_of_what_is_latched(tmp_path: Path) -> None:
+def test_each_receiver_has_its_own_copy_even_of_latched_messages(tmp_path: Path) -> None:
     with running(OF_THEIR_OWN, tmp_path, own=CHANGERS) as system:
         source = system.node("source")
         source.loop.run(source._behavior.send)
@@ -205,9 +205,7 @@ connections:
 
 
 @pytest.mark.parametrize(("whole", "one"), [("auto", "dds"), ("dds", "auto")])
-def test_what_a_connection_says_goes_before_the_system(
-    tmp_path: Path, whole: str, one: str
-) -> None:
+def test_a_connection_overrides_the_system(tmp_path: Path, whole: str, one: str) -> None:
     text = OVERRIDDEN.format(whole=whole, one=one)
     with running(text, tmp_path, table=MODULE) as system:
         source = system.node("source")

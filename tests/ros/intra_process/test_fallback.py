@@ -1,4 +1,4 @@
-"""Where the middleware returns a process its own messages, all goes by DDS, and each once."""
+"""If the middleware cannot ignore local publications, all messages use DDS, each once."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class Reader(Behavior):
 
 
 def compiled(source: str, target: Path, *options: str) -> Path:
-    """Compile C against the headers of the ROS that is used."""
+    """Compile C with the headers of the installed ROS."""
     prefixes = os.environ["AMENT_PREFIX_PATH"].split(":")
     folders = [folder for prefix in prefixes for folder in Path(prefix, "include").iterdir()]
     command = ["cc", "-Wall", "-Werror", *options, *(f"-I{folder}" for folder in folders)]
@@ -112,7 +112,7 @@ def compiled(source: str, target: Path, *options: str) -> Path:
 
 @contextmanager
 def in_front_of_rmw(middleware: str | None, folder: Path) -> Iterator[None]:
-    """Have processes that are started in the block go through it."""
+    """Make processes that start in the block use it."""
     with pytest.MonkeyPatch.context() as environment:
         if middleware is not None:
             library = compiled(f"{middleware}.c", folder / "library.so", "-shared", "-fPIC")
@@ -120,7 +120,7 @@ def in_front_of_rmw(middleware: str | None, folder: Path) -> Iterator[None]:
         yield
 
 
-def test_the_fields_lie_where_the_headers_say(tmp_path: Path) -> None:
+def test_the_offsets_of_fields_are_those_of_the_headers(tmp_path: Path) -> None:
     program = compiled("print_layout.c", tmp_path / "print_layout")
     printed = subprocess.run([program], capture_output=True, check=True, text=True).stdout
     flag = _Subscription.options.offset + _Options.ignore_local_publications.offset
@@ -129,7 +129,7 @@ def test_the_fields_lie_where_the_headers_say(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("middleware", [None, *REASONS])
-def test_every_message_comes_once_whatever_the_middleware_returns(
+def test_every_message_arrives_once_with_any_middleware(
     middleware: str | None, tmp_path: Path, peer: Peer
 ) -> None:
     path = tmp_path / "fallback.yaml"
@@ -144,13 +144,13 @@ def test_every_message_comes_once_whatever_the_middleware_returns(
             Int64, "/stream", lambda message: outside.take(message.data), QoSProfile(depth=5000)
         )
         wait_until(lambda: peer.node.count_publishers("/stream"), "the publisher")
-        # What a participant has is announced in order: who answers this knows the subscription.
+        # Endpoints are announced in order: a node that responds knows the subscription.
         assert peer.state("/writer") == "inactive"
         assert peer.change("/writer", "activate")
         for reader in ("near", "far"):
             system.wait_for(rf"\[{reader}\] complete")
         ends = dict.fromkeys(range(WRITERS), PER_WRITER - 1)
-        wait_until(lambda: outside.last == ends, "the last messages, outside")
+        wait_until(lambda: outside.last == ends, "the last messages, externally")
         code, _ = system.stop()
     assert code == 0, system.output
     everything = [WRITERS * PER_WRITER, [], list(range(LATCHED))]
@@ -171,7 +171,7 @@ def test_every_message_comes_once_whatever_the_middleware_returns(
 
 
 @pytest.mark.parametrize("middleware", [None, *REASONS])
-def test_the_doctor_tells_beforehand(middleware: str | None, tmp_path: Path) -> None:
+def test_the_doctor_reports_it(middleware: str | None, tmp_path: Path) -> None:
     with in_front_of_rmw(middleware, tmp_path):
         command = [*COMPOSE, "doctor", "--json"]
         done = subprocess.run(command, capture_output=True, check=False, text=True, timeout=30.0)

@@ -1,4 +1,4 @@
-"""More messages than a reader can take: what its depth allows comes, and the rest is counted."""
+"""More messages than a subscription handles: those within its depth arrive, the rest is counted."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.ros.support.in_process import running, wait_until
 
 
 @pytest.mark.parametrize("depth", [1, 100, 500])
-def test_a_flood_leaves_what_the_depth_allows_and_the_rest_is_counted(
+def test_a_flood_keeps_messages_within_the_depth_and_counts_the_rest(
     tmp_path: Path, depth: int
 ) -> None:
     text = NUMBERS.replace("KIND", "events").replace("100", str(depth))
@@ -25,7 +25,7 @@ def test_a_flood_leaves_what_the_depth_allows_and_the_rest_is_counted(
         assert near.statistics.dropped == 1000 - depth
 
 
-def test_without_a_depth_nothing_of_a_flood_is_dropped(tmp_path: Path) -> None:
+def test_without_a_depth_no_message_of_a_flood_is_dropped(tmp_path: Path) -> None:
     text = NUMBERS.replace("KIND", "events").replace("depth: 100", "history: keep_all")
     with running(text, tmp_path, counting=MODULE) as system:
         send(system, 5000)
@@ -37,7 +37,7 @@ def test_without_a_depth_nothing_of_a_flood_is_dropped(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 @pytest.mark.parametrize("depth", [1, 3, 500])
-def test_threads_that_push_each_other_out_lose_nothing_that_is_not_counted(
+def test_concurrent_publishers_lose_no_message_uncounted(
     tmp_path: Path, kind: str, depth: int
 ) -> None:
     text = NUMBERS.replace("KIND", kind).replace("100", str(depth))
@@ -58,20 +58,20 @@ def test_threads_that_push_each_other_out_lose_nothing_that_is_not_counted(
         for k in range(4):
             from_one = [number for number in heard if number // 5000 == k]
             assert from_one == sorted(from_one)
-        assert {number % 5000 for number in heard} & {4999}  # the very last comes
+        assert {number % 5000 for number in heard} & {4999}  # the last one arrives
 
 
 @pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
-def test_a_flood_fills_no_loop_and_delays_nothing_that_comes_after(
+def test_a_flood_neither_fills_the_loop_nor_delays_later_messages(
     tmp_path: Path, kind: str
 ) -> None:
     with running(NUMBERS.replace("KIND", kind), tmp_path, counting=MODULE) as system:
         far, release = system.node("far"), threading.Event()
-        for _ in range(8):  # as many as it can have threads
+        for _ in range(8):  # one per possible thread
             far.loop.call_soon(release.wait)
         for _ in range(20):
             send(system, 500)  # from the thread of another loop
-        assert len(far.loop._calls) < 120  # its depth, and little else
+        assert len(far.loop._calls) < 120  # its depth, and few other calls
         release.set()
         wait_until(lambda: len(far._behavior.heard) + far.statistics.dropped == 10_000)
         assert numbers(far._behavior.heard)[-100:] == list(range(9_900, 10_000))

@@ -1,4 +1,4 @@
-"""Services between co-located nodes: answered without DDS, with the same outcomes as by DDS."""
+"""Services between co-located nodes: in-process, with the same outcomes as by DDS."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def ask(system: RunningSystem, data: bool = True, timeout_ms: float | None = Non
 
 
 def outcomes(system: RunningSystem, count: int) -> list[Any]:
-    """Wait for so many outcomes and return them."""
+    """Wait for ``count`` outcomes and return them."""
     known: list[Any] = system.behavior("client").outcomes
     wait_until(lambda: len(known) == count, f"{count} outcomes")
     return known
@@ -95,7 +95,7 @@ def outcomes(system: RunningSystem, count: int) -> list[Any]:
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 @pytest.mark.parametrize("delivery", ["auto", "dds"])
-def test_every_outcome_of_a_call_is_the_same_either_way(
+def test_calls_have_the_same_outcomes_in_process_and_by_dds(
     tmp_path: Path, kind: str, delivery: str
 ) -> None:
     text = TEXT.replace("KIND", kind).replace("DELIVERY", delivery)
@@ -107,13 +107,13 @@ def test_every_outcome_of_a_call_is_the_same_either_way(
 
         ask(system, data=False, timeout_ms=300.0)
         assert outcomes(system, 2)[-1] == "CallTimeout"
-        wait_until(lambda: len(server.asked) == 2, "the request that is given up")
+        wait_until(lambda: len(server.asked) == 2, "the request that times out")
 
         system.change("server", "deactivate")
         ask(system)
         assert outcomes(system, 3)[-1] == REFUSED
         system.change("server", "cleanup")
-        # By DDS it is known some milliseconds later, and until then it is waited for.
+        # By DDS it is discovered some milliseconds later.
         wait_until(lambda: not client.clients.ask._has_server(), "the end of the server")
         ask(system, timeout_ms=300.0)
         assert outcomes(system, 4)[-1] == "ServerUnavailable"
@@ -129,7 +129,7 @@ def test_every_outcome_of_a_call_is_the_same_either_way(
     assert counted == {"/client": 4, "/server": 3}
 
 
-def test_a_server_that_ends_with_a_request_open_says_so_and_outsiders_are_served(
+def test_a_server_that_shuts_down_refuses_pending_requests_and_serves_external_clients(
     tmp_path: Path,
 ) -> None:
     text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto")
@@ -149,7 +149,7 @@ def test_a_server_that_ends_with_a_request_open_says_so_and_outsiders_are_served
     assert "not active" in message
 
 
-def test_calls_of_one_moment_end_each_in_its_time(tmp_path: Path) -> None:
+def test_concurrent_calls_end_each_at_its_own_timeout(tmp_path: Path) -> None:
     text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto")
     with running(
         text.replace("asking:Server}", "asking:Server, reentrant: true}"), tmp_path, asking=MODULE
@@ -161,11 +161,11 @@ def test_calls_of_one_moment_end_each_in_its_time(tmp_path: Path) -> None:
             ("CallTimeout", limit, f"service '/ask' did not answer within {limit:g} ms")
             for limit in (90.0, 30.0, 60.0)
         ]
-        wait_until(lambda: not client._context.gate.pending._futures, "nothing is waited for")
+        wait_until(lambda: not client._context.gate.pending._futures, "no future is pending")
 
 
 @pytest.mark.parametrize("delivery", ["auto", "dds"])
-def test_a_failed_call_that_nobody_awaits_is_told_of(tmp_path: Path, delivery: str) -> None:
+def test_a_failed_call_that_is_not_awaited_is_logged(tmp_path: Path, delivery: str) -> None:
     text = TEXT.replace("KIND", "events").replace("DELIVERY", delivery)
     with running(text, tmp_path, asking=MODULE) as system:
         client = system.node("client")
@@ -178,7 +178,7 @@ def test_a_failed_call_that_nobody_awaits_is_told_of(tmp_path: Path, delivery: s
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 @pytest.mark.parametrize("copied", [False, True])
-def test_the_ends_hold_the_same_objects_unless_copies_are_asked_for(
+def test_both_endpoints_have_the_same_objects_unless_isolated(
     tmp_path: Path, kind: str, copied: bool
 ) -> None:
     text = TEXT.replace("KIND", kind).replace("DELIVERY", "auto") + (COPIED if copied else "")
@@ -192,7 +192,7 @@ def test_the_ends_hold_the_same_objects_unless_copies_are_asked_for(
         assert (server.answers[0] is not client.answers[0]) is copied
 
 
-def test_a_copied_request_is_what_it_was_when_it_was_sent(tmp_path: Path) -> None:
+def test_a_copied_request_is_as_it_was_when_sent(tmp_path: Path) -> None:
     text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto") + COPIED
     with running(text, tmp_path, asking=MODULE) as system:
         client, server = (system.node(name) for name in ("client", "server"))

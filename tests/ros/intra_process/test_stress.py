@@ -1,4 +1,4 @@
-"""Whoever joins, leaves or dies outside: inside, nothing is lost, doubled or out of order.
+"""External nodes join, leave and die; in-process nothing is lost, duplicated or reordered.
 
 Everything is published twice, on a topic that stays in the process as far as it can, and on another
 by DDS alone. The same processes listen to both and talk on both, so that one is the control of the
@@ -25,9 +25,9 @@ OWED, *_ = PROFILES = (
     ("RELIABLE", 10),
     ("BEST_EFFORT", 10),
 )
-ENOUGH = 1000  # messages that a listener has heard of each topic before it goes
+ENOUGH = 1000  # messages of each topic that a listener receives before it leaves
 FIRST_TALKER = 100
-MOVES = 3  # of a reader inside, while each listener listens
+MOVES = 3  # of an in-process reader, while each listener listens
 #: What is missing on the two topics differs by chance: both wait for the same processor.
 BY_CHANCE, BY_CHANCE_AT_ALL = 1.1, 50
 
@@ -152,7 +152,7 @@ def behaviors(system: RunningSystem, *names: str) -> list[Any]:
 
 
 class Stress:
-    """Listeners and talkers that join, leave in order, and are killed, by turns."""
+    """Listeners and talkers that join, leave and are killed, in turn."""
 
     def __init__(self, system: RunningSystem, folder: Path) -> None:
         self._system = system
@@ -161,7 +161,7 @@ class Stress:
         self.owed, self.missing = Missing(), Missing()
 
     def run(self, rounds: int) -> None:
-        """Have as many of both come and go, half of them by SIGKILL."""
+        """Start and stop as many of both, half of them by SIGKILL."""
         for turn in range(rounds):
             profile = PROFILES[turn % len(PROFILES)]
             killed = (turn + turn // len(PROFILES)) % 2 == 1
@@ -171,10 +171,10 @@ class Stress:
             else:
                 self.missing.add_of_both(heard)
             if not killed:
-                wait_until(self._is_alone, "nobody outside")
+                wait_until(self._is_alone, "no external node")
 
     def verify(self) -> None:
-        """Have the writers end, and see that each reader has got everything there was for it."""
+        """Stop the writers, and check that each reader has received everything."""
         sent = {name: self._sent_by(name) for name in WRITERS}
         everything = sent["writer"] | sent["second"]
         for name in ("near", "far", "guest"):
@@ -203,13 +203,13 @@ class Stress:
         return listening.heard
 
     def _seen(self, profile: tuple[str, int]) -> Iterator[Sequences]:
-        """Yield what those inside have seen who match somebody outside."""
+        """Yield what the in-process readers that match an external node have received."""
         names = ("near", "far") if profile[0] == "RELIABLE" else ("far",)
         for reader in behaviors(self._system, *names):
             yield from (reader.seen[topic] for topic in TOPICS)
 
     def _move_the_guest(self) -> None:
-        """Take one of the readers inside away, and back, while somebody outside listens."""
+        """Remove and restore an in-process reader while an external node listens."""
         (guest,) = behaviors(self._system, "guest")
         wait_until(lambda: guest.seen[STREAM].count > 0, "the guest")
         self._system.change("guest", "deactivate")
@@ -220,7 +220,7 @@ class Stress:
         self._system.change("guest", "cleanup", "configure", "activate")
 
     def _count_talkers(self, name: str) -> None:
-        """Compare what has come in from outside, all that is missing of it being lost by DDS."""
+        """Compare the messages of external nodes; missing ones must be lost by DDS."""
         (reader,) = behaviors(self._system, name)
         stream, control = (
             {
@@ -233,13 +233,13 @@ class Stress:
         self.missing.add_counted(stream, control)
 
     def _is_alone(self) -> bool:
-        """Say whether the publishers of the stream have matched nobody but the three inside."""
+        """Return whether the publishers match only the three in-process subscriptions."""
         nodes = [self._system.node(name) for name in WRITERS]
         ports = [node._entities.publishers["stream"] for node in nodes]
         return all(port._publisher.get_subscription_count() == 3 for port in ports)
 
     def _sent_by(self, name: str) -> dict[int, int]:
-        """End a node that writes; return the last of each of its writers."""
+        """Stop a node that writes; return the last message of each of its writers."""
         (behavior,) = behaviors(self._system, name)
         self._system.node(name).loop.run(behavior.end)
         assert len(behavior.next) == 3
@@ -257,7 +257,7 @@ class Stress:
 @pytest.mark.parametrize(
     "rounds", [4, pytest.param(50, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
 )
-def test_a_stress_of_outsiders_changes_nothing(tmp_path: Path, rounds: int) -> None:
+def test_external_nodes_do_not_disturb_in_process_delivery(tmp_path: Path, rounds: int) -> None:
     with running(TEXT, tmp_path, stress=MODULE) as system:
         stress = Stress(system, tmp_path)
         stress.run(rounds)

@@ -1,4 +1,4 @@
-"""Messages between co-located ports: straight, in order, and by DDS to whoever is outside."""
+"""Messages between co-located ports: in-process, in order, and by DDS to external nodes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NUMBERING_LISTENER = Path(__file__).parents[1] / "programs" / "numbering_listene
 
 @pytest.fixture
 def outsider() -> Iterator[Callable[[], Peer]]:
-    """Joins when it is called: what goes in the process is to go without anybody outside."""
+    """Joins when it is called: in-process delivery must work without external nodes."""
     peers: list[Peer] = []
 
     def join() -> Peer:
@@ -59,14 +59,14 @@ def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -
 
 
 @pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
-def test_what_is_published_is_what_is_received_and_outsiders_hear_it_too(
+def test_local_messages_are_shared_and_external_nodes_receive_them_too(
     tmp_path: Path, outsider: Callable[[], Peer], kind: str
 ) -> None:
     with running(NUMBERS.replace("KIND", kind), tmp_path, counting=MODULE) as system:
         near, far, source = (system.behavior(name) for name in ("near", "far", "source"))
         send(system, 50)
         wait_until(lambda: len(near.heard) == len(far.heard) == 50)
-        # By reference: nothing of it went through DDS.
+        # By reference: not through DDS.
         for listener in (near, far):
             assert all(a is b for a, b in zip(listener.heard, source.sent, strict=True))
 
@@ -80,20 +80,20 @@ def test_what_is_published_is_what_is_received_and_outsiders_hear_it_too(
         assert numbers(near.heard) == numbers(far.heard) == list(range(100))
 
         intruder = peer.publisher(Int64, "/numbers", 100)
-        wait_until(lambda: intruder.get_subscription_count() == 3)  # its own is one of them
+        wait_until(lambda: intruder.get_subscription_count() == 3)  # including its own
         intruder.publish(Int64(data=-1))
         wait_until(lambda: len(near.heard) == len(far.heard) == 101)
         assert near.heard[-1].data == far.heard[-1].data == -1
-        # As many ends as ROS tools are to see.
+        # The number of endpoints that ROS tools see.
         assert peer.node.count_publishers("/numbers") == 2
         assert peer.node.count_subscribers("/numbers") == 3
 
 
 @pytest.mark.parametrize(("tells", "level"), [(False, "info"), (True, "info"), (True, "debug")])
-def test_every_outsider_is_seen_to_come(
+def test_every_external_subscription_is_noticed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tells: bool, level: str
 ) -> None:
-    if not tells:  # then the middleware is asked at each message
+    if not tells:  # then matches are counted for each message
         monkeypatch.setattr(match_flag, "EVENT", lambda *_: 1)
     context = Context()
     context.init([])
@@ -112,7 +112,7 @@ def test_every_outsider_is_seen_to_come(
             first = 20 * turn + 10
             assert [take(subscription) for _ in range(10)] == list(range(first, first + 10))
             node.destroy_subscription(subscription)
-            # Or its end would hide that the next one begins.
+            # Otherwise its end would hide the next one.
             wait_until(lambda: source._context.node.count_subscribers("/apart/numbers") == 2)
         near = system.behavior("near")
         wait_until(lambda: numbers(near.heard) == list(range(100)))
@@ -134,7 +134,7 @@ def take(subscription: Subscription) -> int:
     return int(taken[0].data)
 
 
-def test_what_is_under_way_when_its_reader_leaves_active_is_dropped(tmp_path: Path) -> None:
+def test_messages_in_transit_are_dropped_when_the_subscriber_leaves_active(tmp_path: Path) -> None:
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
         system.change("near", "deactivate")
         send(system, 3)
@@ -144,7 +144,7 @@ def test_what_is_under_way_when_its_reader_leaves_active_is_dropped(tmp_path: Pa
         send(system, 2)
         wait_until(lambda: len(near._behavior.heard) == 2)
         assert numbers(near._behavior.heard) == [3, 4]
-        # A node that is cleaned up has no subscription: nothing is kept for it.
+        # A node that is cleaned up has no subscription, so no message is kept for it.
         system.change("near", "deactivate", "cleanup")
         send(system, 2)
         wait_until(lambda: len(system.behavior("far").heard) == 7)
@@ -175,7 +175,7 @@ nodes:
 """
 
 
-def test_who_joins_late_gets_what_is_latched_once_inside_and_outside(
+def test_late_joiners_get_latched_messages_once_in_process_and_by_dds(
     tmp_path: Path, outsider: Callable[[], Peer]
 ) -> None:
     module = """
@@ -198,11 +198,11 @@ def test_who_joins_late_gets_what_is_latched_once_inside_and_outside(
     assert system.log() == ["late 2", "late 3"]
 
 
-def test_dds_is_used_only_while_somebody_outside_has_matched(tmp_path: Path) -> None:
-    """The middleware numbers what a publisher hands it: what stays inside has no number."""
+def test_dds_is_used_only_while_an_external_subscription_matches(tmp_path: Path) -> None:
+    """The middleware numbers its messages: in-process messages have no number."""
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
         for visit in range(2):
-            send(system, 20)  # to nobody outside
+            send(system, 20)  # to no external node
             command = [sys.executable, str(NUMBERING_LISTENER)]
             with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as listener:
                 try:
@@ -212,7 +212,7 @@ def test_dds_is_used_only_while_somebody_outside_has_matched(tmp_path: Path) -> 
                 finally:
                     listener.kill()
             first = visit * 25 + 20
-            # Fast DDS prints there, too, when something is not to its liking.
+            # Fast DDS prints its errors there too.
             (told,) = [line for line in printed.splitlines() if line.startswith("[[")]
             assert json.loads(told) == [[first + step, visit * 5 + step + 1] for step in range(5)]
             wait_for_matches(system, lambda count: count == 2)
@@ -220,7 +220,7 @@ def test_dds_is_used_only_while_somebody_outside_has_matched(tmp_path: Path) -> 
         assert numbers(system.behavior("near").heard) == list(range(50))
 
 
-def test_a_publisherthat_is_not_active_reaches_nobody_inside(tmp_path: Path) -> None:
+def test_a_publisher_that_is_not_active_reaches_no_local_subscription(tmp_path: Path) -> None:
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
         send(system, 2)
         system.change("source", "deactivate")
@@ -317,14 +317,14 @@ nodes:
 """
 
 
-def test_ports_meet_by_the_names_that_remapping_gives_them(tmp_path: Path, peer: Peer) -> None:
+def test_ports_connect_by_their_remapped_names(tmp_path: Path, peer: Peer) -> None:
     with running(REMAPPED, tmp_path, counting=MODULE) as system:
         source, near, far = (system.behavior(name) for name in ("source", "near", "far"))
         intruder = peer.publisher(Int64, "/left/numbers")
         outside = peer.listen(Int64, "/lane/numbers")
         wait_for_matches(system, lambda count: count == 2)
         send(system, 3)
-        intruder.publish(Int64(data=-1))  # where far is left: nothing else is said there
+        intruder.publish(Int64(data=-1))  # the topic of far, which has no other messages
         wait_until(lambda: len(near.heard) == len(outside) == 3)
         wait_until(lambda: far.heard)
         assert all(a is b for a, b in zip(near.heard, source.sent, strict=True))

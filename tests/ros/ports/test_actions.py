@@ -1,4 +1,4 @@
-"""Action servers and clients of a running node, from goal to result and every way out."""
+"""Action servers and clients of a running node, from goal to result, with all outcomes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ KINDS = ["events", "single_threaded", "multi_threaded"]
 
 
 class Navigator:
-    """The client side, as anybody would write it."""
+    """A hand-written client."""
 
     def __init__(self, peer: Peer) -> None:
         self._peer = peer
@@ -59,7 +59,7 @@ class Navigator:
         return self._answer(handle.cancel_goal_async)
 
     def _answer(self, ask: Callable[[], Any]) -> Any:
-        """Ask on the thread that takes answers: it drops one whose question is not noted yet."""
+        """Send on the thread that takes responses: rclpy drops those to unregistered requests."""
         return finished(self._peer.run(ask))
 
     def _take(self, message: Any) -> None:
@@ -73,9 +73,12 @@ def test_a_declared_action_gives_feedback_and_a_result(
     with running(SERVER.replace("KIND", kind), tmp_path) as system:
         navigator = Navigator(peer)
         server = system.node("server")._context.node
-        wait_until(lambda: server.count_subscribers("/navigate/_action/feedback"), "who listens")
+        wait_until(
+            lambda: server.count_subscribers("/navigate/_action/feedback"),
+            "the feedback subscription",
+        )
         handle = navigator.send(3.0)
-        # With the result rclpy's client forgets the feedback that it has not taken yet.
+        # After the result, rclpy's client drops feedback that it has not taken.
         wait_until(lambda: len(navigator.feedback) == 4, "all feedback")
         status, result = navigator.result(handle)
         assert system.log() == ["goal to 3.0"]
@@ -141,7 +144,9 @@ def test_a_client_cancels_a_goal(tmp_path: Path, peer: Peer, kind: str) -> None:
     assert (status, result.message) == (GoalStatus.STATUS_CANCELED, "stopped")
 
 
-def test_one_goal_at_a_time_and_those_that_wait_can_be_canceled(tmp_path: Path, peer: Peer) -> None:
+def test_one_goal_runs_at_a_time_and_waiting_ones_can_be_canceled(
+    tmp_path: Path, peer: Peer
+) -> None:
     with running(handled(), tmp_path, handled=PATIENT) as system:
         navigator = Navigator(peer)
         first, second, third = (navigator.send(float(number)) for number in (1, 2, 3))
@@ -181,7 +186,7 @@ def test_deactivation_cancels_the_goals(tmp_path: Path, peer: Peer, kind: str) -
     assert system.end().exit_code == 0
 
 
-def test_a_handler_that_does_not_end_its_goal_is_ended(tmp_path: Path, peer: Peer) -> None:
+def test_a_handler_that_does_not_end_its_goal_is_canceled(tmp_path: Path, peer: Peer) -> None:
     module = """
     from composer.behavior import Behavior, CallCancelled
 
@@ -222,7 +227,7 @@ def test_a_handler_that_does_not_end_its_goal_is_ended(tmp_path: Path, peer: Pee
     ],
 )
 @pytest.mark.parametrize("prefix", ["", "async "])
-def test_every_way_out_of_a_handler_ends_the_goal(
+def test_every_outcome_of_a_handler_ends_the_goal(
     tmp_path: Path, peer: Peer, prefix: str, way_out: tuple[str, int, str]
 ) -> None:
     body, status, fault = way_out
@@ -294,9 +299,7 @@ def test_the_reactions_of_an_action_client(
     assert [line for line in system.log() if "rejects" not in line] == lines
 
 
-def test_goals_are_canceled_when_the_node_that_sent_them_leaves_active(
-    tmp_path: Path, peer: Peer
-) -> None:
+def test_goals_are_canceled_when_their_client_leaves_active(tmp_path: Path, peer: Peer) -> None:
     with running(CLIENT.replace("TARGET", "1.0"), tmp_path, handled=PATIENT) as system:
         system.wait_for_log("begin 1.0")
         assert peer.change("/client", "deactivate")

@@ -1,4 +1,4 @@
-"""Ports and timers that are always on live while their node is inactive, too; others do not."""
+"""Ports and timers that are always on also work while their node is inactive."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Power(Behavior):
 
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
-def test_what_is_always_on_lives_while_its_node_is_inactive(
+def test_always_on_ports_work_while_their_node_is_inactive(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:
     text = POWER.replace("KIND", kind)
@@ -80,23 +80,21 @@ def test_what_is_always_on_lives_while_its_node_is_inactive(
 
         def is_heard_alone() -> bool:
             beats, seen = len(voltage), len(current)
-            wait_until(lambda: len(voltage) > beats + 3, "the timer goes on")
+            wait_until(lambda: len(voltage) > beats + 3, "the timer continues")
             return len(current) == seen
 
-        wait_until(is_heard_alone, "what was on its way has come, and then no more")
+        wait_until(is_heard_alone, "the messages in transit arrive, and then no more")
         assert peer.call(Trigger, "/ask").success
 
         assert peer.change("/power", "cleanup")
-        wait_until(lambda: voltage[-1].data == "last", "a last word")
+        wait_until(lambda: voltage[-1].data == "last", "a last message")
 
 
-def test_what_waits_in_a_port_that_is_always_on_ends_with_the_cleanup(
-    tmp_path: Path, peer: Peer
-) -> None:
+def test_calls_of_always_on_ports_end_with_the_cleanup(tmp_path: Path, peer: Peer) -> None:
     text = POWER.replace("KIND", "events").replace("pause_s: 0.01", "pause_s: 60.0")
     with running(text, tmp_path, autostart=PrimaryState.INACTIVE, power=MODULE) as system:
         answer = peer.client(Trigger, "/ask").call_async(Trigger.Request())
-        system.wait_for_log("asked")  # what begins while the node is active ends with that
+        system.wait_for_log("asked")  # a call from the active state ends with that state
         assert peer.change("/power", "activate")
         assert peer.change("/power", "deactivate")
         assert not answer.done()

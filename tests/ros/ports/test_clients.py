@@ -1,4 +1,4 @@
-"""Service clients of a running node: answers, failures, and the end of waiting."""
+"""Service clients of a running node: responses, failures and cancellation."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def declared(on_failure: bool) -> str:
 
 
 def activate_once_the_server_is_known(system: RunningSystem) -> None:
-    """Find the server first: that may take longer than the only call may."""
+    """Wait for the server: discovery may take longer than the timeout of the call."""
     client = system.node("asker")._entities.clients["trigger"]
     wait_until(client._has_server, "the server")
     system.change("asker", "activate")
@@ -49,13 +49,13 @@ def test_a_declared_call_is_answered(tmp_path: Path, peer: Peer) -> None:
         assert system.summary("/asker").calls == 1
 
 
-def test_a_server_that_is_not_there_is_told_of(tmp_path: Path) -> None:
+def test_a_missing_server_is_a_failure(tmp_path: Path) -> None:
     with running(declared(on_failure=True), tmp_path) as system:
         line = system.wait_for_log("failed")
     assert line == "failed: no server of service '/trigger' was available within 200 ms"
 
 
-def test_a_failure_that_nothing_is_declared_for_is_logged_and_counted(tmp_path: Path) -> None:
+def test_a_failure_without_a_reaction_is_logged_and_counted(tmp_path: Path) -> None:
     with running(ASKER, tmp_path) as system:
         line = system.wait_for_log("within 200 ms")
         counted = system.summary("/asker")
@@ -63,7 +63,7 @@ def test_a_failure_that_nothing_is_declared_for_is_logged_and_counted(tmp_path: 
     assert counted.errors == 1
 
 
-def test_a_server_that_does_not_answer_is_told_of(tmp_path: Path, peer: Peer) -> None:
+def test_a_missing_response_is_a_failure(tmp_path: Path, peer: Peer) -> None:
     held = threading.Event()
 
     def answer_late(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -129,7 +129,7 @@ def test_calls_and_sleeps_end_when_the_node_leaves_active(
         wait_until(lambda: len(context.gate.pending._futures) == 2, "both wait")
         assert peer.change("/caller", "deactivate")
         assert peer.state("/caller") == "inactive"
-        wait_until(lambda: not context.tasks, "nothing runs any more")
+        wait_until(lambda: not context.tasks, "no task is running")
         counted = system.summary("/caller")
     assert "cancelled: /caller is deactivating, not active" in system.log()
     assert "last try: no server of service '/trigger' was available within 20 ms" in system.log(), (
@@ -138,7 +138,7 @@ def test_calls_and_sleeps_end_when_the_node_leaves_active(
     assert counted.errors == 0
 
 
-def test_what_is_wrong_in_a_call_is_told_at_once(tmp_path: Path) -> None:
+def test_errors_in_a_call_are_raised_at_once(tmp_path: Path) -> None:
     module = """
     from composer.behavior import Behavior, CallCancelled
 

@@ -1,4 +1,4 @@
-"""Missed deadlines and lost liveliness: told at once, summed up, and counted, whatever the loop."""
+"""Missed deadlines and lost liveliness: logged at once, summarized and counted."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def lines(system: RunningSystem, part: str) -> list[str]:
 
 
 def publishers(node: Node, topic: str) -> list[str]:
-    """Return the names of those who publish, as a node knows them."""
+    """Return the names of the publishers that a node has discovered."""
     return [end.node_name for end in node.get_publishers_info_by_topic(topic)]
 
 
@@ -53,14 +53,14 @@ OF_SUBSCRIPTION = "subscription 'beat' on /beat: nothing was received within its
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_missed_deadline_within_the_process_is_told_at_once_and_then_summed_up(
+def test_a_missed_deadline_is_logged_at_once_and_then_summarized(
     tmp_path: Path, peer: Peer, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(log, "WARNING_PERIOD_S", 1.0)
     with running(TIMED.format(kind=kind, deadline_ms=200), tmp_path) as system:
         wait_until(lambda: len(lines(system, "heard")) > 10)
         assert peer.set_parameter("/talker", "period_ms", 1e6) == ""
-        # A busy machine may have made the talker miss one before: that one is told alone.
+        # On a busy machine the talker may have missed one before, which is logged separately.
         more = r" \(\d+ times more within 1 s\)"
         of_talker = "; it is published by /talker"
         wait_until(lambda: told(system, re.escape(OF_PUBLISHER) + more))
@@ -72,9 +72,7 @@ def test_a_missed_deadline_within_the_process_is_told_at_once_and_then_summed_up
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_deadlines_that_are_missed_all_the_time_freeze_nothing(
-    tmp_path: Path, peer: Peer, kind: str
-) -> None:
+def test_constantly_missed_deadlines_do_not_deadlock(tmp_path: Path, peer: Peer, kind: str) -> None:
     # Taking the status of each froze the process within two seconds.
     with running(TIMED.format(kind=kind, deadline_ms=2), tmp_path) as system:
         wait_until(lambda: counts(system, "listener").get("deadline_missed", 0) > 1000)
@@ -85,16 +83,16 @@ def test_deadlines_that_are_missed_all_the_time_freeze_nothing(
         wait_until(lambda: counts(system, "listener")["deadline_missed"] > before + 100)
 
 
-def test_who_is_not_active_misses_nothing(tmp_path: Path, peer: Peer) -> None:
+def test_an_inactive_publisher_misses_no_deadline(tmp_path: Path, peer: Peer) -> None:
     with running(TIMED.format(kind="events", deadline_ms=200), tmp_path) as system:
         wait_until(lambda: len(lines(system, "heard")) > 10)
         assert peer.change("/talker", "deactivate")
         before = counts(system, "talker")
         wait_until(lambda: counts(system, "listener").get("deadline_missed", 0) > 3)
-        assert counts(system, "talker") == before  # it is to be silent
+        assert counts(system, "talker") == before  # an inactive node must be silent
 
 
-def test_who_keeps_a_deadline_misses_none(tmp_path: Path) -> None:
+def test_a_kept_deadline_is_not_reported(tmp_path: Path) -> None:
     with running(TIMED.format(kind="events", deadline_ms=60_000), tmp_path) as system:
         over_s = time.monotonic() + 1.0
         wait_until(lambda: time.monotonic() > over_s, "a second of beats")
@@ -113,7 +111,7 @@ nodes:
 """
 
 
-def test_a_deadline_that_somebody_outside_misses_is_told_with_his_name(
+def test_a_deadline_missed_by_an_external_node_is_logged_with_its_name(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(LISTENER, tmp_path) as system:
@@ -139,7 +137,7 @@ nodes:
 """
 
 
-def test_a_publisher_that_gives_no_sign_of_life_is_told(tmp_path: Path, peer: Peer) -> None:
+def test_a_publisher_without_liveliness_is_logged(tmp_path: Path, peer: Peer) -> None:
     with running(MANUAL, tmp_path) as system:
         peer.publisher(String, "/go").publish(String())
         assert system.wait_for_log("did not assert its liveliness") == (

@@ -1,4 +1,4 @@
-"""What the middleware tells of QoS: by name in the log, and counted."""
+"""QoS events: logged with the names of nodes, and counted."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def counts(system: RunningSystem, node: str) -> dict[str, int]:
 
 
 def publishers(system: RunningSystem, name: str, topic: str) -> list[str]:
-    """Return the names of those who publish, as a node of the system knows them."""
+    """Return the names of the publishers that a node of the system has discovered."""
     node = system.node(name)._context.node
     return [end.node_name for end in node.get_publishers_info_by_topic(topic)]
 
@@ -46,7 +46,7 @@ nodes:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_outsiders_with_another_qos_are_named_with_the_policy(
+def test_external_nodes_with_incompatible_qos_are_named_with_the_policy(
     tmp_path: Path, peer: Peer, kind: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with running(ENDS.format(kind=kind), tmp_path) as system:
@@ -72,15 +72,15 @@ def test_outsiders_with_another_qos_are_named_with_the_policy(
     assert not re.search(r"'/input', offering incompatible|\[a\].*incompatible QoS", of_rclpy)
 
 
-def test_an_outsider_with_another_type_is_named(tmp_path: Path, peer: Peer) -> None:
+def test_an_external_node_with_another_type_is_named(tmp_path: Path, peer: Peer) -> None:
     with running(ENDS.format(kind="events"), tmp_path) as system:
         odd = peer.join("odd")
         odd.create_publisher(Int64, "/input", 10)
         name = odd.get_fully_qualified_name()
         wait_until(lambda: publishers(system, "a", "/input") == [odd.get_name()], "its name")
-        other = Peer()  # a participant has one type for a topic
+        other = Peer()  # a participant has one type per topic
         try:
-            # Fast DDS tells nothing of types alone.
+            # Fast DDS does not report types alone.
             other.node.create_publisher(String, "/input", BEST_EFFORT)
             system.wait_for_log("reliability is best_effort")
         finally:
@@ -108,7 +108,7 @@ nodes:
 
 @pytest.mark.parametrize("away", [("deactivate", "cleanup"), ("deactivate",)])
 @pytest.mark.parametrize(("lifespan_ms", "heard"), [(300, ["heard new"]), (60_000, None)])
-def test_a_lifespan_holds_between_nodes_of_the_process(
+def test_a_lifespan_applies_within_the_process(
     tmp_path: Path, peer: Peer, lifespan_ms: int, heard: list[str] | None, away: tuple[str, ...]
 ) -> None:
     with running(LATCHED.format(lifespan_ms=lifespan_ms), tmp_path) as system:
@@ -117,13 +117,13 @@ def test_a_lifespan_holds_between_nodes_of_the_process(
         say.publish(String(data="old"))
         system.wait_for_log("said old")
         over_s = time.monotonic() + 1.0
-        wait_until(lambda: time.monotonic() > over_s, "the end of a short life")
+        wait_until(lambda: time.monotonic() > over_s, "the end of the lifespan")
         back = ("configure", "activate") if "cleanup" in away else ("activate",)
         system.change("listener", *back)
         wait_until(lambda: heard is not None or lines(system, "heard old"))
 
         def new_is_heard() -> bool:
-            """Say it again until then: on a busy machine a short life ends on the way."""
+            """Publish until it arrives: on a busy machine the lifespan may end in transit."""
             say.publish(String(data="new"))
             return "heard new" in system.log()
 
@@ -131,7 +131,7 @@ def test_a_lifespan_holds_between_nodes_of_the_process(
         assert [*dict.fromkeys(lines(system, "heard"))] == (heard or ["heard old", "heard new"])
 
 
-def test_ps_tells_the_counts(tmp_path: Path, peer: Peer) -> None:
+def test_ps_shows_the_counts(tmp_path: Path, peer: Peer) -> None:
     with running(ENDS.format(kind="events"), tmp_path) as system:
         told = peer.listen(DiagnosticArray, "/diagnostics")
         peer.node.create_publisher(String, "/input", BEST_EFFORT)

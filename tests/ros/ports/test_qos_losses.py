@@ -1,4 +1,4 @@
-"""Messages that are lost on their way, and publishers that fall silent: told and counted.
+"""Messages that are lost in transit, and publishers that fall silent: logged and counted.
 
 Whoever floods is killed after the system has gone: where a writer was killed in the middle of a
 large message, Fast DDS makes a port in shared memory anew, and crashes if that is closed meanwhile.
@@ -56,7 +56,7 @@ def test_messages_that_are_lost_are_counted_one_by_one(tmp_path: Path) -> None:
         losses: defaultdict[int, set[int]] = defaultdict(set)
 
         def three_floods_add_up() -> bool:
-            """What was sent but neither received nor lost is the same whenever it is quiet."""
+            """The messages that were sent but neither received nor lost are constant when idle."""
             lost, numbers = counts(system).get("message_lost", 0), tuple(seen)
             losses[numbers[-1] - len(numbers) - lost].add(lost)
             return any(len(found) > 2 for found in losses.values())
@@ -76,7 +76,7 @@ nodes:
 """
 
 
-def test_a_publisher_that_falls_silent_is_told_and_one_that_leaves_is_not(
+def test_a_silent_publisher_is_logged_and_one_that_leaves_is_not(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(SILENCE, tmp_path) as system:
@@ -108,7 +108,7 @@ nodes:
 """
 
 
-def test_what_happens_all_the_time_freezes_nothing(tmp_path: Path) -> None:
+def test_constant_events_do_not_deadlock(tmp_path: Path) -> None:
     with (
         hand_written("hand_written_flood.py", "10", "100"),
         hand_written("hand_written_flood.py", "10", "100"),
@@ -123,18 +123,18 @@ def test_what_happens_all_the_time_freezes_nothing(tmp_path: Path) -> None:
         wait_until(lambda: counts(system)["liveliness_changed"] > before + 20)
 
 
-def test_nothing_is_watched_later_than_from_the_start(tmp_path: Path) -> None:
-    # To begin to watch asks for a status, too. rclpy's handlers were watched once their node's loop
-    # had found them, when messages could be lost already: once in hundreds of runs it froze.
+def test_events_are_watched_from_the_start(tmp_path: Path) -> None:
+    # Starting to watch takes a status, too. rclpy's handlers were watched once their node's loop
+    # had found them, when messages could be lost already: one in hundreds of runs deadlocked.
     with running(RESTLESS, tmp_path) as system:
         subscriptions = list(system.node("listener")._context.node.subscriptions)
         assert [ends.topic_name for ends in subscriptions] == ["/big", "/alive"]
         assert [ends.event_handlers for ends in subscriptions] == [[], []]
 
 
-def test_statuses_taken_all_the_time_freeze_nothing(peer: Peer) -> None:
-    # To ask for a status that is not there waits for who announces the next, and he for that: it
-    # froze within two seconds.
+def test_constantly_taken_statuses_do_not_deadlock(peer: Peer) -> None:
+    # Taking a status that is not available waits for the thread that reports the next, which
+    # waits too: it deadlocked within two seconds.
     loop = EventLoop("loop", lambda _, error: pytest.fail(repr(error)))
     loop.start()
     qos = QoSProfile(depth=10, deadline=Duration(nanoseconds=1_000_000))

@@ -1,4 +1,4 @@
-"""Services of a running node: every request is answered, whatever becomes of it."""
+"""Services of a running node respond to every request."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ nodes:
 """
 
 
-def test_a_declared_response_is_sent_and_the_default_one_where_when_is_false(
+def test_a_declared_response_is_sent_or_the_default_one_if_when_is_false(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(STUB, tmp_path) as system:
@@ -37,7 +37,7 @@ def test_a_declared_response_is_sent_and_the_default_one_where_when_is_false(
     ]
 
 
-def test_a_node_that_is_not_active_refuses_and_says_so(tmp_path: Path, peer: Peer) -> None:
+def test_a_node_that_is_not_active_refuses_with_a_reason(tmp_path: Path, peer: Peer) -> None:
     with running(STUB, tmp_path) as system:
         assert peer.change("/stub", "deactivate")
         refusal = peer.call(Trigger, "/trigger")
@@ -99,7 +99,7 @@ def test_a_handler_gets_the_declared_response_and_returns_its_own(
         ("return 'nonsense'", " returned 'nonsense', not a Trigger.Response"),
     ],
 )
-def test_a_handler_that_fails_is_answered_for(
+def test_a_failing_handler_sends_a_response(
     tmp_path: Path, peer: Peer, outcome: str, reason: str
 ) -> None:
     module = MODULE.replace("OUTCOME", outcome)
@@ -113,7 +113,7 @@ def test_a_handler_that_fails_is_answered_for(
     assert counted.errors == 2
 
 
-def test_requests_that_are_under_way_when_the_node_leaves_active_are_refused(
+def test_pending_requests_are_refused_when_the_node_leaves_active(
     tmp_path: Path, peer: Peer
 ) -> None:
     module = MODULE.replace("OUTCOME", "await_for_ever = None").replace(

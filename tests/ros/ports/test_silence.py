@@ -1,4 +1,4 @@
-"""Silence unless active: every port, on every way to every state."""
+"""Every port is silent unless its node is active, whatever led to the state."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ WAYS = (
 
 
 class Outside:
-    """What somebody outside sees and sends."""
+    """What an external node receives and sends."""
 
     def __init__(self, system: RunningSystem, peer: Peer) -> None:
         self.system, self.peer = system, peer
@@ -95,10 +95,10 @@ class Outside:
         if is_made_anew:
             wait_until(lambda: self.peer.servers("/subject/get_state") - known, "the new node")
         assert self.peer.state("/subject") == "active"
-        # Of two participants in one process, one may never notice that a subscription has gone, so
-        # that one is there says nothing: heard is heard.
+        # Of two participants in one process, one may never notice that a subscription is gone, so a
+        # match proves nothing: wait for a message.
         greeting = f"greeting {next(self._greetings)}"
-        wait_until(lambda: self._is_heard(greeting), "an order is heard")
+        wait_until(lambda: self._is_heard(greeting), "a command is received")
         wait_until(self._ask.service_is_ready)
         wait_until(self._drive.server_is_ready)
 
@@ -110,7 +110,7 @@ class Outside:
         return finished(self.peer.run(lambda: self._drive.send_goal_async(Navigate.Goal())))
 
     def begin_work(self, name: str) -> Any:
-        """Leave it a call and a goal that take a minute; return the end of the goal."""
+        """Start a call and a goal that take a minute; return the future of the goal."""
         self.order(name)
         self.system.wait_for_log(f"got {name}")
         goal = self.goal()
@@ -119,21 +119,21 @@ class Outside:
 
     def check_that_it_works(self, name: str) -> None:
         seen = len(self.beats)
-        wait_until(lambda: len(self.beats) > seen + 3, "it beats")
+        wait_until(lambda: len(self.beats) > seen + 3, "it publishes")
         self.order(f"order {name}")
         self.system.wait_for_log(f"got order {name}")
         assert finished(self._ask.call_async(Trigger.Request())).success
         assert self.goal().accepted
 
     def nothing_comes(self) -> bool:
-        """Say whether nothing comes in a time that is long for who beats each 10 ms."""
+        """Return whether no message arrives in a time that is long for a period of 10 ms."""
         seen = len(self.beats)
         time.sleep(0.15)
         return len(self.beats) == seen
 
     def check_silence(self, name: str, state: str) -> None:
         self.order(f"order {name}")
-        wait_until(self.nothing_comes, "what was on its way has come")
+        wait_until(self.nothing_comes, "the messages in transit arrive")
         assert f"got order {name}" not in self.system.log_text()
         if state == "inactive":
             refusal = finished(self._ask.call_async(Trigger.Request()))
@@ -145,7 +145,7 @@ class Outside:
             wait_until(lambda: self.peer.node.count_publishers("/beat") == 0, "no publisher")
 
 
-def test_nothing_gets_through_whatever_led_there(tmp_path: Path, peer: Peer) -> None:
+def test_nothing_passes_unless_active(tmp_path: Path, peer: Peer) -> None:
     with running(SYSTEM, tmp_path, subject=MODULE) as system:
         outside = Outside(system, peer)
         for number, (start, fault, transition, end) in zip(itertools.count(), WAYS, strict=False):

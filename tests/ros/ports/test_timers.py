@@ -25,7 +25,7 @@ nodes:
 """
 
 
-def test_a_timer_follows_its_parameter_and_stands_when_the_node_is_not_active(
+def test_a_timer_follows_its_parameter_and_stops_while_the_node_is_not_active(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(TIMED, tmp_path) as system:
@@ -43,7 +43,7 @@ def test_a_timer_follows_its_parameter_and_stands_when_the_node_is_not_active(
     )
 
 
-def test_a_period_that_no_timer_can_have_is_refused(tmp_path: Path, peer: Peer) -> None:
+def test_an_invalid_period_is_refused(tmp_path: Path, peer: Peer) -> None:
     with running(TIMED, tmp_path):
         for value in (0.0, -1.0, float("inf")):
             reason = peer.set_parameter("/timed", "rate_hz", value)
@@ -51,7 +51,7 @@ def test_a_period_that_no_timer_can_have_is_refused(tmp_path: Path, peer: Peer) 
         assert peer.state("/timed") == "active"
 
 
-def test_a_call_that_is_due_while_the_one_before_awaits_is_left_out(tmp_path: Path) -> None:
+def test_a_call_that_is_due_while_the_previous_one_awaits_is_skipped(tmp_path: Path) -> None:
     text = """
     system: late
     nodes:
@@ -101,7 +101,7 @@ class Tuned(Behavior):
 """
 
 
-def test_parameters_are_declared_with_all_that_is_known_of_them(tmp_path: Path, peer: Peer) -> None:
+def test_parameters_are_declared_with_their_descriptors(tmp_path: Path, peer: Peer) -> None:
     with running(PARAMETERS, tmp_path, tuned=TUNED) as system:
         names = ["speed", "retries", "mode", "serial"]
         request = DescribeParameters.Request(names=names)
@@ -138,7 +138,7 @@ def test_parameters_are_declared_with_all_that_is_known_of_them(tmp_path: Path, 
         ("unknown", 1, "undeclared parameter"),
     ],
 )
-def test_values_that_do_not_fit_are_refused_with_the_reason(
+def test_invalid_values_are_refused_with_the_reason(
     tmp_path: Path, peer: Peer, name: str, value: object, reason: str
 ) -> None:
     with running(PARAMETERS, tmp_path, tuned=TUNED) as system:
@@ -146,9 +146,9 @@ def test_values_that_do_not_fit_are_refused_with_the_reason(
     assert len(system.log()) == 1
 
 
-def test_a_change_reaches_the_behaviour_and_the_expressions(tmp_path: Path, peer: Peer) -> None:
+def test_a_change_reaches_the_behavior_and_the_expressions(tmp_path: Path, peer: Peer) -> None:
     with running(PARAMETERS, tmp_path, tuned=TUNED) as system:
-        assert peer.set_parameter("/tuned", "speed", 2) == ""  # an integer is fine for a double
+        assert peer.set_parameter("/tuned", "speed", 2) == ""  # an integer is accepted for a double
         assert peer.set_parameter("/tuned", "mode", "fast") == ""
         assert peer.set_parameter("/tuned", "speed", 2.5) == ""
         peer.publisher(Int64, "/ask").publish(Int64())

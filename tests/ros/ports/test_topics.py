@@ -1,4 +1,4 @@
-"""Publishers and subscriptions of a running node: gated, in order, and unhurt by user code."""
+"""Publishers and subscriptions of a running node: gated, in order, with contained faults."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ nodes:
 """
 
 
-def test_a_reaction_publishes_and_logs_what_it_works_out(tmp_path: Path, peer: Peer) -> None:
+def test_a_reaction_publishes_and_logs_what_it_computes(tmp_path: Path, peer: Peer) -> None:
     with running(RELAY, tmp_path) as system:
         heard = peer.listen(Int64, "/output")
         system.wait_for_listener("relay", "output")
@@ -35,7 +35,7 @@ def test_a_reaction_publishes_and_logs_what_it_works_out(tmp_path: Path, peer: P
     assert system.log() == ["got 41, the 0th"]
 
 
-def test_nothing_gets_through_a_node_that_is_not_active(tmp_path: Path, peer: Peer) -> None:
+def test_nothing_passes_a_node_that_is_not_active(tmp_path: Path, peer: Peer) -> None:
     with running(RELAY, tmp_path) as system:
         heard = peer.listen(Int64, "/output")
         system.wait_for_listener("relay", "output")
@@ -52,9 +52,7 @@ def test_nothing_gets_through_a_node_that_is_not_active(tmp_path: Path, peer: Pe
     assert (counted.received, counted.sent, counted.dropped) == (1, 1, 5)
 
 
-def test_what_is_latched_while_inactive_comes_with_the_activation(
-    tmp_path: Path, peer: Peer
-) -> None:
+def test_messages_latched_while_inactive_arrive_on_activation(tmp_path: Path, peer: Peer) -> None:
     text = """
     system: latched
     nodes:
@@ -86,9 +84,7 @@ nodes:
 """
 
 
-def test_a_node_has_a_first_and_a_last_word_but_none_when_it_is_not_active(
-    tmp_path: Path, peer: Peer
-) -> None:
+def test_a_node_publishes_in_transitions_but_not_while_inactive(tmp_path: Path, peer: Peer) -> None:
     module = """
     from composer.behavior import Behavior
     from std_msgs.msg import String
@@ -136,7 +132,7 @@ nodes:
       "": {type: std_msgs/msg/Int64, topic: /f}
 """
 PORTS_MODULE = """
-class Talker(dict):  # any class will do
+class Talker(dict):  # any class works
     def on_activate(self):
         for name in dir(self.publishers):
             assert getattr(self.publishers, name) is self.publishers[name]
@@ -148,7 +144,7 @@ class Talker(dict):  # any class will do
 """
 
 
-def test_ports_are_attributes_of_what_a_behavior_has(tmp_path: Path) -> None:
+def test_ports_are_attributes_of_a_behavior(tmp_path: Path) -> None:
     with running(PORTS, tmp_path, talker=PORTS_MODULE) as system:
         names = ["", "__entries", "_hidden", "class", "no identifier", "plain"]
         assert system.log() == [*names, f"no publisher 'plan'; available: {', '.join(names)}"]
@@ -183,7 +179,7 @@ class Faulty(Behavior):
 
 
 @pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
-def test_what_a_handler_raises_is_told_and_hurts_nobody(
+def test_an_exception_of_a_handler_is_logged_and_contained(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:
     text = FAULTY.replace("KIND", kind)

@@ -1,4 +1,4 @@
-"""A source that counts, who listens to it in its loop, and who does in another one."""
+"""A source of numbers, a listener on the same loop, and one on another loop."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Listener(Behavior):
 
 
 def send(system: RunningSystem, count: int) -> None:
-    """Have the source publish so many at once, in a callback of its loop."""
+    """Make the source publish ``number`` messages at once, in a callback of its loop."""
     source = system.node("source")
     source.loop.run(lambda: source._behavior.send(count))
 

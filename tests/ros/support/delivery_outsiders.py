@@ -1,4 +1,4 @@
-"""Processes that listen to two topics and talk on them, and what they have missed of each."""
+"""External processes that subscribe or publish to two topics, and what they have missed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SOON_MISSED = """<builtin>
 
 
 class Outsider:
-    """Another process that listens or talks; what it has heard is read as it comes.
+    """Another process that listens or talks; its output is read continuously.
 
     ``profile`` is reliability and depth; ``writer`` is who it talks as.
     """
@@ -64,11 +64,11 @@ class Outsider:
         self.go(killed=True)
 
     def has_heard(self, count: int) -> bool:
-        """Say whether so many messages of each topic have come."""
+        """Return whether ``number`` messages of each topic have arrived."""
         return all(len(numbers) >= count for numbers in self.heard.values())
 
     def go(self, *, killed: bool) -> int:
-        """End it, by SIGKILL or in order; return its exit code."""
+        """Stop it, by SIGKILL or cleanly; return its exit code."""
         assert self._process.stdin is not None
         if killed:
             self._process.kill()
@@ -81,7 +81,7 @@ class Outsider:
     def _read(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            # Fast DDS tells of errors on standard output, and who is killed breaks off.
+            # Fast DDS prints errors to standard output, and a killed process stops mid-line.
             if line.startswith("{") and line.endswith("}\n"):
                 for topic, numbers in json.loads(line).items():
                     self.heard[topic] += numbers
@@ -95,12 +95,12 @@ class Missing:
         self.control = 0
 
     def add_all(self, heard: Mapping[str, Sequence[int]]) -> None:
-        """Count what is missing between the first and the last message of each topic."""
+        """Count missing messages between the first and the last one of each topic."""
         stream, control = (sequences_of(heard[topic]) for topic in TOPICS)
         self.add_counted(stream.missing, control.missing)
 
     def add_of_both(self, heard: Mapping[str, Sequence[int]]) -> None:
-        """Count what is missing of the time in which both topics were heard.
+        """Count missing messages of the time in which both topics were received.
 
         What is lost by the way is lost when the machine is busy, so the time has to be the same.
         """
@@ -113,13 +113,13 @@ class Missing:
                 self.control += missing_between(first, last, heard[CONTROL])
 
     def add_counted(self, stream: Mapping[int, int], control: Mapping[int, int]) -> None:
-        """Add up what is missing by writers."""
+        """Add up missing messages by writer."""
         self.stream += sum(stream.values())
         self.control += sum(control.values())
 
 
 def sequences_of(numbers: Iterable[int]) -> Sequences:
-    """Look at all numbers that have come. Nothing may have come twice or out of order."""
+    """Check all numbers: none may arrive twice or out of order."""
     sequences = Sequences()
     for item in numbers:
         sequences.take(item)

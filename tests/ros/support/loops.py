@@ -1,4 +1,4 @@
-"""What the tests of loops share: a loop of each kind with a node, and a second process."""
+"""Support for tests of loops: a loop of each kind with a node, and a second process."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ KINDS = list(ExecutorKind)
 
 
 def wait_until(condition: Callable[[], object], what: str = "") -> None:
-    """Wait until ``condition()`` is true. Fails when it does not come true."""
+    """Wait until ``condition()`` is true; fail after a time limit."""
     until = time.monotonic() + PATIENCE_S
     while not condition():
         assert time.monotonic() < until, f"did not come true: {what or condition}"
@@ -38,7 +38,7 @@ def wait_until(condition: Callable[[], object], what: str = "") -> None:
 
 @dataclass
 class Bench:
-    """A running loop, a node of it, and what was reported."""
+    """A running loop, its node, and the reported exceptions."""
 
     loop: Loop
     node: Node
@@ -101,7 +101,7 @@ def bench(kind: ExecutorKind, name: str = "bench") -> Iterator[Bench]:
 
 @contextmanager
 def peer(*arguments: object) -> Iterator[subprocess.Popen[str]]:
-    """Run ``loop_peer.py``, hand-written rclpy, in a process of its own."""
+    """Run ``loop_peer.py``, hand-written rclpy, in another process."""
     command = [sys.executable, str(PEER), *map(str, arguments)]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True, env=os.environ.copy()
@@ -120,7 +120,7 @@ def wait_for_line(process: subprocess.Popen[str], wanted: str) -> None:
 
 
 def last_line(process: subprocess.Popen[str]) -> str:
-    """Wait for the end of a peer and return the last line it printed."""
+    """Wait until a peer has ended and return its last line."""
     output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, output
     return output.strip().splitlines()[-1]

@@ -1,4 +1,4 @@
-"""Numbers that tell who sent them and when, and what is wrong with how they arrive."""
+"""Numbers that encode their writer and sequence, and errors in their order."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ def number(writer: int, sequence: int) -> int:
 
 
 class Sequences:
-    """What one reader has seen of every writer. Each may begin anywhere and must go on by one."""
+    """What one reader has received of each writer, starting anywhere, counting by one."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -21,7 +21,7 @@ class Sequences:
         self.disordered: list[str] = []
 
     def take(self, received: int) -> None:
-        """Look at a number that has come."""
+        """Check a number that was received."""
         self.count += 1
         writer, sequence = divmod(received, _PER_WRITER)
         last = self.last.get(writer)
@@ -36,6 +36,6 @@ class Sequences:
 
     @property
     def wrong(self) -> list[str]:
-        """What is missing between the first and the last, came again, or out of order."""
+        """Messages that are missing, duplicated or out of order."""
         gaps = [f"writer {writer}: {count} missing" for writer, count in self.missing.items()]
         return gaps + self.disordered

@@ -1,4 +1,4 @@
-"""A simulator as far as time goes: it publishes /clock."""
+"""A simulator that only publishes /clock."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def message_of(time_s: float) -> Clock:
 
 
 class Simulator:
-    """Tells a system's nodes what time it is, and goes on when they know."""
+    """Publishes times and waits until the nodes of a system have them."""
 
     def __init__(self, peer: Peer, system: RunningSystem) -> None:
         self._system = system
         self._publisher = peer.publisher(Clock, "/clock")
 
     def tell(self, *times_s: float, node: str = "a") -> None:
-        """Let it be each of the times; a message may be lost, so each is told until it is known."""
+        """Publish each time until it is received, since a message may be lost."""
         for time_s in times_s:
             self._publisher.publish(message_of(time_s))
             wait_until(lambda time_s=time_s: self._is(node, time_s), f"{time_s} at {node}")
@@ -42,7 +42,7 @@ class Simulator:
 
     @contextmanager
     def runs(self, start_s: float, factor: float) -> Iterator[Callable[[], float]]:
-        """Let time pass ``factor`` times as quickly as it does; yields what tells the time."""
+        """Publish the time ``factor`` times as fast as real time; yield how to read it."""
         began_s, over = time.monotonic(), threading.Event()
         now_s = start_s
 
@@ -62,5 +62,5 @@ class Simulator:
 
 
 def listeners(peer: Peer) -> list[Any]:
-    """Return who listens to /clock."""
+    """Return the subscriptions of /clock."""
     return list(peer.node.get_subscriptions_info_by_topic("/clock"))

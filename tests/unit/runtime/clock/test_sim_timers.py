@@ -26,7 +26,7 @@ class Loop:
 
 
 class Bench:
-    """A simulation that goes from time to time, and when what was called."""
+    """A simulation that jumps between times, and the calls that it made."""
 
     def __init__(self) -> None:
         self.loop = Loop()
@@ -37,7 +37,7 @@ class Bench:
         self.called.append(self.calls.now_ns / NANOSECONDS)
 
     def pass_to(self, *times_s: float) -> list[float]:
-        """Return when calls were made on the way."""
+        """Set these times; return when calls were made."""
         self.called.clear()
         for time_s in times_s:
             self.calls.set_time(round(time_s * NANOSECONDS))
@@ -50,14 +50,14 @@ def bench() -> Bench:
     return Bench()
 
 
-def test_before_the_first_time_everything_stands_and_with_it_begins(bench: Bench) -> None:
+def test_timers_start_with_the_first_time(bench: Bench) -> None:
     bench.calls.add(0.1, bench.note, repeats=True)
     assert bench.pass_to(0.0, 0.0) == []
     assert bench.pass_to(1_700_000_000.0) == []
     assert bench.pass_to(1_700_000_000.1) == [1_700_000_000.1]
 
 
-def test_a_period_is_met_exactly_however_many_there_were(bench: Bench) -> None:
+def test_multiples_of_a_period_are_met_exactly(bench: Bench) -> None:
     bench.pass_to(1_700_000_000.0)
     bench.calls.add(0.1, bench.note, repeats=True)
     start_ns = bench.calls.now_ns
@@ -67,7 +67,7 @@ def test_a_period_is_met_exactly_however_many_there_were(bench: Bench) -> None:
     assert len(bench.called) == 10_000
 
 
-def test_a_jump_forward_calls_once_and_keeps_the_beat(bench: Bench) -> None:
+def test_a_jump_forward_calls_once_and_keeps_the_phase(bench: Bench) -> None:
     bench.pass_to(10.0)
     bench.calls.add(1.0, bench.note, repeats=True)
     assert bench.pass_to(110.5, 110.9, 111.0) == [110.5, 111.0]
@@ -82,7 +82,7 @@ def test_a_jump_backward_waits_no_longer_than_a_period(bench: Bench) -> None:
     assert bench.pass_to(12.0) == [12.0, 12.0]
 
 
-def test_a_little_jump_backward_shifts_nothing(bench: Bench) -> None:
+def test_a_small_jump_backward_shifts_nothing(bench: Bench) -> None:
     bench.pass_to(100.0)
     bench.calls.add(1.0, bench.note, repeats=True)
     assert bench.pass_to(100.9, 100.5, 100.9, 100.6, 101.0) == [101.0]
@@ -121,7 +121,7 @@ def test_calls_come_in_the_order_they_are_due(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("repeats", [True, False])
-def test_a_cancelled_call_does_not_come(bench: Bench, repeats: bool) -> None:
+def test_a_canceled_call_is_not_made(bench: Bench, repeats: bool) -> None:
     bench.pass_to(1.0)
     waiting = bench.calls.add(0.1, bench.note, repeats=repeats)
     handed_over = bench.calls.add(0.1, bench.note, repeats=repeats)
@@ -133,7 +133,7 @@ def test_a_cancelled_call_does_not_come(bench: Bench, repeats: bool) -> None:
     assert bench.pass_to(3.0) == []
 
 
-def test_a_timer_that_raises_goes_on(bench: Bench) -> None:
+def test_a_timer_that_raises_continues(bench: Bench) -> None:
     bench.pass_to(1.0)
 
     def fall_over() -> None:
@@ -149,7 +149,7 @@ def test_a_timer_that_raises_goes_on(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("delay_s", [0.0, -1.0, -math.inf])
-def test_what_is_due_now_is_called_while_time_stands(bench: Bench, delay_s: float) -> None:
+def test_a_call_without_a_delay_is_made_while_time_is_paused(bench: Bench, delay_s: float) -> None:
     bench.calls.add(delay_s, bench.note)
     bench.loop.run()
     assert bench.called == [0.0]
@@ -162,7 +162,7 @@ def test_a_delay_may_be_very_long(bench: Bench, delay_s: float) -> None:
     assert bench.pass_to(1.0, 2.0, 1.5, 3.0) == [2.0]
 
 
-def test_how_late_a_call_is_counts_in_the_simulation(bench: Bench) -> None:
+def test_lateness_is_in_simulated_time(bench: Bench) -> None:
     bench.pass_to(1.0)
     late_s: list[float] = []
     call = bench.calls.add(1.0, lambda: late_s.append(call.late_s), repeats=True)

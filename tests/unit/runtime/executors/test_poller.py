@@ -18,7 +18,7 @@ _LONG_S = 30.0
 
 @pytest.fixture(params=["with epoll_pwait2", "without"])
 def poller(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Poller:
-    if request.param == "without":  # as where Linux is older than 5.11
+    if request.param == "without":  # as on Linux before 5.11
         monkeypatch.setattr(module, "_HAS_PWAIT2", False)
     elif not module._HAS_PWAIT2:
         pytest.skip("this Linux has no epoll_pwait2")
@@ -39,11 +39,11 @@ def test_waits_until_the_time_has_come(poller: Poller, wait_s: float) -> None:
     assert monotonic() >= until_s
 
 
-def test_a_wait_that_something_else_has_ended_goes_on_until_the_time_has_come(
+def test_a_wait_that_was_woken_can_continue_until_the_time_has_come(
     poller: Poller, written: int
 ) -> None:
     poller.register(written)
-    for _ in range(2):  # for two times, each waited for more than once
+    for _ in range(2):  # two times, each waited for more than once
         until_s = monotonic() + 0.05
         for _ in range(3):
             os.eventfd_write(written, 1)
@@ -54,12 +54,12 @@ def test_a_wait_that_something_else_has_ended_goes_on_until_the_time_has_come(
         assert monotonic() < until_s + _LONG_S
 
 
-def test_a_time_may_be_far_off(poller: Poller) -> None:
+def test_a_time_may_be_far_in_the_future(poller: Poller) -> None:
     poller.wake()
     poller.wait(1e300)  # returns
 
 
-def test_a_time_that_is_over_is_not_waited_for(poller: Poller, written: int) -> None:
+def test_a_past_time_is_not_waited_for(poller: Poller, written: int) -> None:
     poller.register(written)
     assert [fd for fd, _ in poller.wait(monotonic() - 1.0)] == [written]
 

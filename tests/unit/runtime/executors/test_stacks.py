@@ -1,4 +1,4 @@
-"""Stacks of threads that go on, looked at while no garbage is collected."""
+"""Stacks of running threads, read while garbage collection is paused."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from composer.runtime.executors.stacks import format_stack, gc_paused, stacks_of
 
 @pytest.fixture
 def waiting() -> Iterator[int]:
-    """A thread that waits in a function of its own; its identifier."""
+    """The identifier of a thread that waits in a known function."""
     is_there, may_go = threading.Event(), threading.Event()
 
     def wait_here() -> None:
@@ -28,7 +28,7 @@ def waiting() -> Iterator[int]:
     is_there.wait()
     assert thread.ident is not None
     while sys._current_frames()[thread.ident].f_code.co_name != "wait":
-        time.sleep(0.001)  # it is there, but on its way still
+        time.sleep(0.001)  # it has started but does not wait yet
     yield thread.ident
     may_go.set()
     thread.join()
@@ -44,12 +44,12 @@ def test_the_innermost_frame_is_first_and_shown_last(waiting: int) -> None:
     assert "may_go.wait()" in format_stack(stack)
 
 
-def test_threads_that_are_no_more_are_left_out(waiting: int) -> None:
+def test_threads_that_have_ended_are_left_out(waiting: int) -> None:
     assert list(stacks_of((0, waiting))) == [waiting]
 
 
 @pytest.mark.parametrize("collects", [True, False])
-def test_garbage_is_collected_afterwards_as_before(collects: bool) -> None:
+def test_garbage_collection_is_restored(collects: bool) -> None:
     before = gc.isenabled()
     try:
         (gc.enable if collects else gc.disable)()
@@ -78,7 +78,7 @@ def test_concurrent_use_does_not_enable_the_collector_too_early() -> None:
 
 
 def test_a_stack_trace_keeps_no_frame_alive() -> None:
-    """Else what a callback holds, an image of some megabytes, waits for the garbage collector."""
+    """Otherwise large messages of a callback are kept until the next garbage collection."""
     is_there, may_go = threading.Event(), threading.Event()
     held: list[weakref.ref[set[int]]] = []
 

@@ -1,4 +1,4 @@
-"""Futures and tasks, on the smallest loop there can be."""
+"""Futures and tasks, on a minimal loop."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ class TestTask:
         assert loop.start(answer(7)).result() == 7
         assert loop.ended == 1
 
-    def test_does_not_begin_before_the_loop_calls(self, loop: Loop) -> None:
+    def test_does_not_start_before_the_loop_calls(self, loop: Loop) -> None:
         begun: list[bool] = []
 
         async def begin() -> None:
@@ -167,7 +167,7 @@ class TestTask:
         loop.run()
         assert begun == [True]
 
-    def test_waits_for_a_future_without_being_called(self, loop: Loop) -> None:
+    def test_waits_for_a_future_without_polling(self, loop: Loop) -> None:
         gate: Future[str] = Future()
         outcome = loop.start(wait_for(gate))
         assert not outcome.done()
@@ -196,7 +196,7 @@ class TestTask:
         assert str(error) == "broken"
 
     @pytest.mark.parametrize("error", [SystemExit, KeyboardInterrupt])
-    def test_an_exit_ends_the_task_and_not_the_loop(
+    def test_system_exit_ends_the_task_but_not_the_loop(
         self, loop: Loop, error: type[BaseException]
     ) -> None:
         async def leave() -> None:
@@ -231,7 +231,7 @@ class TestTask:
         with pytest.raises(TypeError, match=r"cannot await _asyncio\.Future here"):
             loop.start(wait_for(foreign)).result()
 
-    def test_a_coroutine_may_go_on_after_a_wrong_await(self, loop: Loop) -> None:
+    def test_a_coroutine_may_continue_after_a_wrong_await(self, loop: Loop) -> None:
         class Wrong:
             def __await__(self) -> Generator[str, None, None]:
                 yield "nonsense"
@@ -268,7 +268,7 @@ class TestCanceling:
         assert not gate.done()
         assert loop.reports == []
 
-    def test_before_the_beginning_nothing_runs(self, loop: Loop) -> None:
+    def test_a_task_canceled_before_its_start_never_runs(self, loop: Loop) -> None:
         seen: list[bool] = []
 
         async def work() -> None:
@@ -279,7 +279,7 @@ class TestCanceling:
         assert seen == []
         assert loop.ended == 1
 
-    def test_what_was_awaited_does_not_wake_it_any_more(self, loop: Loop) -> None:
+    def test_the_awaited_future_does_not_wake_a_canceled_task(self, loop: Loop) -> None:
         gate: Future[str] = Future()
         other: Future[str] = Future()
         seen: list[str] = []
@@ -313,7 +313,7 @@ class TestCanceling:
         loop.run()
         assert [str(error) for _, error in loop.reports] == ["while cleaning up"]
 
-    def test_awaiting_what_was_cancelled_cancels(self, loop: Loop) -> None:
+    def test_awaiting_a_canceled_future_cancels(self, loop: Loop) -> None:
         gate: Future[None] = Future()
         outcome = loop.start(wait_for(gate))
         gate.cancel()
@@ -363,11 +363,11 @@ class TestWaiting:
         loop.pass_time()
         assert outcome.done()
 
-    def test_a_cancelled_sleep_leaves_no_timer(self, loop: Loop) -> None:
+    def test_a_canceled_sleep_leaves_no_timer(self, loop: Loop) -> None:
         sleep(loop, 0.5).cancel()
         assert [call.cancelled for call in loop.later] == [True]
 
-    def test_within_the_time_the_result_comes_through(self, loop: Loop) -> None:
+    def test_a_result_in_time_is_returned(self, loop: Loop) -> None:
         gate: Future[str] = Future()
         outcome = loop.start(within(loop, gate, 1.0))
         gate.set_result("answer")
@@ -375,7 +375,7 @@ class TestWaiting:
         assert outcome.result() == "answer"
         assert [call.cancelled for call in loop.later] == [True]
 
-    def test_after_the_time_the_future_is_cancelled(self, loop: Loop) -> None:
+    def test_after_the_timeout_the_future_is_canceled(self, loop: Loop) -> None:
         gate: Future[str] = Future()
         outcome = loop.start(within(loop, gate, 1.5))
         loop.pass_time()

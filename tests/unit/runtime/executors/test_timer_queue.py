@@ -21,7 +21,7 @@ def take_due(queue: TimerQueue) -> list[ScheduledCall]:
     return taken
 
 
-def test_gives_what_is_due_in_order_and_keeps_the_rest() -> None:
+def test_pops_due_calls_in_order_and_keeps_the_rest() -> None:
     queue = TimerQueue()
     now_s = monotonic()
     late, soon, later = call(now_s - 2.0), call(now_s - 1.0), call(now_s + 60.0)
@@ -42,13 +42,13 @@ def test_calls_due_at_the_same_time_keep_their_order() -> None:
     assert take_due(queue) == calls
 
 
-def test_an_empty_timetable_is_never_due() -> None:
+def test_an_empty_queue_is_never_due() -> None:
     queue = TimerQueue()
     assert queue.next_due_s() == queue.next_s == math.inf
     assert take_due(queue) == []
 
 
-def test_a_cancelled_call_is_not_given_and_not_waited_for() -> None:
+def test_a_canceled_call_is_neither_made_nor_waited_for() -> None:
     queue = TimerQueue()
     now_s = monotonic()
     due, next_one, last = call(now_s - 1.0), call(now_s + 30.0), call(now_s + 60.0)
@@ -61,7 +61,7 @@ def test_a_cancelled_call_is_not_given_and_not_waited_for() -> None:
     assert queue.next_due_s() == last.due_s
 
 
-def test_cancelled_calls_do_not_pile_up() -> None:
+def test_canceled_calls_do_not_accumulate() -> None:
     queue = TimerQueue()
     for _ in range(10_000):
         item = call(monotonic() + 60.0)
@@ -70,7 +70,7 @@ def test_cancelled_calls_do_not_pile_up() -> None:
     assert len(queue._entries) < 200
 
 
-def test_a_periodic_call_keeps_its_beat_and_skips_what_it_missed() -> None:
+def test_a_periodic_call_keeps_its_phase_and_skips_missed_periods() -> None:
     queue = TimerQueue()
     begin_s = monotonic() - 350.0
     item = call(begin_s, period_s=100.0)
@@ -79,7 +79,7 @@ def test_a_periodic_call_keeps_its_beat_and_skips_what_it_missed() -> None:
     assert queue.next_s == item.due_s
 
 
-def test_a_periodic_call_in_time_comes_a_period_later() -> None:
+def test_a_periodic_call_in_time_is_due_one_period_later() -> None:
     queue = TimerQueue()
     due_s = monotonic()
     item = call(due_s, period_s=60.0)
@@ -87,7 +87,7 @@ def test_a_periodic_call_in_time_comes_a_period_later() -> None:
     assert item.due_s == pytest.approx(due_s + 60.0)
 
 
-def test_a_call_that_is_out_counts_for_when_the_next_is_due() -> None:
+def test_a_popped_call_counts_for_the_next_due_time() -> None:
     queue = TimerQueue()
     begin_s = monotonic() - 1.0
     once, often = call(begin_s), call(begin_s + 0.5, period_s=60.0)
@@ -102,7 +102,7 @@ def test_a_call_that_is_out_counts_for_when_the_next_is_due() -> None:
 
 
 @pytest.mark.parametrize("period_s", [None, 1.0])
-def test_what_is_cancelled_or_once_only_is_not_repeated(period_s: float | None) -> None:
+def test_canceled_and_single_calls_are_not_repeated(period_s: float | None) -> None:
     queue = TimerQueue()
     item = call(monotonic(), period_s)
     if period_s is not None:

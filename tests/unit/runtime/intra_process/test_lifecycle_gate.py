@@ -1,4 +1,4 @@
-"""What is waited for, each future until its time: on one timer."""
+"""Pending futures, each with a deadline, on one timer."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from composer.runtime.intra_process.lifecycle_gate import PendingFutures
 
 
 class Clock:
-    """A steady clock that is set by hand, and the timers on it."""
+    """A steady clock that the test advances, and its timers."""
 
     def __init__(self) -> None:
         self.now_s = 100.0
@@ -27,7 +27,7 @@ class Clock:
         self.timers.append((self.now_s + delay_s, callback))
 
     def pass_s(self, seconds: float) -> None:
-        """Let time pass, from timer to timer."""
+        """Advance the time, from timer to timer."""
         end_s = self.now_s + seconds
         while due := [timer for timer in self.timers if timer[0] <= end_s]:
             timer = min(due, key=lambda entry: entry[0])
@@ -57,7 +57,7 @@ def hold(pending: PendingFutures, until_s: float) -> Future[str]:
     return pending.add(Future(), until_s, TooLate)
 
 
-def test_each_ends_at_its_own_time(clock: Clock, pending: PendingFutures) -> None:
+def test_each_future_fails_at_its_deadline(clock: Clock, pending: PendingFutures) -> None:
     ends_s = (105.0, 103.0, 104.0, 103.0, 109.0)
     futures = [hold(pending, end_s) for end_s in ends_s]
     for second in range(101, 111):
@@ -67,7 +67,9 @@ def test_each_ends_at_its_own_time(clock: Clock, pending: PendingFutures) -> Non
     assert not clock.timers
 
 
-def test_what_is_done_in_time_keeps_its_outcome(clock: Clock, pending: PendingFutures) -> None:
+def test_a_future_that_is_done_in_time_keeps_its_result(
+    clock: Clock, pending: PendingFutures
+) -> None:
     early, late = hold(pending, 101.0), hold(pending, 102.0)
     early.set_result("answer")
     clock.pass_s(5.0)
@@ -75,23 +77,21 @@ def test_what_is_done_in_time_keeps_its_outcome(clock: Clock, pending: PendingFu
     assert isinstance(late.exception(), TooLate)
 
 
-def test_one_call_after_the_other_takes_one_timer_for_all(
-    clock: Clock, pending: PendingFutures
-) -> None:
+def test_consecutive_calls_share_one_timer(clock: Clock, pending: PendingFutures) -> None:
     for _ in range(1000):
         hold(pending, clock.now_s + 5.0).set_result("answer")
         clock.pass_s(0.001)
     assert clock.ordered == 1
     unanswered = hold(pending, clock.now_s + 5.0)
     clock.pass_s(4.5)
-    assert clock.ordered == 2  # the first one has gone off meanwhile
+    assert clock.ordered == 2  # the first one has fired meanwhile
     assert not unanswered.done()
     clock.pass_s(0.5)
     assert isinstance(unanswered.exception(), TooLate)
     assert not clock.timers
 
 
-def test_a_sooner_time_is_kept_though_a_later_one_was_there_first(
+def test_an_earlier_deadline_is_kept_even_if_a_later_one_was_added_first(
     clock: Clock, pending: PendingFutures
 ) -> None:
     later, sooner = hold(pending, 150.0), hold(pending, 101.0)
@@ -117,7 +117,7 @@ def test_without_a_limit_there_is_no_timer_and_closing_ends_it(
     assert hold(pending, 2000.0).done() is False, "the end of others is not its own"
 
 
-def test_what_is_done_is_let_go(pending: PendingFutures) -> None:
+def test_a_future_that_is_done_is_discarded(pending: PendingFutures) -> None:
     done: Future[str] = Future()
     done.set_result("answer")
     pending.add(done)
@@ -142,7 +142,7 @@ def test_a_passed_deadline_ends_it_at_the_next_poll(clock: Clock, pending: Pendi
     assert future.done()
 
 
-def test_none_is_forgotten_while_threads_hold_and_the_timer_looks() -> None:
+def test_no_future_is_lost_while_threads_add_and_the_timer_checks() -> None:
     due: list[Callable[[], object]] = []
     pending = PendingFutures(lambda _, look: due.append(look))
 

@@ -1,4 +1,4 @@
-"""The histogram of times, what is made of it, and how it is shown."""
+"""Histograms of durations, the figures and rates computed from them, and their views."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_a_percentile_is_right_within_a_tenth(scale_s: float) -> None:
     assert durations.longest_s == times_s[-1]
 
 
-def test_times_that_settle_together_come_into_the_buckets_of_each() -> None:
+def test_a_flushed_batch_is_counted_in_the_right_buckets() -> None:
     random = Random(3)
     kinds = (
         lambda: random.choice(BOUNDS_S),
@@ -66,12 +66,12 @@ def test_values_beyond_the_scale_are_counted() -> None:
     assert durations.percentile_s(0.5) <= 1e-7
 
 
-def test_nothing_counted_is_zero() -> None:
+def test_an_empty_histogram_is_zero() -> None:
     durations = counted()
     assert (durations.count, durations.mean_s, durations.percentile_s(0.99)) == (0, 0.0, 0.0)
 
 
-def test_a_time_can_stand_for_several() -> None:
+def test_a_duration_can_have_a_weight() -> None:
     durations = counted(0.5)
     durations.set_weight(16)
     durations.add(0.25)
@@ -111,7 +111,7 @@ def test_figures_are_in_milliseconds() -> None:
     assert (found.longest_ms, found.late_longest_ms) == (4.0, 1.0)
 
 
-def test_rates_are_those_between_two_looks() -> None:
+def test_rates_are_those_between_two_snapshots() -> None:
     before = [CallbackFigures("/a", "timer", "tick", count=10, total_ms=100.0)]
     now = [
         CallbackFigures("/a", "timer", "tick", count=30, total_ms=500.0),
@@ -120,7 +120,7 @@ def test_rates_are_those_between_two_looks() -> None:
     found = rates(before, now, 2.0)
     assert [(item.calls_hz, item.busy) for item in found] == [(10.0, 0.2), (0.0, 0.0)]
     assert [item.calls_hz for item in rates(before, now, 0.0)] == [0.0, 0.0]
-    assert rates(now, before, 1.0)[0].busy == 0.0  # a node that was made anew
+    assert rates(now, before, 1.0)[0].busy == 0.0  # a node that was created again
 
 
 def report(at_s: float, *callbacks: CallbackFigures) -> Any:
@@ -165,7 +165,7 @@ def test_top_sorts_by_the_requested_column(sorting: SortKey, first: str) -> None
     assert sorted_rates(*two_reports(), sorting)[0].figures.node == first
 
 
-def test_top_shows_a_line_a_callback_and_no_more_than_there_is_room_for() -> None:
+def test_top_shows_one_line_per_callback_up_to_the_height_of_the_terminal() -> None:
     before, now = two_reports()
     found = sorted_rates(before, now, SortKey.NODE)
     assert top_table(now, found) == (
@@ -180,7 +180,7 @@ def test_top_shows_a_line_a_callback_and_no_more_than_there_is_room_for() -> Non
     assert top_data(now, found)["callbacks"][0]["calls_hz"] == 50.0
 
 
-def test_the_summary_shows_what_took_most_time() -> None:
+def test_the_summary_shows_the_slowest_callbacks() -> None:
     _, now = two_reports()
     lines = summary_table(now.callbacks, 1).splitlines()
     assert lines[1].split()[0] == "/b"
