@@ -49,5 +49,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
             RULE,
             f"namespace '{namespace}' has {levels} levels, more than {DEEPEST}",
             namespace.span,
-            hint="merge or drop levels that do not tell nodes apart",
+            hint="merge or drop levels that do not distinguish nodes",
         )

@@ -31,7 +31,7 @@ system: polling
 nodes:
   display:
     subscriptions:
-      battery: {type: sensor_msgs/msg/BatteryState, qos: state, external: true, log: heard}
+      battery: {type: sensor_msgs/msg/BatteryState, qos: state, external: true, log: received}
 """,
     )
 )

@@ -17,8 +17,8 @@ RULE = register(
         severity=Severity.WARNING,
         summary="A remapping gives a port a name that another port of the node already has.",
         why=(
-            "Two streams of the node become one, and subscribers cannot tell the messages of the "
-            "two ports apart."
+            "Two streams of the node become one, and subscribers cannot distinguish the messages "
+            "of the two ports."
         ),
         bad="""\
 system: collision

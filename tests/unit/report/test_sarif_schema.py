@@ -1,8 +1,8 @@
-"""SARIF held against the schema of OASIS, as the package pydantic-sarif has it.
+"""SARIF logs match the OASIS schema, in the form of the package pydantic-sarif.
 
-That package is made by a program from ``sarif-schema-2.1.0.json``: properties that must be there,
-none that the schema does not have, types, enumerations, least values. What no schema can say -
-URIs, indexes into arrays - is in test_report_programs.py.
+The package is generated from ``sarif-schema-2.1.0.json`` and checks required and unknown properties,
+types, enumerations and minimum values. What a schema does not cover, such as URIs and indexes, is
+tested in test_machine_formats.py.
 """
 
 from __future__ import annotations

@@ -20,11 +20,11 @@ def system(*nodes: str, connections: tuple[str, ...] = (), above: str = "") -> s
 
 
 MISTAKES = {
-    "a node of an unknown type may publish what another one hears": (
+    "a node of an unknown type may publish what another one subscribes to": (
         system("talker: {type: tlker}", LISTENER),
         ["unknown-node-type"],
     ),
-    "the port that was meant is not called unheard": (
+    "the intended port of a misspelled reference is not unheard": (
         system(
             TALKER,
             LISTENER,
@@ -32,7 +32,7 @@ MISTAKES = {
         ),
         ["unknown-port"],
     ),
-    "nor is the one of a node whose name is misspelled": (
+    "the port of a misspelled node is not unheard": (
         system(
             TALKER,
             LISTENER,
@@ -40,7 +40,7 @@ MISTAKES = {
         ),
         ["unknown-node"],
     ),
-    "a misspelled section takes its ports with it": (
+    "a misspelled section hides its ports": (
         system(
             "talker: {publisher: {chatter: {type: std_msgs/msg/String, qos: command}}, "
             "timers: {tick: {period_ms: 100, publish: {chatter: {data: hello}}}}}",
@@ -49,14 +49,14 @@ MISTAKES = {
         ),
         ["unknown-key"],
     ),
-    "a misspelled section takes its parameters with it": (
+    "a misspelled section hides its parameters": (
         system(
             "motor: {paramters: {rate_hz: 10.0}, "
             'timers: {tick: {rate_hz: "{parameters.rate_hz}", log: tick}}}'
         ),
         ["unknown-key"],
     ),
-    "a misspelled section takes its state with it": (
+    "a misspelled section hides its state": (
         system(
             "motor: {stat: {last: 0.0}, timers: {tick: {period_ms: 100, set: {last: 1.0}, "
             "when: state.last < 1.0}}}"
@@ -67,7 +67,7 @@ MISTAKES = {
         system("motor: {timers: {tick: {period_ms: 100, lgo: hello}}}"),
         ["unknown-key"],
     ),
-    "a misspelled policy makes the profile a guess": (
+    "a misspelled policy makes the profile unknown": (
         system(
             "talker: {publishers: {chatter: {type: std_msgs/msg/String, "
             "qos: {reliabilty: reliable, durability: transient_local}}}}",
@@ -81,7 +81,7 @@ MISTAKES = {
         ),
         ["unknown-interface"],
     ),
-    "ends of different types need not match in QoS": (
+    "endpoints of different types need not have compatible QoS": (
         system(
             TALKER, "listener: {subscriptions: {chatter: {type: std_msgs/msg/Bool, qos: state}}}"
         ),
@@ -94,7 +94,7 @@ MISTAKES = {
         ),
         ["parameter-type"],
     ),
-    "a range nobody can meet is one mistake": (
+    "a range that no value can satisfy is one mistake": (
         system(
             "motor: {parameters: {speed: {type: double, default: 3.0, minimum: 5, maximum: 1}}}"
         ),
@@ -107,11 +107,11 @@ MISTAKES = {
         ),
         ["unknown-name"],
     ),
-    "a broken expression does not leave an idle timer": (
+    "a timer with an invalid expression is not idle": (
         system('motor: {timers: {tick: {period_ms: 100, log: "{1 +}"}}}'),
         ["invalid-expression"],
     ),
-    "a cycle is not also an order of clients and servers": (
+    "a cycle is not also reported as the wrong order": (
         system(
             "a: {clients: {ask: {type: std_srvs/srv/Trigger}}, lifecycle: {depends_on: [b]}}",
             "b: {services: {ask: {type: std_srvs/srv/Trigger, respond: {success: true}}}, "
@@ -119,7 +119,7 @@ MISTAKES = {
         ),
         ["dependency-cycle"],
     ),
-    "a remapping of an unknown name may have been what was needed": (
+    "a remapping of an unknown name may be meant for an unconnected port": (
         system(
             "talker: {publishers: {words: {type: std_msgs/msg/String, qos: command}}, "
             "remappings: {word: chatter}}",
@@ -141,7 +141,7 @@ MISTAKES = {
         ),
         ["unknown-qos-profile"],
     ),
-    "a period that is refused is not absurd too": (
+    "an invalid period is not also reported as impractical": (
         system("motor: {timers: {tick: {period_ms: -5, log: tick}}}"),
         ["out-of-range"],
     ),
