@@ -1,6 +1,6 @@
 """SARIF logs match the OASIS schema, in the form of the package pydantic-sarif.
 
-The package is generated from ``sarif-schema-2.1.0.json`` and checks required and unknown properties,
+The package is generated from ``sarif-schema-2.1.0.json``. It checks required, unknown properties,
 types, enumerations and minimum values. What a schema does not cover, such as URIs and indexes, is
 tested in test_machine_formats.py.
 """
