@@ -1,6 +1,6 @@
 """The API for Python behaviors. It does not need ROS.
 
-A behavior is a plain class beside its node type. Handlers are bound by name::
+A behavior is a plain class next to its node type. Handlers are bound by name::
 
     class Planner(Behavior):
         def on_sensor_data(self, message): ...              # subscription `sensor_data`

@@ -1,7 +1,7 @@
 """Folders of data files: JSON Schemas, node types, systems, interfaces.
 
 A wheel has them in ``composer/share/`` (see pyproject.toml). In a checkout or an editable install,
-they are beside the package.
+they are next to the package.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ _PACKAGE = Path(__file__).resolve().parent
 
 def _folder(name: str) -> Path:
     share = _PACKAGE / "share"
-    # The wheel first: `nodes` beside an installed package would belong to another distribution.
+    # The wheel first: `nodes` next to an installed package would belong to another distribution.
     return (share if share.is_dir() else _PACKAGE.parent) / name
 
 

@@ -20,7 +20,7 @@ LEAST_LIKENESS = 0.6
 LONGEST_NAME = 255
 
 _FEW = 60
-_BESIDE = 12  # number of candidates on each side, of many names
+_NEIGHBORS = 12  # number of candidates on each side, of many names
 
 
 class Vocabulary:
@@ -46,9 +46,9 @@ class Vocabulary:
         if len(self._forwards) <= _FEW:
             found: Iterable[str] = self._forwards
         else:
-            beside = _beside(folded, self._forwards)
-            beside += (name[::-1] for name in _beside(folded[::-1], self._backwards))
-            found = dict.fromkeys(beside)
+            neighbors = _neighbors(folded, self._forwards)
+            neighbors += (name[::-1] for name in _neighbors(folded[::-1], self._backwards))
+            found = dict.fromkeys(neighbors)
         return [candidate for candidate in found if len(candidate) <= LONGEST_NAME]
 
 
@@ -58,6 +58,6 @@ def vocabulary(names: tuple[str, ...]) -> Vocabulary:
     return Vocabulary(names)
 
 
-def _beside(name: str, ordered: Sequence[str]) -> list[str]:
+def _neighbors(name: str, ordered: Sequence[str]) -> list[str]:
     place = bisect_left(ordered, name)
-    return list(ordered[max(place - _BESIDE, 0) : place + _BESIDE])
+    return list(ordered[max(place - _NEIGHBORS, 0) : place + _NEIGHBORS])

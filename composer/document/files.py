@@ -105,14 +105,14 @@ def _require_regular(mode: int) -> None:
 
 
 def _similar_name(path: Path) -> str | None:
-    name = nearest(path.name, _names_beside(path))
+    name = nearest(path.name, _sibling_names(path))
     if name is None:
         return None
     # Do not shorten the path: its end is the part that differs.
     return f"did you mean '{shown(path.with_name(name), limit=_LONGEST_PATH)}'?"
 
 
-def _names_beside(path: Path) -> Iterator[str]:
+def _sibling_names(path: Path) -> Iterator[str]:
     try:
         with os.scandir(path.parent) as entries:
             yield from (entry.name for entry in islice(entries, _ENTRIES_FOR_HINT))

@@ -1,4 +1,4 @@
-"""Builds the tree that is compiled, out of safe operations. What it does not know, it refuses."""
+"""Build the syntax tree to compile from safe operations, and refuse anything else."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from composer.expressions.values import read_fields, read_path
 _MAXIMUM_INDEX = 2**31 - 1
 _NOT_IN_LANGUAGE = "this is not part of the expression language"
 
-#: The name under which compiled code finds the values it is given.
+#: The name of the scope in compiled code.
 SCOPE = "scope"
 
-#: All else that compiled code can reach: it looks nothing up anywhere but here.
+#: The only other names that compiled code can access.
 OPERATIONS: Mapping[str, Callable[..., Any]] = {
     **ARITHMETIC,
     **{f"call_{name}": function.call for name, function in FUNCTIONS.items()},
@@ -52,18 +52,18 @@ Built = TypeVar("Built", bound=ast.expr)
 
 
 def build(tree: ast.expr) -> tuple[ast.expr, tuple[FieldPath, ...]]:
-    """Return a safe tree that does what ``tree`` says, and every field path in it.
+    """Return a safe tree equivalent to ``tree``, and all field paths in it.
 
-    Raises ExpressionError for whatever is not part of the language.
+    Raises ExpressionError for anything that is not part of the language.
     """
     paths: list[FieldPath] = []
     return _build(tree, paths), tuple(paths)
 
 
 def path_of(node: ast.expr) -> FieldPath:
-    """Return the field path that a name, attribute or subscript stands for.
+    """Return the field path of a name, attribute or subscript.
 
-    Raises ExpressionError when it is not one.
+    Raises ExpressionError for other nodes.
     """
     offset, length = extent(node)
     parts: list[str | int] = []
@@ -86,7 +86,7 @@ def path_of(node: ast.expr) -> FieldPath:
 
 
 def literal(node: ast.expr) -> bool | int | float | str | None:
-    """Return the value of a constant, which may have a minus before it; None for all else."""
+    """Return the value of a constant with an optional minus; None for other nodes."""
     match node:
         case ast.Constant(value=bool() | int() | float() | str() as value):
             return value
@@ -133,7 +133,7 @@ def _path(node: ast.expr, paths: list[FieldPath]) -> ast.expr:
 
 
 def _steps(parts: tuple[str | int, ...]) -> tuple[tuple[str, ...] | int, ...]:
-    """Return the parts with field names that follow each other in one tuple."""
+    """Return the parts, with consecutive field names in one tuple."""
     steps: list[tuple[str, ...] | int] = []
     names: tuple[str, ...] = ()
     for part in parts:
@@ -255,7 +255,7 @@ def _error(node: ast.expr, message: str, hint: str | None = None) -> ExpressionE
 
 
 def _at(origin: ast.expr, node: Built) -> Built:
-    """Return ``node`` with the place of ``origin``, so that a failure names its part."""
+    """Return ``node`` with the location of ``origin``, for error messages."""
     return ast.copy_location(node, origin)
 
 

@@ -1,4 +1,4 @@
-"""From source text to an Expression."""
+"""Compile source text to an Expression."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from composer.expressions.syntax import parse
 
 @lru_cache(maxsize=4096)
 def compile_expression(source: str) -> Expression:
-    """Return the compiled expression. Raises ExpressionError when ``source`` is not one.
+    """Return the compiled expression. Raises ExpressionError if ``source`` is invalid.
 
-    Which names are in scope is not judged here: ``Expression.paths`` lists what is used.
+    Names are not checked here: ``Expression.paths`` lists those in use.
     """
     tree = parse(source)
     body, paths = build(tree)
@@ -29,7 +29,7 @@ def _function(body: ast.expr) -> Callable[[Mapping[str, Any]], Any]:
     )
     function = ast.copy_location(ast.Lambda(arguments, body), body)
     code = compile(ast.fix_missing_locations(ast.Expression(function)), "<expression>", "eval")
-    # Nothing of this code is the user's: build() made it, out of OPERATIONS and constants.
+    # Safe: build() made this code from OPERATIONS and constants only.
     compiled: Callable[[Mapping[str, Any]], Any] = eval(  # noqa: S307
         code, {"__builtins__": {}, **OPERATIONS}
     )

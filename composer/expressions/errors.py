@@ -1,13 +1,14 @@
-"""What can go wrong with an expression: as it is written, and as it is worked out."""
+"""Errors of expressions, when they are compiled or evaluated."""
 
 from __future__ import annotations
 
 
 class ExpressionError(Exception):
-    """The text is no expression of the language.
+    """The text is not a valid expression.
 
-    ``offset`` and ``length`` give the part that is wrong, in characters of the source; ``hint``
-    says how to mend it, where that is known.
+    ``offset`` and ``length`` are the invalid part in characters of the source; ``hint`` says how to
+    fix
+    it, if that is clear.
     """
 
     def __init__(self, message: str, offset: int = 0, length: int = 1, hint: str | None = None):
@@ -19,8 +20,8 @@ class ExpressionError(Exception):
 
 
 class EvaluationError(Exception):
-    """The expression has no value for the values it was given. The text names the part."""
+    """The expression cannot be evaluated with the given values. The text names the part."""
 
 
 class Refusal(Exception):
-    """An operation does not take the value at hand; becomes an EvaluationError."""
+    """An operation does not support a value; becomes an EvaluationError."""

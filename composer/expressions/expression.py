@@ -1,4 +1,4 @@
-"""A compiled expression and what is known of it before it is evaluated."""
+"""Compiled expressions."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _is_name(part: str | int) -> bool:
 class FieldPath:
     """A use of a name: ``("message", "poses", 0, "pose")``.
 
-    Offset and length are in characters of the expression's source.
+    ``offset`` and ``length`` count characters of the source.
     """
 
     parts: tuple[str | int, ...]
@@ -39,11 +39,11 @@ class FieldPath:
 
     @property
     def root(self) -> str:
-        """The name in scope that the path starts from."""
+        """The name in scope at the start of the path."""
         return str(self.parts[0])
 
     def key(self, known: Container[str]) -> str:
-        """Return the key that the path reads of its root, a map that has the keys ``known``."""
+        """Return the key that the path reads from its root, a map with the keys ``known``."""
         names = tuple(str(part) for part in takewhile(_is_name, self.parts[1:]))
         return map_key(known, names)[0] if names else ""
 
@@ -54,9 +54,9 @@ class FieldPath:
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """An expression ready to be evaluated. Two are equal when their sources are.
+    """A compiled expression. Expressions with the same source are equal.
 
-    ``tree`` is its syntax, for whoever wants to know the type of its value; columns in it count
+    ``tree`` is its syntax tree, for type inference; columns in it count
     characters of the source.
     """
 
@@ -76,7 +76,7 @@ class Expression:
             raise EvaluationError(self._explain(error)) from error
 
     def holds(self, scope: Mapping[str, Any]) -> bool:
-        """Return the value of a condition. Raises EvaluationError when it is not true or false."""
+        """Return the value of a condition. Raises EvaluationError unless it is a boolean."""
         value = self.evaluate(scope)
         if not isinstance(value, bool):
             message = f"'{shown(self.source)}': {describe(value)} where true or false is expected"
@@ -100,7 +100,7 @@ def _reason(error: Exception) -> str:
 
 
 def _failed_part(source: str, code: CodeType, traceback: TracebackType | None) -> str:
-    """Return the part of the source that was being worked out, by the code's position table."""
+    """Return the part of the source that failed, from the code's position table."""
     while traceback is not None and traceback.tb_frame.f_code is not code:
         traceback = traceback.tb_next
     if traceback is None:

@@ -1,4 +1,4 @@
-"""Everything a compiled expression can calculate: each operation checks the values it is given."""
+"""The operations of compiled expressions. Each one checks its arguments."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from composer.expressions.errors import Refusal
 from composer.expressions.values import Kind, describe, kind_of, plain
 
-#: The range of integers: what int64 and uint64 fields hold between them.
+#: The range of integers: int64 and uint64.
 MAXIMUM_INTEGER = 2**64 - 1
 MINIMUM_INTEGER = -(2**63)
 _MAXIMUM_DIGITS = 15
@@ -22,7 +22,7 @@ _PRIMITIVES = (Kind.NUMBER, Kind.TEXT, Kind.BOOL)
 
 
 def as_number(value: Any) -> Any:
-    """Return ``value`` when it is a number; true and false are none."""
+    """Return ``value`` if it is a number, which excludes booleans."""
     if type(value) in _PLAIN_NUMBERS:
         return value
     value = plain(value)
@@ -32,14 +32,14 @@ def as_number(value: Any) -> Any:
 
 
 def bounded(value: Any) -> Any:
-    """Return ``value``, refusing integers beyond 64 bits, so that no number grows for ever."""
+    """Return ``value``, but refuse integers beyond 64 bits, to limit their size."""
     if isinstance(value, int) and not MINIMUM_INTEGER <= value <= MAXIMUM_INTEGER:
         raise Refusal("the number is too large")
     return value
 
 
 def comparable(value: Any) -> Any:
-    """Return ``value`` when it is a number, a text, true, false or nothing."""
+    """Return ``value`` if it is a number, a text, a boolean or None."""
     if type(value) in _PLAIN_COMPARABLE:
         return value
     value = plain(value)
@@ -49,7 +49,7 @@ def comparable(value: Any) -> Any:
 
 
 def is_in(item: Any, container: Any) -> bool:
-    """Say whether ``container``, a list or a text, has ``item`` in it."""
+    """Return whether ``container``, a list or a text, contains ``item``."""
     item = comparable(item)
     match kind_of(type(container)):
         case Kind.TEXT if isinstance(item, str):
@@ -143,7 +143,7 @@ def _primitive(value: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """A function of the language. ``most`` is None where any number of arguments will do."""
+    """A function of the language. ``most`` is None for any number of arguments."""
 
     call: Callable[..., Any]
     least: int = 1
@@ -151,7 +151,7 @@ class Function:
 
     @property
     def arguments(self) -> str:
-        """How many arguments the function takes, in words."""
+        """The number of arguments in words."""
         if self.most is None:
             return f"at least {self.least} argument"
         if self.least != self.most:
@@ -159,7 +159,7 @@ class Function:
         return f"{self.least} argument" + ("s" if self.least > 1 else "")
 
     def takes(self, count: int) -> bool:
-        """Say whether the function can be called with ``count`` arguments."""
+        """Return whether the function takes ``count`` arguments."""
         return self.least <= count and (self.most is None or count <= self.most)
 
 

@@ -1,4 +1,4 @@
-"""From text to Python's syntax tree, within limits; nothing is understood yet."""
+"""Parse text to Python's syntax tree, within limits."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ MAXIMUM_NODES = 64
 
 
 def parse(source: str) -> ast.expr:
-    """Return the syntax tree of ``source``, with columns that count characters of it.
+    """Return the syntax tree of ``source``, with columns in characters.
 
-    Raises ExpressionError for what is too long, too deep, or no expression.
+    Raises ExpressionError if it is too long, too deep or invalid.
     """
     _check_length(source)
     check_tokens(source)
@@ -25,7 +25,7 @@ def parse(source: str) -> ast.expr:
         tree = ast.parse(text, mode="eval").body
     except SyntaxError as error:
         raise _syntax_error(source, error, skipped) from None
-    except (ValueError, RecursionError, MemoryError):  # lone surrogates; a deep stack already
+    except (ValueError, RecursionError, MemoryError):  # lone surrogates, or little stack left
         raise ExpressionError("the expression cannot be read", 0, len(source)) from None
     _count_nodes(source, tree)
     _count_characters(text, tree, skipped)
@@ -33,7 +33,7 @@ def parse(source: str) -> ast.expr:
 
 
 def extent(node: ast.expr) -> tuple[int, int]:
-    """Return where ``node`` begins and how long it is, in characters of the source."""
+    """Return the offset and the length of ``node`` in characters of the source."""
     end = node.end_col_offset if node.end_col_offset is not None else node.col_offset + 1
     return node.col_offset, end - node.col_offset
 
@@ -52,7 +52,7 @@ def _syntax_error(source: str, error: SyntaxError, skipped: int) -> ExpressionEr
         return ExpressionError("something is missing at the end", end - 1)
     offset = min(skipped + max((error.offset or 1) - 1, 0), end - 1)
     length = (error.end_offset or 0) - (error.offset or 0)
-    message = error.msg.partition(". ")[0]  # what follows speaks of Python, not of this language
+    message = error.msg.partition(". ")[0]  # the rest is about Python, not this language
     return ExpressionError(message, offset, max(min(length, end - offset), 1))
 
 
@@ -64,7 +64,7 @@ def _count_nodes(source: str, tree: ast.expr) -> None:
 
 
 def _count_characters(text: str, tree: ast.expr, skipped: int) -> None:
-    """Turn Python's columns, which count UTF-8 bytes of ``text``, into columns of the source."""
+    """Convert Python's columns, in UTF-8 bytes of ``text``, to columns of the source."""
     data = text.encode()
     for node in ast.walk(tree):
         if isinstance(node, ast.expr):

@@ -1,4 +1,4 @@
-"""The characters of an expression, looked at before Python's parser sees any of them."""
+"""Check the tokens of an expression before Python parses it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from composer.expressions.errors import ExpressionError
 
-#: Bounds the depth to which Python's parser can be driven, whatever is written.
+#: Limits the recursion depth of Python's parser.
 MAXIMUM_TOKENS = 256
 MAXIMUM_NESTING = 32
 
@@ -39,7 +39,7 @@ _HINTS = {
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """A word or an operator, and where it stands."""
+    """A word or an operator with its offset."""
 
     kind: str
     text: str
@@ -47,7 +47,7 @@ class Token:
 
 
 def check_tokens(source: str) -> None:
-    """Raise ExpressionError unless ``source`` is a short, flat run of known tokens."""
+    """Raise ExpressionError unless ``source`` has few, flat and known tokens."""
     closing: list[str] = []
     previous: Token | None = None
     for count, token in enumerate(_tokens(source)):
@@ -79,7 +79,7 @@ def _unexpected(source: str, offset: int, text: str) -> ExpressionError:
 
 
 def _check_apart(previous: Token | None, token: Token) -> None:
-    """Refuse ``1if``, ``0x10``, ``f'...'`` and triple quotes, which Python would understand."""
+    """Refuse ``1if``, ``0x10``, ``f'...'`` and triple quotes, which are valid in Python."""
     if previous is None or previous.kind not in _WORDS or token.kind not in _WORDS:
         return
     if previous.offset + len(previous.text) == token.offset:

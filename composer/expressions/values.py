@@ -121,7 +121,7 @@ def read_path(value: Any, steps: tuple[tuple[str, ...] | int, ...]) -> Any:
 
 
 def _read_maps(value: Any, names: tuple[str, ...]) -> tuple[Any, tuple[str, ...]]:
-    """Return what is reached before the first value that is no map, and the names left then."""
+    """Return the first value on the path that is not a map, and the remaining names."""
     while names and kind_of(type(value)) is Kind.MAPPING:
         key, count = map_key(value, names)
         if key not in value:

@@ -1,4 +1,4 @@
-"""The colours of pictures on light and dark pages: one hue for each way nodes talk."""
+"""The colors of pictures on light and dark pages, one hue per kind of channel."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _KINDS = {
 
 
 def colors(*, dark: bool) -> dict[str, str]:
-    """Return all colours by name: ``page``, ``text``, ..., ``node`` (fill), ``node-line``."""
+    """Return all colors by name: ``page``, ``text``, ..., ``node`` (fill), ``node-line``."""
     side = int(dark)
     found = {name: both[side] for name, both in _PLAIN.items()}
     for kind, both in _KINDS.items():
@@ -38,7 +38,7 @@ def colors(*, dark: bool) -> dict[str, str]:
 
 
 def color_rules(color: Mapping[str, str]) -> str:
-    """Return the rules of a style sheet that give every part of a picture its colour."""
+    """Return the rules of a style sheet that give every part of a picture its color."""
     rules = [
         f".page{{fill:{color['page']}}}",
         f"text{{fill:{color['text']}}}",
@@ -56,7 +56,7 @@ def color_rules(color: Mapping[str, str]) -> str:
     return "".join(rules)
 
 
-#: Everything about a picture but its colours.
+#: Everything about a picture but its colors.
 FORMS = (
     'text{font-family:"Helvetica Neue",Helvetica,Arial,"Liberation Sans",sans-serif;'
     "font-size:12px;text-anchor:middle}"

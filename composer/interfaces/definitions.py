@@ -1,4 +1,4 @@
-"""What an interface definition says: messages, services, actions and the types of their fields."""
+"""Interface definitions: messages, services, actions and the types of their fields."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TypeAlias
 from composer.tree import Plain
 
 #: The primitive types of the ROS 2 interface definition language, and the range of the integers.
-#: ``char`` is a uint8 since ROS 2 and is turned into one; ``byte`` is a type of its own.
+#: ``char`` is a uint8 in ROS 2 and is converted to it; ``byte`` is a separate type.
 INTEGER_RANGES: Mapping[str, tuple[int, int]] = {
     "byte": (0, 255),
     "int8": (-(2**7), 2**7 - 1),
@@ -62,7 +62,7 @@ class FieldType:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A field of a message. ``default`` is None where the definition gives none."""
+    """A field of a message. ``default`` is None without a default."""
 
     name: str
     type: FieldType
@@ -91,7 +91,7 @@ class Message:
         return {item.name: item for item in self.fields}
 
     def field(self, name: str) -> Field | None:
-        """Return the field called ``name``, or None."""
+        """Return the field ``name``, or None."""
         return self._by_name.get(name)
 
     @property
@@ -102,7 +102,7 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """A service: what is asked and what is answered."""
+    """A service: its request and its response."""
 
     name: str
     request: Message
@@ -111,7 +111,7 @@ class Service:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """An action: what is asked for, how it ends, and what is told on the way."""
+    """An action: its goal, result and feedback."""
 
     name: str
     goal: Message

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from composer.diagnostics import nearest, suggestion
 from composer.interfaces.definitions import Action, Interface, Message, Service
 from composer.interfaces.parser import DefinitionError, parse_definition, split_name
 from composer.interfaces.share_json import read_description
@@ -33,7 +34,7 @@ class InvalidDefinition:
 
     @property
     def place(self) -> str:
-        """Where it is, as a file and a line."""
+        """The location as file and line."""
         return f"{shown_path(Path(self.path))}:{self.line}"
 
 
@@ -55,7 +56,7 @@ class Interfaces:
         return cls((find_packages(folders), *installed_prefixes(), Bundle()))
 
     def find(self, name: str) -> Message | Service | Action | None:
-        """Return the interface ``package/msg/Name`` (or srv, action); None when there is none.
+        """Return the interface ``package/msg/Name`` (or srv, action); None if there is none.
 
         None too for a definition that cannot be read: ``problem`` says why.
         """
@@ -68,7 +69,7 @@ class Interfaces:
         return found if isinstance(found, Message) else None
 
     def problem(self, name: str) -> InvalidDefinition | None:
-        """Return what is wrong with the definition of ``name``, or None."""
+        """Return the error in the definition of ``name``, or None."""
         found = self._look_up(name)
         return found if isinstance(found, InvalidDefinition) else None
 
@@ -104,3 +105,20 @@ def _parse(name: str, definition: Definition) -> Interface | InvalidDefinition:
         return InvalidDefinition(name, definition.path, error.line, error.message)
     except ValueError as error:
         return InvalidDefinition(name, definition.path, 1, str(error))
+
+
+def similar_interface(name: str, known: Collection[str]) -> str | None:
+    """Return a hint with the most similar names among ``known``, or None."""
+    package, slash, _ = name.partition("/")
+    siblings = [other for other in known if other.startswith(f"{package}/")]
+    alike = [other for other in known if _stem(other) == _stem(name)]
+    found = [other for other in alike if not siblings or other in siblings]
+    if not found:
+        by_stem = {_stem(other): other for other in (siblings if slash else known)}
+        close = nearest(_stem(name), by_stem)
+        found = alike or siblings if close is None else [by_stem[close]]
+    return f"did you mean '{found[0]}'?" if len(found) == 1 else suggestion(_stem(name), found)
+
+
+def _stem(name: str) -> str:
+    return name.rpartition("/")[2]

@@ -1,8 +1,8 @@
-"""Reads ``.msg``, ``.srv`` and ``.action`` text.
+"""Parse ``.msg``, ``.srv`` and ``.action`` files.
 
-The language is that of docs.ros.org "About ROS 2 interfaces"; where the page is silent this does
-what rosidl_adapter, ROS's own parser, does: a ``#`` begins a comment even within quotes, and a
-line with an ``=`` behind the name is a constant.
+The language is that of docs.ros.org "About ROS 2 interfaces"; beyond it, this follows
+rosidl_adapter, the parser of ROS: a ``#`` begins a comment even within quotes, and a line with an
+``=`` after the name is a constant.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _Lines = list[tuple[int, str]]
 
 
 class DefinitionError(Exception):
-    """A definition that ROS would not build. ``line`` counts from 1."""
+    """A definition that is invalid in ROS. ``line`` counts from 1."""
 
     def __init__(self, message: str, line: int) -> None:
         super().__init__(message)
@@ -99,14 +99,14 @@ def parse_definition(name: str, text: str) -> Interface:
 
 
 def without_comments(text: str) -> str:
-    """Return the definition with nothing in it but what it defines."""
+    """Return the definition without comments and empty lines."""
     return ("\n" + _SEPARATOR + "\n").join(
         "\n".join(" ".join(line.split(None, 1)) for _, line in lines) for lines in _parts(text)
     )
 
 
 def _parts(text: str) -> list[_Lines]:
-    """Return the lines that define something, with their numbers, between the separators."""
+    """Return the numbered lines of definitions between the separators."""
     parts: list[_Lines] = [[]]
     for number, line in enumerate(text.splitlines(), start=1):
         content = line.partition("#")[0].replace("\t", " ").strip()
@@ -205,7 +205,7 @@ def _default(type_: FieldType, text: str) -> Plain:
 
 
 def _items(text: str) -> list[str]:
-    """Return what stands between commas that are not in quotes."""
+    """Return the items between commas outside quotes."""
     quoted = r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\""""
     items = re.findall(rf"\s*((?:{quoted}|[^,])+)", text)
     return [item.strip() for item in items if item.strip()]

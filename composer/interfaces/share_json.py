@@ -1,4 +1,4 @@
-"""Reads the type descriptions that rosidl installs (``share/<package>/msg/<Name>.json``).
+"""Read the type descriptions that rosidl installs (``share/<package>/msg/<Name>.json``).
 
 They are needed for packages that are written in OMG IDL and have no ``.msg`` text. They hold no
 constants. The layout is that of type_description_interfaces/msg/TypeDescription.
@@ -44,7 +44,7 @@ _TYPE_NAMES: Mapping[int, str] = {
 _NESTED = 1
 _FIXED_ARRAY, _BOUNDED_SEQUENCE, _UNBOUNDED_SEQUENCE = 1, 2, 3
 _ROW = 48
-#: What rosidl puts into a message without fields, because C has no empty struct.
+#: The field that rosidl adds to empty messages, because C has no empty struct.
 _PLACEHOLDER = "structure_needs_at_least_one_member"
 
 

@@ -1,4 +1,4 @@
-"""Where definitions are: packages in the project, installed packages, the bundled snapshot.
+"""Sources of definitions: packages of the project, installed packages, a bundled snapshot.
 
 A source finds the text of a definition by name. Names come from user files, so they are split and
 checked before they become part of a path.
@@ -22,7 +22,7 @@ FOLDERS = ("msg", "srv", "action")
 _MAXIMUM_BYTES = 1_000_000
 _MAXIMUM_DEPTH = 4
 _PACKAGE_NAME = re.compile(r"<name>\s*([a-z][a-z0-9_]*)\s*</name>", re.ASCII)
-#: Folders that never hold sources: what colcon, Python and JavaScript make.
+#: Folders without sources, made by colcon, Python and JavaScript tools.
 _SKIPPED = frozenset(("build", "install", "log", "node_modules", "site-packages", "__pycache__"))
 
 
@@ -36,16 +36,16 @@ class Definition:
 
 
 class InterfaceSource(Protocol):
-    """A place that definitions come from."""
+    """A source of definitions."""
 
     def packages(self) -> frozenset[str]:
-        """Return the packages that have interfaces here."""
+        """Return the packages with interfaces in this source."""
 
     def names(self, folder: str) -> Iterator[str]:
-        """Yield the full names of all messages, services or actions here."""
+        """Yield the full names of all messages, services or actions."""
 
     def read(self, name: str) -> Definition | None:
-        """Return the definition called ``name``, or None. Raises OSError, UnicodeDecodeError."""
+        """Return the definition ``name``, or None. Raises OSError, UnicodeDecodeError."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +59,13 @@ class Packages:
         return frozenset(self.folders)
 
     def names(self, folder: str) -> Iterator[str]:
-        """Yield what the folders of the packages hold."""
+        """Yield the names of the interfaces in the packages."""
         for package, base in self.folders.items():
             for path in sorted((base / folder).glob(f"*.{folder}")):
                 yield f"{package}/{folder}/{path.stem}"
 
     def read(self, name: str) -> Definition | None:
-        """Return the text of a definition; its type description where there is no text."""
+        """Return the text of a definition, else its type description."""
         package, folder, type_name = split_name(name) or ("", "", "")
         base = self.folders.get(package)
         return _read(base / folder, type_name, folder) if base is not None else None
@@ -83,14 +83,14 @@ class Prefix:
         return frozenset(_listed(index))
 
     def names(self, folder: str) -> Iterator[str]:
-        """Yield what the packages of the prefix have installed."""
+        """Yield the names of the installed interfaces."""
         for package in sorted(self.packages()):
             names = _listed(self.root / "share" / package / folder)
             stems = {Path(name).stem for name in names if name.endswith((f".{folder}", ".json"))}
             yield from (f"{package}/{folder}/{stem}" for stem in sorted(stems))
 
     def read(self, name: str) -> Definition | None:
-        """Return the text of a definition; its type description where there is no text."""
+        """Return the text of a definition, else its type description."""
         package, folder, type_name = split_name(name) or ("", "", "")
         return _read(self.root / "share" / package / folder, type_name, folder) if folder else None
 
@@ -114,7 +114,7 @@ class Bundle:
 
 
 def installed_prefixes() -> tuple[Prefix, ...]:
-    """Return the prefixes ROS looks into: ``AMENT_PREFIX_PATH``, then this Python's own."""
+    """Return the prefixes that ROS searches: ``AMENT_PREFIX_PATH``, then that of this Python."""
     listed = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     roots = dict.fromkeys((*(entry for entry in listed if entry), sys.prefix))
     return tuple(Prefix(Path(root)) for root in roots)
@@ -133,7 +133,7 @@ def find_packages(folders: Iterable[Path]) -> Packages:
 
 
 def _manifests(folder: Path, depth: int) -> Iterator[Path]:
-    """Yield every package.xml; not below one, and not through symbolic links."""
+    """Yield every package.xml, but none below another one or behind symbolic links."""
     manifest = folder / "package.xml"
     if manifest.is_file():
         yield manifest
@@ -170,7 +170,7 @@ def _read(folder: Path, type_name: str, extension: str) -> Definition | None:
 
 
 def _text(path: Path) -> str | None:
-    """Return the text of a regular file of sensible size; None for everything else."""
+    """Return the text of a regular file of limited size, or None."""
     try:
         if not path.is_file() or path.stat().st_size > _MAXIMUM_BYTES:
             return None

@@ -11,7 +11,7 @@ from composer.model.system import PrimaryState, System, channels
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
+class DependencyEdge:
     """``node`` waits until ``on`` is in ``state``. Both are keys of ``System.nodes``.
 
     ``serves`` is the name of the service or action that ``on`` serves to ``node``; it is empty for
@@ -29,15 +29,15 @@ class Edge:
         return bool(self.serves)
 
 
-def declared_edges(system: System) -> Iterator[Edge]:
+def declared_edges(system: System) -> Iterator[DependencyEdge]:
     """Yield the declared dependencies in order, without those on unknown nodes."""
     for node in system.nodes:
         for dependency in node.depends_on:
             if system.node(dependency.node.value) is not None:
-                yield Edge(node.name.value, dependency.node.value, state=dependency.state)
+                yield DependencyEdge(node.name.value, dependency.node.value, state=dependency.state)
 
 
-def implied_edges(system: System) -> Iterator[Edge]:
+def implied_edges(system: System) -> Iterator[DependencyEdge]:
     """Yield an edge from every client of a service or action to its server.
 
     Of several servers, which the rules refuse, the first is used. There are no edges if the system
@@ -51,10 +51,10 @@ def implied_edges(system: System) -> Iterator[Edge]:
         server = channel.sources[0].node.name.value
         for client in dict.fromkeys(end.node.name.value for end in channel.sinks):
             if client != server:
-                yield Edge(client, server, serves=channel.name)
+                yield DependencyEdge(client, server, serves=channel.name)
 
 
-def dependency_edges(system: System) -> tuple[Edge, ...]:
+def dependency_edges(system: System) -> tuple[DependencyEdge, ...]:
     """Return all declared edges, then the implied ones that are not on a cycle.
 
     Nodes that serve each other have no order, and declared dependencies take precedence over
@@ -86,7 +86,7 @@ def dependency_cycles(system: System) -> tuple[tuple[str, ...], ...]:
     return tuple(sorted(cycles, key=lambda cycle: rank[cycle[0]]))
 
 
-def in_dependency_order(system: System, edges: Sequence[Edge]) -> tuple[str, ...]:
+def in_dependency_order(system: System, edges: Sequence[DependencyEdge]) -> tuple[str, ...]:
     """Return the names of all nodes in dependency order, else as declared.
 
     A cycle, which the rules refuse, is broken at its first declared node.
@@ -117,7 +117,9 @@ def in_dependency_order(system: System, edges: Sequence[Edge]) -> tuple[str, ...
 Graph = Mapping[str, Mapping[str, None]]
 
 
-def _graph(system: System, edges: Sequence[Edge] | Iterator[Edge]) -> dict[str, dict[str, None]]:
+def _graph(
+    system: System, edges: Sequence[DependencyEdge] | Iterator[DependencyEdge]
+) -> dict[str, dict[str, None]]:
     """Return the nodes that each node waits for, in order and without duplicates."""
     graph: dict[str, dict[str, None]] = {node.name.value: {} for node in system.nodes}
     for edge in edges:

@@ -69,7 +69,7 @@ class Dependency:
 
 @dataclass(frozen=True, slots=True)
 class BehaviorReference:
-    """``module:Class``: Python beside the YAML file, beside the node types, or installed."""
+    """``module:Class``: Python next to the YAML file or the node types, or installed."""
 
     text: Located[str]
     folder: Path  # the folder of the YAML file; searched first

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from composer.model import Dependency, Node, PrimaryState, System
-from composer.model.dependencies import Edge, dependency_edges, in_dependency_order
+from composer.model.dependencies import DependencyEdge, dependency_edges, in_dependency_order
 from composer.plan.steps import Phase, Plan, build_plan, downward, nodes_of, rank
 from composer.plan.transitions import plan_transitions
 
@@ -83,7 +83,7 @@ def _limit(dependency: Dependency, goals: Mapping[str, PrimaryState]) -> Primary
     return PrimaryState.ACTIVE if rank(reached) >= rank(dependency.state) else reached
 
 
-def _dependents(edges: Iterable[Edge]) -> dict[str, tuple[str, ...]]:
+def _dependents(edges: Iterable[DependencyEdge]) -> dict[str, tuple[str, ...]]:
     """Return the names of the nodes that wait for each node."""
     users: dict[str, dict[str, None]] = {}
     for edge in edges:

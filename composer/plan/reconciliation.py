@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from composer.model import OnFailure, PrimaryState, System
-from composer.model.dependencies import Edge, dependency_edges, in_dependency_order
+from composer.model.dependencies import DependencyEdge, dependency_edges, in_dependency_order
 from composer.plan.steps import Plan, rank
 from composer.plan.transitions import plan_transitions
 
@@ -181,10 +181,10 @@ def _reachable(
     return reachable
 
 
-def _needs(system: System) -> Iterator[tuple[str, tuple[Edge, ...]]]:
+def _needs(system: System) -> Iterator[tuple[str, tuple[DependencyEdge, ...]]]:
     """Yield every node in dependency order, with its dependencies."""
     edges = dependency_edges(system)
-    needs: dict[str, list[Edge]] = {}
+    needs: dict[str, list[DependencyEdge]] = {}
     for edge in edges:
         needs.setdefault(edge.node, []).append(edge)
     for name in in_dependency_order(system, edges):

@@ -8,7 +8,7 @@ from itertools import groupby
 from typing import Literal, TypeAlias
 
 from composer.model import Node, PrimaryState, System
-from composer.model.dependencies import Edge
+from composer.model.dependencies import DependencyEdge
 
 TransitionName: TypeAlias = Literal["configure", "activate", "deactivate", "cleanup", "shutdown"]
 
@@ -89,14 +89,14 @@ def build_plan(phases: Iterable[Phase], causes: Mapping[str, str]) -> Plan:
     return Plan(tuple(steps))
 
 
-def upward(edges: Iterable[Edge], state: PrimaryState) -> Iterable[tuple[str, str]]:
+def upward(edges: Iterable[DependencyEdge], state: PrimaryState) -> Iterable[tuple[str, str]]:
     """Yield (node, dependency) for each dependency needed in ``state`` or above."""
     for edge in edges:
         if rank(edge.state) >= rank(state):
             yield edge.node, edge.on
 
 
-def downward(edges: Iterable[Edge], state: PrimaryState) -> Iterable[tuple[str, str]]:
+def downward(edges: Iterable[DependencyEdge], state: PrimaryState) -> Iterable[tuple[str, str]]:
     """Yield (dependency, node): on the way down, a dependency waits for its dependents."""
     for node, other in upward(edges, state):
         yield other, node

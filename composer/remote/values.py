@@ -11,7 +11,7 @@ from composer.diagnostics import suggestion
 from composer.document import parse_document
 from composer.expressions import EvaluationError
 from composer.interfaces import Interfaces
-from composer.interfaces.similar import similar_interface
+from composer.interfaces.index import similar_interface
 from composer.remote.session import RosError
 from composer.runtime.ros.messages import MessageError, compile_message, interface_class
 from composer.source import SourceFile

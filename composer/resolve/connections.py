@@ -131,7 +131,7 @@ def read_chains(tree: Tree | None) -> tuple[Chain, ...]:
 def _chain(entry: Entry) -> Chain | None:
     tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
     latency_ms = number(tree.get("latency_ms"))
-    through = tuple(Endpoint(name) for name in texts(tree.get("through")))
-    if latency_ms is None or not through:
+    endpoints = tuple(Endpoint(name) for name in texts(tree.get("through")))
+    if latency_ms is None or not endpoints:
         return None
-    return Chain(key(entry), through, latency_ms, entry.key.span)
+    return Chain(key(entry), endpoints, latency_ms, entry.key.span)

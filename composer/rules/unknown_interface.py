@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Rule, Severity, register
-from composer.interfaces.similar import similar_interface
+from composer.interfaces.index import similar_interface
 from composer.model import Port
 
 RULE = register(

@@ -46,7 +46,7 @@ def _is_integer(_: object, value: object) -> bool:
 def _inline_references(part: Any, definitions: dict[str, Any]) -> Any:
     """Return ``part`` with references replaced by definitions, which halves the time.
 
-    In draft-07, validators ignore the keywords beside a ``$ref``.
+    In draft-07, validators ignore the keywords next to a ``$ref``.
     """
     match part:
         case {"$ref": reference}:

@@ -71,7 +71,7 @@ def show(
 
     Nested messages are expanded and indented.
     """
-    from composer.interfaces.similar import similar_interface
+    from composer.interfaces.index import similar_interface
 
     interfaces = _interfaces()
     found = interfaces.find(name)

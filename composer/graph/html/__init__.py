@@ -1,8 +1,8 @@
-"""Diagrams as one page that needs nothing else: no network, no server, no installed program.
+"""Diagrams as one self-contained HTML page: no network, no server, no installed program.
 
-``page`` puts it together; ``articles`` writes what is known about each thing. What the page looks
-like is in ``page.css``; what it does is in the ``.js`` files, one matter each, joined in the order
-that ``page`` names.
+``page`` assembles the page and ``articles`` the details of each entity. The style is in
+``page.css``, the behavior
+in the ``.js`` files, which ``page`` joins in order.
 """
 
 from __future__ import annotations

@@ -8,13 +8,13 @@ from composer.graph.diagram import Details, Graph
 from composer.graph.svg_elements import text
 from composer.tree import Plain
 
-#: Words of facts that are no words of people.
+#: Labels for the keys of facts.
 _WORDS = {"rate_hz": "rate", "timeout_ms": "timeout", "qos": "QoS"}
 _UNITS = {"rate_hz": "Hz", "timeout_ms": "ms"}
 #: Policies whose value alone says which one it is.
 _PLAIN_POLICIES = ("reliability", "durability", "history")
 _SEPARATOR = " -> "
-#: What is told on its own; ports are parts of nodes.
+#: Kinds with an article of their own; ports are part of their nodes.
 _WHOLE = ("node", "topic", "service", "action")
 
 Facts = Mapping[str, Plain]
@@ -60,7 +60,7 @@ def _title(key: str) -> tuple[str, str]:
 
 
 def _role(kind: str) -> str:
-    """Mark what is told with its node anyway: print leaves it out."""
+    """Mark an article that repeats a part of its node's: print omits it."""
     return "" if kind in _WHOLE else ' class="part"'
 
 

@@ -29,10 +29,10 @@ function createSearch(currentPicture, goTo) {
       thing.element.classList.remove("current");
       if (found) matches.push(thing);
     }
-    // Names say more than what is known beside them.
+    // Matches in names rank above matches in details.
     matches.sort((one, other) => rank(one, words) - rank(other, words));
     picture.svg.classList.toggle("searching", words.length > 0);
-    tell(words.length > 0);
+    report(words.length > 0);
   }
 
   function step(by) {
@@ -41,10 +41,10 @@ function createSearch(currentPicture, goTo) {
     position = (position + by + matches.length) % matches.length;
     matches[position].element.classList.add("current");
     goTo(matches[position]);
-    tell(true);
+    report(true);
   }
 
-  function tell(asked) {
+  function report(asked) {
     const where = position < 0 ? `${matches.length} found` : `${position + 1} of ${matches.length}`;
     output.textContent = asked ? where : "";
   }

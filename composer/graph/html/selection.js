@@ -1,5 +1,5 @@
 /**
- * What is chosen: its details in the panel, what it is connected to beside it, the rest dimmed.
+ * The selection: its details in the panel, its connections highlighted, the rest dimmed.
  *
  * In a picture one thing can be reached with Tab; the arrow keys go to what lies in that direction,
  * Enter chooses.

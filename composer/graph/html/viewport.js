@@ -153,7 +153,7 @@ function listenToPointers(svg, viewport) {
     });
   }
 
-  // What ends a drag is no click on whatever lies under it.
+  // The end of a drag is not a click on the element below it.
   svg.addEventListener("click", (event) => { if (dragging) event.stopPropagation(); }, true);
 
   function drag(before, event) {

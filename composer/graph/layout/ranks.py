@@ -46,11 +46,11 @@ def assign_ranks(clusters: Mapping[str, str], pairs: Sequence[Pair]) -> dict[str
 
 
 def _neighbors(keys: Sequence[str], pairs: Sequence[Pair]) -> dict[str, list[str]]:
-    neighbours: dict[str, list[str]] = {key: [] for key in keys}
+    neighbors: dict[str, list[str]] = {key: [] for key in keys}
     for source, target in pairs:
         if source != target:
-            neighbours[source].append(target)
-    return neighbours
+            neighbors[source].append(target)
+    return neighbors
 
 
 def _acyclic_order(keys: Sequence[str], pairs: Sequence[Pair]) -> list[str]:

@@ -1,1 +1,1 @@
-"""One file for each way to look at a system: ``build(system, diagnostics) -> Graph``."""
+"""One module per view of a system: ``build(system, diagnostics) -> Graph``."""

@@ -1,4 +1,4 @@
-"""Every port, and what it is joined to with which type and QoS."""
+"""All ports and their connections, with types and QoS."""
 
 from __future__ import annotations
 
@@ -82,15 +82,15 @@ def _edges(channel: SceneChannel) -> Iterator[Edge]:
 
 
 def _said(source: SceneEndpoint, sink: SceneEndpoint) -> Iterator[str]:
-    """Yield the type; of a topic the rate and the QoS of both ends, once where they agree."""
+    """Yield the type; for a topic also the rate and the QoS of both endpoints, once if equal."""
     yield " / ".join(dict.fromkeys(short_type(end.port.interface) for end in (source, sink)))
     if source.port.kind.channel is not ChannelKind.TOPIC:
         return
     if source.port.rate_hz is not None:
         yield rate(source.port.rate_hz)
-    told = dict.fromkeys(end.port.qos for end in (source, sink) if end.port.qos)
-    if told:
-        yield " → ".join(told)
+    labels = dict.fromkeys(end.port.qos for end in (source, sink) if end.port.qos)
+    if labels:
+        yield " → ".join(labels)
 
 
 def _key(endpoint: SceneEndpoint) -> str:

@@ -1,4 +1,4 @@
-"""The order of the bring-up: which step each node takes when, and whom it waits for."""
+"""The bring-up order: the steps of each node and the nodes that it waits for."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from composer.model import ChannelKind, PortKind
 
 
 def build(scene: Scene) -> Graph:
-    """Return the graph of who talks to whom over what. Arrows point where data or requests go."""
+    """Return the graph of nodes and channels. Arrows point in the direction of data or requests."""
     namespaces = Namespaces(node.namespace for node in scene.nodes)
     joined = channels(scene.nodes)
     return Graph(
@@ -85,7 +85,7 @@ def _label(channel: SceneChannel, endpoint: SceneEndpoint) -> tuple[str, ...]:
     if port.kind is PortKind.PUBLISHER and port.rate_hz is not None:
         lines.append(rate(port.rate_hz))
     offered = {source.port.qos for source in channel.sources}
-    is_told = port.kind is PortKind.SUBSCRIPTION and offered == {port.qos}
-    if port.qos and not is_told:
+    has_rate = port.kind is PortKind.SUBSCRIPTION and offered == {port.qos}
+    if port.qos and not has_rate:
         lines.append(port.qos)
     return tuple(lines)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.interfaces.similar import similar_interface
+from composer.interfaces.index import similar_interface
 
 KNOWN = (
     "nav_msgs/msg/Odometry",
