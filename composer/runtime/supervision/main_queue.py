@@ -64,7 +64,7 @@ class MainQueue(Generic[T]):
     """
 
     def __init__(self) -> None:
-        #: Woken for every item and request.
+        #: Woken for every item and request; wake it to make :meth:`wait` check its condition.
         self.wakeup = WakeupPipe()
         self._items: deque[T] = deque()
         #: Why the system stops; None while no stop is requested.
@@ -91,10 +91,6 @@ class MainQueue(Generic[T]):
     def put(self, item: T) -> None:
         """Append an item, from any thread."""
         self._items.append(item)
-        self.wakeup.wake()
-
-    def wake(self) -> None:
-        """Make :meth:`wait` check its condition again, from any thread."""
         self.wakeup.wake()
 
     def drain(self) -> list[T]:

@@ -195,7 +195,7 @@ class PlanExecutor:
         limit_s = min(self._node_set.timeout_s(step.node) + _STUCK_AFTER_S, options.step_limit_s)
         self._node_set.moving.add(step.node)
         future = node.loop.run_task(node.lifecycle.change(step.transition))
-        future.add_done_callback(lambda _: self._main_queue.wake())
+        future.add_done_callback(lambda _: self._main_queue.wakeup.wake())
         name = node.loop.name
         phase.running.append(_RunningStep(step, name, future, now_s, limit_s, options.end_s))
 

@@ -24,7 +24,7 @@ def test_items_are_kept_during_a_wait() -> None:
     main_queue: MainQueue[str] = MainQueue()
     main_queue.put("later")
     done = []
-    threading.Thread(target=lambda: (done.append(True), main_queue.wake())).start()
+    threading.Thread(target=lambda: (done.append(True), main_queue.wakeup.wake())).start()
     assert main_queue.wait(lambda: bool(done), time.monotonic() + 20.0, stoppable=True)
     assert main_queue.get(time.monotonic()) == "later"
 
@@ -62,6 +62,6 @@ def test_a_stop_ends_stoppable_waits_and_a_second_one_shortens_the_others(
 @pytest.mark.parametrize("left_s", [1e9, math.inf])
 def test_the_end_of_a_wait_may_be_years_away(left_s: float) -> None:
     main_queue: MainQueue[str] = MainQueue()
-    main_queue.wake()
+    main_queue.wakeup.wake()
     assert main_queue.wakeup.wait(time.monotonic() + left_s)
     assert not main_queue.wakeup.wait(time.monotonic() + 0.01)
