@@ -97,10 +97,6 @@ class LifecycleClient:
         """Return the full names of all lifecycle nodes, once discovery is complete."""
         return self._session.wait_until_settled(self.known, self._deadline)
 
-    def check_all_respond(self) -> None:
-        """Raise NoResponseError if the nodes of a system of this computer are not known."""
-        check_all_respond(self._session)
-
     def find(self, name: str) -> str:
         """Return the full name of a node. Raises NotFoundError, NoResponseError."""
         return find_node(self._session, self._deadline, name, self.known, "lifecycle node")

@@ -41,12 +41,12 @@ def config(
     from composer.tree import plain
 
     path = system_file(system)
-    loading = load_system(path, shown=system)
-    if loading.tree is None or not loading.is_valid:
+    result = load_system(path, shown=system)
+    if result.tree is None or not result.is_valid:
         raise typer.Exit(FAILED)
-    whole = canonical(loading.tree)
+    whole = canonical(result.tree)
     text = write_document(whole)
-    if not gives_same_model(loading, text):
+    if not gives_same_model(result, text):
         say(
             "note: node types, behaviors and parameter files next to an included file are not found"
             " from this file"

@@ -120,12 +120,12 @@ def diff(
 
 def _load(text: str, settings: list[str], namespace: str | None) -> System:
     path = system_file(text)
-    loading = load_system(path, shown=text, settings=settings, namespace=namespace)
-    if loading.system is not None and loading.system.node_type:
+    result = load_system(path, shown=text, settings=settings, namespace=namespace)
+    if result.system is not None and result.system.node_type:
         raise CommandError(f"'{text}' is a node type, not a system")
-    if loading.system is None or not loading.is_runnable:
+    if result.system is None or not result.is_runnable:
         raise CommandError(f"'{text}' has errors, so it cannot be compared")
-    return loading.system
+    return result.system
 
 
 def _comparison(system: System, autostart: Autostart | None, ignored: list[str]) -> Compare:

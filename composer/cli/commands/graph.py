@@ -164,11 +164,11 @@ def _declared(names: list[str]) -> Scene:
     systems: list[System] = []
     diagnostics: list[Diagnostic] = []
     for name in names:
-        loading = load_system(system_file(name), shown=name)
-        if loading.system is None:
+        result = load_system(system_file(name), shown=name)
+        if result.system is None:
             raise CommandError(f"'{name}' cannot be drawn because of its errors")
-        systems.append(loading.system)
-        diagnostics.extend(loading.diagnostics)
+        systems.append(result.system)
+        diagnostics.extend(result.diagnostics)
     from composer.graph import scene_of
 
     return scene_of(systems, diagnostics)

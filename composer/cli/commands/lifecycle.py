@@ -59,13 +59,17 @@ def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False) -> None:
 
     Exit code 1 if a system on this computer does not respond, because its nodes are missing then.
     """
-    with _client(timeout) as client:
+    with ros_session("compose lifecycle", timeout) as (session, deadline):
+        from composer.remote.lifecycle import LifecycleClient
+        from composer.remote.name_matching import check_all_respond
+
+        client = LifecycleClient(session, deadline)
         states = client.states(client.nodes())
         if json:
             write(as_json(states, indent=2))
         elif states:
             write(columns([(name, state or "(no response)") for name, state in states.items()]))
-        client.check_all_respond()
+        check_all_respond(session)
     if not states and not json:
         say_none_found("lifecycle node")
 

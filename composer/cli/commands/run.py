@@ -187,21 +187,21 @@ def run(
 
 def _load(text: str, settings: list[str], namespace: str | None, *, use_sim_time: bool) -> System:
     path = system_file(text)
-    loading = load_system(
+    result = load_system(
         path,
         shown=text,
         settings=settings,
         namespace=namespace,
         use_sim_time=use_sim_time,
     )
-    if loading.system is not None and loading.system.node_type:
+    if result.system is not None and result.system.node_type:
         raise CommandError(
             f"'{text}' is a node type, not a system",
             hint="use it in a system under 'nodes:'; 'compose validate' checks it on its own",
         )
-    if loading.system is None or not loading.is_runnable:
+    if result.system is None or not result.is_runnable:
         raise typer.Exit(FAILED)
-    return loading.system
+    return result.system
 
 
 def _arguments(

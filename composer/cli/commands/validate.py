@@ -126,17 +126,17 @@ def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
         if path != _STDIN and not path_exists(path):
             raise UsageError(f"there is no file or folder '{path}'", hint=_path_hint(path))
     found = find_files(path for path in paths if path != _STDIN)
-    loadings = load_files(found.files)
+    results = load_files(found.files)
     if _STDIN in paths:
         content = sys.stdin.buffer.read(MAX_BYTES + 1)
-        loadings.insert(0, load_bytes(content, Path.cwd(), shown=stdin_name))
-    diagnostics = [*found.diagnostics, *collect_diagnostics(loadings)]
-    if not loadings and not diagnostics:
+        results.insert(0, load_bytes(content, Path.cwd(), shown=stdin_name))
+    diagnostics = [*found.diagnostics, *collect_diagnostics(results)]
+    if not results and not diagnostics:
         raise UsageError("there is no system and no node type in " + ", ".join(map(str, paths)))
     return _Checked(
-        files=len(loadings),
+        files=len(results),
         diagnostics=diagnostics,
-        strict=any(loading.project.settings.strict for loading in loadings),
+        strict=any(result.project.settings.strict for result in results),
         foreign=found.foreign,
     )
 

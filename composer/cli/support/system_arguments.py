@@ -124,15 +124,15 @@ def load_system(
     from composer.report.text import render
     from composer.resolve import OverrideOptions
 
-    loading = load(
+    result = load(
         path,
         shown=str(path) if shown is None or not path_exists(Path(shown)) else shown,
         overrides=OverrideOptions(tuple(settings), namespace, use_sim_time),
     )
-    reported = [item for item in loading.diagnostics if item.severity is not Severity.INFO]
+    reported = [item for item in result.diagnostics if item.severity is not Severity.INFO]
     if reported:
         say(render(reported, color=use_color(sys.stderr)))
-    return loading
+    return result
 
 
 def running_system_name(text: str) -> str:

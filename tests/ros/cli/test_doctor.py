@@ -18,7 +18,7 @@ from tests.ros.support.commands import PATIENCE_S, compose, hand_written, measur
 
 @pytest.fixture(scope="module")
 def incompatible_nodes(shared_domain_id: int) -> Iterator[subprocess.Popen[str]]:
-    with hand_written("hand_written_misfits.py") as process:
+    with hand_written("hand_written_incompatible.py") as process:
         yield process
 
 

@@ -188,7 +188,7 @@ class Slow:
     def find_spec(self, name, path=None, target=None):
         if name == "rclpy":
             print("loading", flush=True)
-            time.sleep(60)  # is to be interrupted
+            time.sleep(60)  # until it is interrupted
 
 sys.meta_path.insert(0, Slow())
 from composer.cli import main

@@ -1,8 +1,8 @@
-"""A plain rclpy process in which nothing fits: nodes for 'compose doctor' to find fault with.
+"""Plain rclpy nodes with incompatible endpoints, for the tests of 'compose doctor'.
 
 /lab/scanner publishes /lab/scan (PointStamped, best effort, 50 Hz, stamped a quarter of a second
 ago), which /lab/mapper requests reliably, and with each /lab/plain (Int32). It and /lab/odd
-publish /lab/mixed, with different types; two nodes are called /lab/twin. The action server of
+publish /lab/mixed, with different types; two nodes have the name /lab/twin. The action server of
 /lab/endless never ends a goal. Prints ``ready`` at the start.
 """
 
