@@ -41,14 +41,14 @@ def join_parts(own: Mapping, parts: Iterable[Part], diagnostics: list[Diagnostic
 
     Of two entries with one name the first is kept, and a diagnostic is added.
     """
-    whole = [*_without_repeats(parts, diagnostics), Part(own, own.span)]
-    if len(whole) == 1 and own.entry(INCLUDE) is None:
+    all_parts = [*_without_repeats(parts, diagnostics), Part(own, own.span)]
+    if len(all_parts) == 1 and own.entry(INCLUDE) is None:
         return own
     sections = {
-        **{name: _joined_maps(name, whole, diagnostics) for name in _MAPS},
-        **{name: _joined_lists(name, whole) for name in _LISTS},
+        **{name: _joined_maps(name, all_parts, diagnostics) for name in _MAPS},
+        **{name: _joined_lists(name, all_parts) for name in _LISTS},
     }
-    diagnostics.extend(_system_conflicts(own, whole[:-1]))
+    diagnostics.extend(_system_conflicts(own, all_parts[:-1]))
     kept = [sections.pop(entry.name, None) or entry for entry in own if entry.name != INCLUDE]
     added = [entry for entry in sections.values() if entry is not None]
     return Mapping((*kept, *added), own.span)
@@ -73,14 +73,14 @@ def _without_repeats(parts: Iterable[Part], diagnostics: list[Diagnostic]) -> It
         diagnostics.append(Diagnostic(DUPLICATE_NODE_NAME, message, part.span, related, hint))
 
 
-def _joined_maps(name: str, whole: list[Part], diagnostics: list[Diagnostic]) -> Entry | None:
-    sections = _sections(name, whole)
+def _joined_maps(name: str, all_parts: list[Part], diagnostics: list[Diagnostic]) -> Entry | None:
+    sections = _sections(name, all_parts)
     if not all(isinstance(section.value, Mapping) for section in sections):
         return sections[-1]
     if len(sections) < _SEVERAL:
         return next(iter(sections), None)
     found: dict[str, Entry] = {}
-    for part in whole:
+    for part in all_parts:
         section = part.tree.get(name)
         for entry in section if isinstance(section, Mapping) else ():
             earlier = found.setdefault(entry.name, entry)
@@ -89,16 +89,16 @@ def _joined_maps(name: str, whole: list[Part], diagnostics: list[Diagnostic]) ->
     return Entry(sections[-1].key, Mapping(tuple(found.values()), sections[-1].value.span))
 
 
-def _joined_lists(name: str, whole: list[Part]) -> Entry | None:
-    sections = _sections(name, whole)
+def _joined_lists(name: str, all_parts: list[Part]) -> Entry | None:
+    sections = _sections(name, all_parts)
     if len(sections) < _SEVERAL:
         return next(iter(sections), None)
     items = [item for section in sections for item in _items(section.value)]
     return Entry(sections[-1].key, Sequence(tuple(items), sections[-1].value.span))
 
 
-def _sections(name: str, whole: list[Part]) -> list[Entry]:
-    found = (part.tree.entry(name) for part in whole)
+def _sections(name: str, all_parts: list[Part]) -> list[Entry]:
+    found = (part.tree.entry(name) for part in all_parts)
     return [entry for entry in found if entry is not None]
 
 

@@ -41,7 +41,7 @@ def pieces(text: str) -> list[str | Reference]:
 
 
 def has_reference(text: str) -> bool:
-    """Say whether ``text`` has anything that is not to be taken as it stands."""
+    """Return whether ``text`` contains a reference or an escape."""
     return _MARK in text
 
 

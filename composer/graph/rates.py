@@ -36,7 +36,7 @@ def publishing_rates_hz(node: Node) -> dict[str, float]:
 
 
 def _is_answered_with(node: Node, port: str) -> bool:
-    """Return whether something that comes in makes the node publish to the port."""
+    """Return whether a reaction to incoming data publishes to the port."""
     return any(
         send.port.value == port
         for other in node.ports

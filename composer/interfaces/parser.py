@@ -71,11 +71,11 @@ def parse_definition(name: str, text: str) -> Interface:
         raise ValueError(f"'{name}' is not the name of an interface")
     package, folder, _ = names
     parts = _parts(text)
-    wanted = {"msg": 1, "srv": 2, "action": 3}[folder]
-    if len(parts) != wanted:
+    expected = {"msg": 1, "srv": 2, "action": 3}[folder]
+    if len(parts) != expected:
         line = len(text.splitlines()) or 1
         message = (
-            f"a .{folder} file has {wanted - 1} lines with '{_SEPARATOR}', not {len(parts) - 1}"
+            f"a .{folder} file has {expected - 1} lines with '{_SEPARATOR}', not {len(parts) - 1}"
         )
         raise DefinitionError(message, line)
     match parts:

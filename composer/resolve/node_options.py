@@ -53,7 +53,7 @@ def _watch(tree: Tree | None, default: Watch) -> Watch:
     if not isinstance(tree, Mapping):
         return default
     silence = tree.get("topic_silence_ms")
-    whole = number(silence)
+    any_topic = number(silence)
     topics = tuple(
         (key(entry), limit)
         for entry in entries(silence)
@@ -61,7 +61,7 @@ def _watch(tree: Tree | None, default: Watch) -> Watch:
     )
     is_set = silence is not None
     return Watch(
-        silence_ms=whole if is_set else default.silence_ms,
+        silence_ms=any_topic if is_set else default.silence_ms,
         topics=topics if is_set else default.topics,
         callback_ms=number(tree.get("callback_ms")) or default.callback_ms,
         max_errors=integer(tree.get("max_errors")) or default.max_errors,

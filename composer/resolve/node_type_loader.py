@@ -137,9 +137,9 @@ class NodeTypeLoader:
         if wrong_kind is not None:
             self.diagnostics.append(wrong_kind)
             return None
-        whole = inherit(NodeTypeFile(path, source, tree))
-        self.diagnostics.extend(whole.diagnostics)
-        return whole
+        inherited = inherit(NodeTypeFile(path, source, tree))
+        self.diagnostics.extend(inherited.diagnostics)
+        return inherited
 
 
 def _missing(tree: Mapping, given: dict[str, Tree], span: Span) -> Iterator[Diagnostic]:

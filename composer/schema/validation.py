@@ -17,19 +17,19 @@ _DEFINITIONS = "#/definitions/"
 _validators: dict[str, Draft7Validator] = {}
 
 
-def explain(content: Plain, tree: Mapping, kind: str, whole: dict[str, Any]) -> list[Diagnostic]:
+def explain(content: Plain, tree: Mapping, kind: str, schema: dict[str, Any]) -> list[Diagnostic]:
     """Return the diagnostics of ``content``, which is ``tree`` as plain data.
 
-    ``whole`` is the schema of ``kind``.
+    ``schema`` is the schema of ``kind``.
     """
     if kind not in _validators:
-        _validators[kind] = _validator(whole)
+        _validators[kind] = _validator(schema)
     return explain_errors(_validators[kind].iter_errors(content), TreeIndex(tree))
 
 
-def _validator(whole: dict[str, Any]) -> Draft7Validator:
-    definitions = whole["definitions"]
-    root = {name: part for name, part in whole.items() if name != "definitions"}
+def _validator(schema: dict[str, Any]) -> Draft7Validator:
+    definitions = schema["definitions"]
+    root = {name: part for name, part in schema.items() if name != "definitions"}
     # 10.0 is an integer in JSON Schema, but not in ROS.
     types = Draft7Validator.TYPE_CHECKER.redefine("integer", _is_integer)
     strict = extend(Draft7Validator, type_checker=types)  # type: ignore[no-untyped-call]

@@ -122,7 +122,9 @@ def _table(values: Facts) -> str:
 
 def _short(name: str, value: Plain) -> str:
     if isinstance(value, dict):
-        return text(", ".join(_policy(policy, said) for policy, said in value.items()))
+        return text(
+            ", ".join(_policy(policy, policy_value) for policy, policy_value in value.items())
+        )
     if isinstance(value, list):
         return _list(value)
     unit = _UNITS.get(name)
@@ -133,8 +135,8 @@ def _policy(name: str, value: Plain) -> str:
     if name in _PLAIN_POLICIES:
         return str(value)
     words, _, unit = name.partition("_ms")
-    said = f"{value:g} ms" if isinstance(value, float) and name.endswith("_ms") else str(value)
-    return f"{words.replace('_', ' ')}{unit} {said}"
+    written = f"{value:g} ms" if isinstance(value, float) and name.endswith("_ms") else str(value)
+    return f"{words.replace('_', ' ')}{unit} {written}"
 
 
 def _list(values: Sequence[Plain]) -> str:

@@ -139,7 +139,7 @@ def _choice(group: str, value: str, label: str, depth: int = 0) -> str:
 
 
 def _with_ancestors(namespaces: set[str]) -> set[str]:
-    """Return the namespaces and those they lie in; the root where there is more than one."""
+    """Return the namespaces with their parents, and the root if there are several."""
     found = set(namespaces)
     for name in namespaces:
         levels = name.split("/")

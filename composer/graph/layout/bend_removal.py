@@ -74,11 +74,11 @@ def _across(begin: Station, end: Station, along: float) -> float:
     span = end.begin - begin.end
     if span <= 0.0:
         return end.across
-    wanted = min(max((along - begin.end) / span, 0.0), 1.0)
+    target = min(max((along - begin.end) / span, 0.0), 1.0)
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        if 1.5 * middle * (1 - middle) + middle**3 < wanted:
+        if 1.5 * middle * (1 - middle) + middle**3 < target:
             low = middle
         else:
             high = middle

@@ -112,14 +112,14 @@ def _weight(box: Box, other: Box) -> float:
 
 def _move(room: _Room, root: Group, pulls: list[_Pull]) -> float:
     """Move an item towards its pull within its limits; return the distance."""
-    weight = wanted = 0.0
+    weight = target = 0.0
     for pull in pulls:
         weight += pull.weight
-        wanted += (pull.other.position + pull.offset - pull.box.position) * pull.weight
+        target += (pull.other.position + pull.offset - pull.box.position) * pull.weight
     if weight == 0.0:
         return 0.0
     item = room.item
-    distance = wanted / weight
+    distance = target / weight
     if distance < 0.0:
         distance = -min(-distance, max(_room_above(room, root), 0.0))
     else:

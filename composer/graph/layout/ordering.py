@@ -142,9 +142,9 @@ def _push_apart(rank: list[Box]) -> None:
 
 def _sort(group: Group) -> float:
     """Sort all children by position, groups by their mean; return the mean of the group."""
-    wanted = {
+    positions = {
         id(child): _sort(child) if isinstance(child, Group) else child.position
         for child in group.children
     }
-    group.children.sort(key=lambda child: wanted[id(child)])
-    return sum(wanted.values()) / len(wanted)
+    group.children.sort(key=lambda child: positions[id(child)])
+    return sum(positions.values()) / len(positions)

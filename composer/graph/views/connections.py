@@ -75,13 +75,13 @@ def _edges(channel: SceneChannel) -> Iterator[Edge]:
                 source=source_key,
                 target=target_key,
                 kind=EdgeKind(channel.kind.value),
-                lines=(channel.name, *_said(source, sink)),
+                lines=(channel.name, *_label_lines(source, sink)),
                 details=(("from", dict(begin.port.details)), ("to", dict(end.port.details))),
                 wrong=source.port.wrong or sink.port.wrong,
             )
 
 
-def _said(source: SceneEndpoint, sink: SceneEndpoint) -> Iterator[str]:
+def _label_lines(source: SceneEndpoint, sink: SceneEndpoint) -> Iterator[str]:
     """Yield the type; for a topic also the rate and the QoS of both endpoints, once if equal."""
     yield " / ".join(dict.fromkeys(short_type(end.port.interface) for end in (source, sink)))
     if source.port.kind.channel is not ChannelKind.TOPIC:

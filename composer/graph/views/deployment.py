@@ -28,7 +28,7 @@ def build(scene: Scene) -> Graph:
 
 
 def _edges(scene: Scene) -> Iterator[Edge]:
-    """One arrow for all that goes from one node to another in one way."""
+    """Return one arrow per pair of nodes and kind of channel."""
     names: dict[tuple[str, str, ChannelKind], dict[str, None]] = {}
     for channel in channels(scene.nodes):
         for source in channel.sources:

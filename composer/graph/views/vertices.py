@@ -7,7 +7,7 @@ from composer.graph.scene import SceneNode, node_key
 
 
 def node_vertex(node: SceneNode, name: str, note: str, cluster: str) -> Vertex:
-    """Return the vertex of a node, with ``note`` below its name where there is one."""
+    """Return the vertex of a node, with an optional ``note`` below its name."""
     return Vertex(
         key=node_key(node),
         kind=VertexKind.NODE,
