@@ -26,7 +26,7 @@ from std_msgs.msg import Int32, String
 AGE = Duration(seconds=0.25)
 
 
-def work_for_ever(_: Any) -> Navigate.Result:
+def work_forever(_: Any) -> Navigate.Result:
     while rclpy.ok():
         time.sleep(0.02)
     return Navigate.Result()
@@ -53,7 +53,7 @@ def main() -> None:
     context.init([])
     odd = Node("odd", namespace="/lab", context=context)
     odd.create_publisher(String, "mixed", 10)
-    ActionServer(mapper, Navigate, "endless", work_for_ever)
+    ActionServer(mapper, Navigate, "endless", work_forever)
     executor = MultiThreadedExecutor(3)
     for node in (scanner, mapper, *(Node("twin", namespace="/lab") for _ in range(2))):
         executor.add_node(node)
