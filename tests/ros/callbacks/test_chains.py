@@ -57,5 +57,5 @@ def test_data_is_followed_from_the_first_publisher_to_the_last(more: str, tmp_pa
     assert see.times.mean_s > 0.003
     # Not the mean: the motor may receive a late message together with the next one.
     assert stop.times.percentile_s(0.5) > see.times.percentile_s(0.5)
-    told = {item.chain: item for item in system.stop().chains}
-    assert told["stop"].count == stop.times.count
+    reported = {item.chain: item for item in system.stop().chains}
+    assert reported["stop"].count == stop.times.count

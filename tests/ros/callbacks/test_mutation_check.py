@@ -47,13 +47,13 @@ class Forger(Behavior):
 
 class Reader(Behavior):
     def on_configure(self):
-        self.heard = 0
+        self.received = 0
 
     def on_numbers(self, message):
-        self.heard += 1
+        self.received += 1
 
     def on_texts(self, message):
-        self.heard += 1
+        self.received += 1
 """
 FORGERY = "subscription 'numbers': has changed a message (Int64) after it was received by 'numbers'"
 USED_AGAIN = "timer 'tock': has changed a message (String) after it was published by 'texts'"
@@ -65,7 +65,7 @@ def test_callbacks_that_change_a_message_are_named(tmp_path: Path) -> None:
         system.wait_for_log(FORGERY)
         system.wait_for_log(USED_AGAIN)
         reader = system.behavior("reader")
-        wait_until(lambda: reader.heard > 10)
+        wait_until(lambda: reader.received > 10)
         errors = {entry.node: entry.errors for entry in system.stop().nodes}
     assert errors["/forger"]
     assert errors["/source"]
@@ -77,7 +77,7 @@ def test_callbacks_that_change_a_message_are_named(tmp_path: Path) -> None:
 def test_without_the_option_there_is_no_check(tmp_path: Path) -> None:
     with running(TEXT, tmp_path, changing=MODULE) as system:
         reader = system.behavior("reader")
-        wait_until(lambda: reader.heard > 10)
+        wait_until(lambda: reader.received > 10)
         assert not any(entry.errors for entry in system.stop().nodes)
     assert "has changed" not in system.log_text()
 

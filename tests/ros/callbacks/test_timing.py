@@ -86,8 +86,8 @@ def test_every_kind_of_callback_is_timed_and_checked_against_its_budget(tmp_path
     assert times.percentile_s(0.5) < 0.36  # right within a tenth; the machine may stall once
     assert client["timer"].lateness.count == client["timer"].times.count
     outcome = system.stop()
-    told = {(item.node, item.kind): item for item in outcome.callbacks}
-    assert told["/server", "service"].count == server["service"].times.count
+    reported = {(item.node, item.kind): item for item in outcome.callbacks}
+    assert reported["/server", "service"].count == server["service"].times.count
 
 
 def test_without_tracing_only_callbacks_with_a_budget_are_timed(tmp_path: Path) -> None:

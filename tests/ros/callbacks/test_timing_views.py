@@ -103,29 +103,29 @@ def verify(callbacks: list[dict[str, Any]]) -> bool:
 
 def test_compose_top_and_compose_ps(system: RunningSystem) -> None:
     wait_until(lambda: verify(compose("top", "--once", "--json")["callbacks"]), "calls")
-    (told,) = compose("ps", "--json")["systems"]
+    (status,) = compose("ps", "--json")["systems"]
     assert verify(
-        [item | {"node": node["node"]} for node in told["nodes"] for item in node["callbacks"]]
+        [item | {"node": node["node"]} for node in status["nodes"] for item in node["callbacks"]]
     )
-    (chain,) = told["chains"]
+    (chain,) = status["chains"]
     assert (chain["chain"], chain["late"]) == ("through", 0)
     assert 0.0 < chain["mean_ms"] <= chain["longest_ms"] < 10_000.0
 
 
 def test_diagnostics(system: RunningSystem, peer: Peer) -> None:
-    heard = peer.listen(DiagnosticArray, "/diagnostics")
+    received = peer.listen(DiagnosticArray, "/diagnostics")
 
-    def told() -> dict[str, DiagnosticStatus]:
-        return {status.name: status for status in heard[-1].status} if heard else {}
+    def statuses() -> dict[str, DiagnosticStatus]:
+        return {status.name: status for status in received[-1].status} if received else {}
 
     def values(name: str) -> dict[str, str]:
-        return {item.key: item.value for item in told()[name].values}
+        return {item.key: item.value for item in statuses()[name].values}
 
     def callbacks() -> list[dict[str, str]]:
-        return [values(name) for name in told() if "'" in name]
+        return [values(name) for name in statuses() if "'" in name]
 
     wait_until(lambda: callbacks() and verify(callbacks()), "calls")
-    work = told()["timed: /worker timer 'work'"]
+    work = statuses()["timed: /worker timer 'work'"]
     assert work.level == DiagnosticStatus.WARN
     assert work.message.endswith("over budget, 0 dropped")
     # Of the last second, in which the process may have been preempted.

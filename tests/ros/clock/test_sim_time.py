@@ -62,20 +62,20 @@ def test_timers_start_pause_and_jump_with_the_clock(tmp_path: Path, peer: Peer, 
         let_real_time_pass(system)
         assert system.node("a").now_s() == 0.0
         simulator = Simulator(peer, system)
-        simulator.tell(1000.0)  # the first time: the first period begins
+        simulator.set_time(1000.0)  # the first time: the first period begins
         let_real_time_pass(system)
         assert ticks(system) == []
-        simulator.tell(1000.05, 1000.1)
+        simulator.set_time(1000.05, 1000.1)
         wait_for_ticks(system, 1000.1)
         let_real_time_pass(system)  # a pause
-        simulator.tell(1100.1)  # far ahead
+        simulator.set_time(1100.1)  # far ahead
         wait_for_ticks(system, 1000.1, 1100.1)
         let_real_time_pass(system)
-        simulator.tell(1100.15, 1100.2)
+        simulator.set_time(1100.15, 1100.2)
         wait_for_ticks(system, 1000.1, 1100.1, 1100.2)
-        simulator.tell(7.0, 7.05)  # back
+        simulator.set_time(7.0, 7.05)  # back
         let_real_time_pass(system)
-        simulator.tell(7.1)
+        simulator.set_time(7.1)
         wait_for_ticks(system, 1000.1, 1100.1, 1100.2, 7.1)
         let_real_time_pass(system)
         assert len(ticks(system)) == 4
@@ -128,23 +128,23 @@ nodes:
 def test_a_coroutine_sleeps_in_simulated_time(tmp_path: Path, peer: Peer, kind: str) -> None:
     with running(SLEEPING.format(kind=kind), tmp_path, sleeper=SLEEPER) as system:
         simulator = Simulator(peer, system)
-        simulator.tell(50.0)
+        simulator.set_time(50.0)
         go = peer.publisher(String, "/go")
         go.publish(String())
         system.wait_for_log("asleep 50.0")
         let_real_time_pass(system)
-        simulator.tell(54.9)
+        simulator.set_time(54.9)
         let_real_time_pass(system)
         assert "awake" not in system.log_text()
-        simulator.tell(55.0)
+        simulator.set_time(55.0)
         system.wait_for_log("awake 55.0")
         go.publish(String())
         system.wait_for_log("asleep 55.0")
         let_real_time_pass(system)  # until it sleeps
-        simulator.tell(10.0, 14.0)  # it does not sleep until 60
+        simulator.set_time(10.0, 14.0)  # it does not sleep until 60
         let_real_time_pass(system)
         assert system.log_text().count("awake") == 1
-        simulator.tell(15.0)
+        simulator.set_time(15.0)
         system.wait_for_log("awake 15.0")
 
 
@@ -155,10 +155,10 @@ def test_deactivation_ends_a_sleep(tmp_path: Path, peer: Peer, kind: str) -> Non
         system.wait_for_log("asleep 0.0")
         let_real_time_pass(system)
         simulator = Simulator(peer, system)
-        simulator.tell(50.0)
+        simulator.set_time(50.0)
         assert peer.change("/a", "deactivate")
         system.wait_for_log("woken")
-        simulator.tell(60.0)
+        simulator.set_time(60.0)
         assert peer.change("/a", "activate")
         let_real_time_pass(system)
         assert "awake" not in system.log_text()
@@ -169,22 +169,22 @@ def test_deactivation_ends_a_sleep(tmp_path: Path, peer: Peer, kind: str) -> Non
 def test_the_parameter_switches_a_running_node(tmp_path: Path, peer: Peer, kind: str) -> None:
     with running(SYSTEM.format(kind=kind), tmp_path) as system:
         simulator = Simulator(peer, system)
-        simulator.tell(20.0)
+        simulator.set_time(20.0)
         assert peer.set_parameter("/a", "use_sim_time", False) == ""
         wait_until(lambda: len(ticks(system)) >= 3, "calls in real time")
         assert min(ticks(system)) > 1e9
         assert peer.set_parameter("/a", "use_sim_time", True) == ""
         wait_for_timer(system)
-        simulator.tell(30.0)  # it was 20 for the other nodes
+        simulator.set_time(30.0)  # it was 20 for the other nodes
         wait_until(lambda: ticks(system)[-1] == 30.0)
         wait_for_timer(system)
         before = len(ticks(system))
         let_real_time_pass(system)
-        simulator.tell(30.1)
+        simulator.set_time(30.1)
         wait_until(lambda: ticks(system)[before:] == [30.1])
         wait_for_timer(system)
         assert "bool" in peer.set_parameter("/a", "use_sim_time", "yes").lower()
-        simulator.tell(30.2)
+        simulator.set_time(30.2)
         wait_until(lambda: ticks(system)[before:] == [30.1, 30.2])
 
 
@@ -220,7 +220,7 @@ def test_one_subscription_serves_all_nodes_and_is_destroyed_with_the_last(
         wait_until(lambda: [end.node_name for end in listeners(peer)] == ["manager"])
         simulator = Simulator(peer, system)
         for number in range(4):
-            simulator.tell(100.0 + number, node=f"for_{number}")
+            simulator.set_time(100.0 + number, node=f"for_{number}")
         assert system.node("real").now_s() > 1e9
         for number in range(4):
             assert listeners(peer) != []
@@ -229,7 +229,7 @@ def test_one_subscription_serves_all_nodes_and_is_destroyed_with_the_last(
         assert peer.set_parameter("/real", "use_sim_time", True) == ""
         simulator = Simulator(peer, system)
         assert system.node("real").now_s() == 0.0  # the old time is outdated
-        simulator.tell(200.0, node="real")
+        simulator.set_time(200.0, node="real")
 
 
 STAMPED = """
@@ -246,7 +246,7 @@ nodes:
 """
 
 
-#: From the first time that is told; today is far behind.
+#: From the first published time on; the real time is far from it.
 SIMULATED_NS = range(1000 * NANOSECONDS, 10**9 * NANOSECONDS)
 
 
@@ -259,20 +259,20 @@ def test_stamps_are_simulated_and_the_manager_has_the_parameter_of_nodes_without
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(STAMPED, tmp_path) as system:
-        heard = peer.listen(Header, "/output")
+        received = peer.listen(Header, "/output")
         logged = peer.listen(Log, "/rosout")
-        told = peer.listen(DiagnosticArray, "/diagnostics")
+        arrays = peer.listen(DiagnosticArray, "/diagnostics")
         simulator = Simulator(peer, system)
         tenths = itertools.count(10_000)
 
         def is_published_by_all() -> object:
             """Wait a tenth of a second: messages before discovery are lost."""
-            simulator.tell(next(tenths) / 10)
-            stamps_ns = [stamp_ns(array.header) for array in told]
-            return heard and logged and any(stamp in SIMULATED_NS for stamp in stamps_ns)
+            simulator.set_time(next(tenths) / 10)
+            stamps_ns = [stamp_ns(array.header) for array in arrays]
+            return received and logged and any(stamp in SIMULATED_NS for stamp in stamps_ns)
 
         wait_until(is_published_by_all)
-        for message in (*heard, *logged):
+        for message in (*received, *logged):
             assert stamp_ns(message) in SIMULATED_NS
             assert stamp_ns(message) % (NANOSECONDS // 10) == 0
         names = ["/a.use_sim_time", "/wall.use_sim_time"]
@@ -287,7 +287,7 @@ def test_stamps_are_simulated_and_the_manager_has_the_parameter_of_nodes_without
             SetParameters.Request(parameters=[off]),
         )
         assert answer.results[0].successful
-        wait_until(lambda: heard[-1].stamp.sec > 10**9, "a stamp of today")
+        wait_until(lambda: received[-1].stamp.sec > 10**9, "a stamp of today")
 
 
 def test_a_parameter_file_sets_it_for_all_nodes(tmp_path: Path, peer: Peer) -> None:
@@ -295,8 +295,8 @@ def test_a_parameter_file_sets_it_for_all_nodes(tmp_path: Path, peer: Peer) -> N
     text = "system: files\nparameter_files: [simulation.yaml]\nnodes: {a: {}, b: {}}\n"
     with running(text, tmp_path) as system:
         simulator = Simulator(peer, system)
-        simulator.tell(5.0, node="a")
-        simulator.tell(6.0, node="b")
+        simulator.set_time(5.0, node="a")
+        simulator.set_time(6.0, node="b")
 
 
 WATCHED = """
@@ -316,11 +316,11 @@ def test_silence_counts_while_the_simulation_runs(tmp_path: Path, peer: Peer) ->
     with running(WATCHED, tmp_path) as system:
         simulator = Simulator(peer, system)
         let_real_time_pass(system)  # no time yet
-        simulator.tell(10.0, 10.02)
+        simulator.set_time(10.0, 10.02)
         let_real_time_pass(system)  # a pause
-        simulator.tell(99.0)  # a jump
+        simulator.set_time(99.0)  # a jump
         let_real_time_pass(system)
-        simulator.tell(5.0)
+        simulator.set_time(5.0)
         let_real_time_pass(system)
         assert system.states("/a") == ["/a inactive", "/a active"]
         assert peer.set_parameter("/a", "period_ms", 1e6) == ""
@@ -355,6 +355,6 @@ def test_a_node_that_blocks_its_loop_does_not_block_the_time_of_others(
         let_go = system.behavior("b").on_hold.__globals__["LET_GO"]
         assert isinstance(let_go, threading.Event)
         try:
-            Simulator(peer, system).tell(1.0, 2.0)
+            Simulator(peer, system).set_time(1.0, 2.0)
         finally:
             let_go.set()

@@ -48,10 +48,10 @@ class Source(Behavior):
 
 class Sink(Behavior):
     def on_configure(self):
-        self.heard = []
+        self.received = []
 
     def on_input(self, message):
-        self.heard.append(message)
+        self.received.append(message)
 """
 
 
@@ -83,17 +83,17 @@ def test_every_combination_of_qos_delivers_the_same_in_process_and_by_dds(
         source.loop.run(lambda: source._behavior.send(TABLE, SENT))
         for name, (_, _, wanted) in TABLE.items():
             sink = system.behavior(name)
-            wait_until(lambda sink=sink, wanted=wanted: len(sink.heard) >= len(wanted), name)
+            wait_until(lambda sink=sink, wanted=wanted: len(sink.received) >= len(wanted), name)
         # Sent last, by the same path: late or duplicate messages would have arrived before.
         source.loop.run(lambda: source._behavior.send(["deep"], 1))
         deep = system.behavior("deep")
-        wait_until(lambda: len(deep.heard) == SENT + 1)
-        heard = {name: [item.data for item in system.behavior(name).heard] for name in TABLE}
-        assert heard == {
+        wait_until(lambda: len(deep.received) == SENT + 1)
+        received = {name: [item.data for item in system.behavior(name).received] for name in TABLE}
+        assert received == {
             name: [*wanted, 0] if name == "deep" else list(wanted)
             for name, (_, _, wanted) in TABLE.items()
         }
-        same = any(message is source._behavior.sent[0] for message in deep.heard)
+        same = any(message is source._behavior.sent[0] for message in deep.received)
         assert same is (delivery == "auto")
 
 
@@ -130,14 +130,14 @@ def test_a_connection_may_require_copies_or_dds(tmp_path: Path) -> None:
                 message.data = 2
 
         source.loop.run(publish_and_change)
-        wait_until(lambda: all(sink.heard for sink in sinks.values()))
-        heard = {name: [item.data for item in sink.heard] for name, sink in sinks.items()}
+        wait_until(lambda: all(sink.received for sink in sinks.values()))
+        received = {name: [item.data for item in sink.received] for name, sink in sinks.items()}
     said = [line for line in system.log() if "uses DDS only" in line]
     assert said == [
         f"{end} uses DDS only: 'delivery: dds' is set"
         for end in ("publisher 'by_dds'", "subscription 'input'")
     ]
-    assert heard == {"shared": [2], "copied": [1], "by_dds": [1]}
+    assert received == {"shared": [2], "copied": [1], "by_dds": [1]}
 
 
 OF_THEIR_OWN = """
@@ -171,10 +171,10 @@ class Source(Behavior):
 
 class Changer(Behavior):
     def on_configure(self):
-        self.heard = []
+        self.received = []
 
     def on_input(self, message):
-        self.heard.append(message.data)
+        self.received.append(message.data)
         message.data = 9
 """
 
@@ -185,8 +185,8 @@ def test_each_receiver_has_its_own_copy_even_of_latched_messages(tmp_path: Path)
         source.loop.run(source._behavior.send)
         system.change("late", "configure", "activate")
         names = ("first", "second", "late")
-        wait_until(lambda: all(system.behavior(name).heard for name in names))
-        assert [system.behavior(name).heard for name in names] == [[1], [1], [1]]
+        wait_until(lambda: all(system.behavior(name).received for name in names))
+        assert [system.behavior(name).received for name in names] == [[1], [1], [1]]
 
 
 OVERRIDDEN = """
@@ -211,8 +211,9 @@ def test_a_connection_overrides_the_system(tmp_path: Path, whole: str, one: str)
         source = system.node("source")
         source.loop.run(lambda: source._behavior.send(["one", "two"], 1))
         sinks = [system.behavior(name) for name in ("one", "two")]
-        wait_until(lambda: all(sink.heard for sink in sinks))
+        wait_until(lambda: all(sink.received for sink in sinks))
         same = [
-            sink.heard[0] is sent for sink, sent in zip(sinks, source._behavior.sent, strict=True)
+            sink.received[0] is sent
+            for sink, sent in zip(sinks, source._behavior.sent, strict=True)
         ]
         assert same == [one == "auto", whole == "auto"]

@@ -158,7 +158,7 @@ def test_every_message_arrives_once_with_any_middleware(
         said = [line for line in system.lines if f"[{reader}] [" in line]
         assert [json.loads(line.partition(f"[{reader}] ")[2]) for line in said] == [everything]
     assert outside.wrong == []
-    warned = [line for line in system.lines if "topics within the process go by DDS" in line]
+    warned = [line for line in system.lines if "topics within the process use DDS" in line]
     by_dds = [line for line in system.lines if "uses DDS only" in line]
     if middleware is None:
         assert (warned, by_dds) == ([], [])

@@ -156,8 +156,8 @@ def test_concurrent_calls_end_each_at_its_own_timeout(tmp_path: Path) -> None:
     ) as system:
         client = system.node("client")
         client._context.spawn(client._behavior.ask_at_once((90.0, 30.0, 60.0)))
-        told = outcomes(system, 3)
-        assert told == [
+        results = outcomes(system, 3)
+        assert results == [
             ("CallTimeout", limit, f"service '/ask' did not answer within {limit:g} ms")
             for limit in (90.0, 30.0, 60.0)
         ]

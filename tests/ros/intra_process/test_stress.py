@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.ros.support.delivery_outsiders import STREAM, TOPICS, Missing, Outsider
+from tests.ros.support.external_processes import STREAM, TOPICS, ExternalProcess, Missing
 from tests.ros.support.in_process import RunningSystem, running, wait_until
 from tests.ros.support.sequences import Sequences
 
@@ -98,7 +98,7 @@ class Writer(Behavior):
 
     def on_activate(self):
         self.next = {}
-        self.outlets = [self.publishers[name] for name in dir(self.publishers)]
+        self.senders = [self.publishers[name] for name in dir(self.publishers)]
         self.ended = False
         self.own = next(WRITERS)
         self.threads = [threading.Thread(target=self.run, args=(next(WRITERS),)) for _ in range(2)]
@@ -108,7 +108,7 @@ class Writer(Behavior):
     def send(self, writer):
         sequence = self.next.get(writer, 0)
         self.next[writer] = sequence + 1
-        for publisher in self.outlets if sequence % 2 else reversed(self.outlets):
+        for publisher in self.senders if sequence % 2 else reversed(self.senders):
             publisher.publish(Int64(data=number(writer, sequence)))
 
     def run(self, writer):
@@ -165,11 +165,11 @@ class Stress:
         for turn in range(rounds):
             profile = PROFILES[turn % len(PROFILES)]
             killed = (turn + turn // len(PROFILES)) % 2 == 1
-            heard = self._visit(profile, FIRST_TALKER + turn, killed=killed)
+            received = self._visit(profile, FIRST_TALKER + turn, killed=killed)
             if profile == OWED:
-                self.owed.add_all(heard)
+                self.owed.add_all(received)
             else:
-                self.missing.add_of_both(heard)
+                self.missing.add_of_both(received)
             if not killed:
                 wait_until(self._is_alone, "no external node")
 
@@ -190,17 +190,17 @@ class Stress:
         self, profile: tuple[str, int], talker: int, *, killed: bool
     ) -> dict[str, list[int]]:
         with (
-            Outsider("listen", profile, 0, self._folder) as listening,
-            Outsider("talk", profile, talker, self._folder) as talking,
+            ExternalProcess("listen", profile, 0, self._folder) as listening,
+            ExternalProcess("talk", profile, talker, self._folder) as talking,
         ):
             wait_until(lambda: all(talker in seen.last for seen in self._seen(profile)), "a talker")
-            wait_until(lambda: listening.has_heard(1), "a listener")
+            wait_until(lambda: listening.has_received(1), "a listener")
             for _ in range(MOVES):
                 self._move_the_guest()
-            wait_until(lambda: listening.has_heard(ENOUGH), "a listener")
-            codes = [outsider.go(killed=killed) for outsider in (talking, listening)]
+            wait_until(lambda: listening.has_received(ENOUGH), "a listener")
+            codes = [process.go(killed=killed) for process in (talking, listening)]
             assert codes == ([-9, -9] if killed else [0, 0])
-        return listening.heard
+        return listening.received
 
     def _seen(self, profile: tuple[str, int]) -> Iterator[Sequences]:
         """Yield what the in-process readers that match an external node have received."""

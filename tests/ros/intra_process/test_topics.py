@@ -27,7 +27,7 @@ NUMBERING_LISTENER = Path(__file__).parents[1] / "programs" / "numbering_listene
 
 
 @pytest.fixture
-def outsider() -> Iterator[Callable[[], Peer]]:
+def join_externally() -> Iterator[Callable[[], Peer]]:
     """Joins when it is called: in-process delivery must work without external nodes."""
     peers: list[Peer] = []
 
@@ -60,44 +60,46 @@ def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -
 
 @pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
 def test_local_messages_are_shared_and_external_nodes_receive_them_too(
-    tmp_path: Path, outsider: Callable[[], Peer], kind: str
+    tmp_path: Path, join_externally: Callable[[], Peer], kind: str
 ) -> None:
     with running(NUMBERS.replace("KIND", kind), tmp_path, counting=MODULE) as system:
         near, far, source = (system.behavior(name) for name in ("near", "far", "source"))
         send(system, 50)
-        wait_until(lambda: len(near.heard) == len(far.heard) == 50)
+        wait_until(lambda: len(near.received) == len(far.received) == 50)
         # By reference: not through DDS.
         for listener in (near, far):
-            assert all(a is b for a, b in zip(listener.heard, source.sent, strict=True))
+            assert all(a is b for a, b in zip(listener.received, source.sent, strict=True))
 
-        peer = outsider()
+        peer = join_externally()
         outside = peer.listen(Int64, "/numbers", 100)
         wait_for_matches(system, lambda count: count == 3)
         send(system, 50)
         wait_until(lambda: len(outside) == 50)
-        wait_until(lambda: len(near.heard) == len(far.heard) == 100)
+        wait_until(lambda: len(near.received) == len(far.received) == 100)
         assert numbers(outside) == list(range(50, 100))
-        assert numbers(near.heard) == numbers(far.heard) == list(range(100))
+        assert numbers(near.received) == numbers(far.received) == list(range(100))
 
         intruder = peer.publisher(Int64, "/numbers", 100)
         wait_until(lambda: intruder.get_subscription_count() == 3)  # including its own
         intruder.publish(Int64(data=-1))
-        wait_until(lambda: len(near.heard) == len(far.heard) == 101)
-        assert near.heard[-1].data == far.heard[-1].data == -1
+        wait_until(lambda: len(near.received) == len(far.received) == 101)
+        assert near.received[-1].data == far.received[-1].data == -1
         # The number of endpoints that ROS tools see.
         assert peer.node.count_publishers("/numbers") == 2
         assert peer.node.count_subscribers("/numbers") == 3
 
 
-@pytest.mark.parametrize(("tells", "level"), [(False, "info"), (True, "info"), (True, "debug")])
+@pytest.mark.parametrize(
+    ("is_supported", "level"), [(False, "info"), (True, "info"), (True, "debug")]
+)
 def test_every_external_subscription_is_noticed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tells: bool, level: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_supported: bool, level: str
 ) -> None:
-    if not tells:  # then matches are counted for each message
+    if not is_supported:  # then matches are counted for each message
         monkeypatch.setattr(match_flag, "EVENT", lambda *_: 1)
     context = Context()
     context.init([])
-    node = Node("outsider", context=context)
+    node = Node("external", context=context)
     apart = NUMBERS.replace("KIND", "events").replace("executors:", "namespace: /apart\nexecutors:")
     options = HostOptions(log_level=LogLevel(level))
     with running(apart, tmp_path, options=options, counting=MODULE) as system:
@@ -115,7 +117,7 @@ def test_every_external_subscription_is_noticed(
             # Otherwise its end would hide the next one.
             wait_until(lambda: source._context.node.count_subscribers("/apart/numbers") == 2)
         near = system.behavior("near")
-        wait_until(lambda: numbers(near.heard) == list(range(100)))
+        wait_until(lambda: numbers(near.received) == list(range(100)))
     node.destroy_node()
     context.try_shutdown()
 
@@ -142,20 +144,20 @@ def test_messages_in_transit_are_dropped_when_the_subscriber_leaves_active(tmp_p
         wait_until(lambda: near.statistics.dropped == 3)
         system.change("near", "activate")
         send(system, 2)
-        wait_until(lambda: len(near._behavior.heard) == 2)
-        assert numbers(near._behavior.heard) == [3, 4]
+        wait_until(lambda: len(near._behavior.received) == 2)
+        assert numbers(near._behavior.received) == [3, 4]
         # A node that is cleaned up has no subscription, so no message is kept for it.
         system.change("near", "deactivate", "cleanup")
         send(system, 2)
-        wait_until(lambda: len(system.behavior("far").heard) == 7)
+        wait_until(lambda: len(system.behavior("far").received) == 7)
         system.change("near", "configure", "activate")
         send(system, 1)
-        wait_until(lambda: len(near._behavior.heard) == 1)
-        assert numbers(near._behavior.heard) == [7]
+        wait_until(lambda: len(near._behavior.received) == 1)
+        assert numbers(near._behavior.received) == [7]
         assert near.statistics.dropped == 3
         far = system.behavior("far")
-        wait_until(lambda: len(far.heard) == 8)
-        assert numbers(far.heard) == list(range(8))
+        wait_until(lambda: len(far.received) == 8)
+        assert numbers(far.received) == list(range(8))
 
 
 LATCHED = """
@@ -176,7 +178,7 @@ nodes:
 
 
 def test_late_joiners_get_latched_messages_once_in_process_and_by_dds(
-    tmp_path: Path, outsider: Callable[[], Peer]
+    tmp_path: Path, join_externally: Callable[[], Peer]
 ) -> None:
     module = """
     from composer.behavior import Behavior
@@ -192,7 +194,7 @@ def test_late_joiners_get_latched_messages_once_in_process_and_by_dds(
             system.change(node, "configure", "activate")
         system.wait_for_log("late 3")
         profile = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        outside = outsider().listen(Int64, "/mode", profile)
+        outside = join_externally().listen(Int64, "/mode", profile)
         wait_until(lambda: len(outside) == 2)
         assert numbers(outside) == [2, 3]
     assert system.log() == ["late 2", "late 3"]
@@ -213,11 +215,11 @@ def test_dds_is_used_only_while_an_external_subscription_matches(tmp_path: Path)
                     listener.kill()
             first = visit * 25 + 20
             # Fast DDS prints its errors there too.
-            (told,) = [line for line in printed.splitlines() if line.startswith("[[")]
-            assert json.loads(told) == [[first + step, visit * 5 + step + 1] for step in range(5)]
+            (line,) = [line for line in printed.splitlines() if line.startswith("[[")]
+            assert json.loads(line) == [[first + step, visit * 5 + step + 1] for step in range(5)]
             wait_for_matches(system, lambda count: count == 2)
-        wait_until(lambda: len(system.behavior("near").heard) == 50)
-        assert numbers(system.behavior("near").heard) == list(range(50))
+        wait_until(lambda: len(system.behavior("near").received) == 50)
+        assert numbers(system.behavior("near").received) == list(range(50))
 
 
 def test_a_publisher_that_is_not_active_reaches_no_local_subscription(tmp_path: Path) -> None:
@@ -228,8 +230,8 @@ def test_a_publisher_that_is_not_active_reaches_no_local_subscription(tmp_path: 
         system.change("source", "activate")
         send(system, 1)
         near = system.behavior("near")
-        wait_until(lambda: 5 in numbers(near.heard))
-        assert numbers(near.heard) == [0, 1, 5]
+        wait_until(lambda: 5 in numbers(near.received))
+        assert numbers(near.received) == [0, 1, 5]
         assert system.node("source").statistics.sent == 3
 
 
@@ -325,8 +327,8 @@ def test_ports_connect_by_their_remapped_names(tmp_path: Path, peer: Peer) -> No
         wait_for_matches(system, lambda count: count == 2)
         send(system, 3)
         intruder.publish(Int64(data=-1))  # the topic of far, which has no other messages
-        wait_until(lambda: len(near.heard) == len(outside) == 3)
-        wait_until(lambda: far.heard)
-        assert all(a is b for a, b in zip(near.heard, source.sent, strict=True))
+        wait_until(lambda: len(near.received) == len(outside) == 3)
+        wait_until(lambda: far.received)
+        assert all(a is b for a, b in zip(near.received, source.sent, strict=True))
         assert numbers(outside) == [0, 1, 2]
-        assert numbers(far.heard) == [-1]
+        assert numbers(far.received) == [-1]

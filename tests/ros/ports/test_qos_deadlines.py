@@ -32,7 +32,7 @@ def publishers(node: Node, topic: str) -> list[str]:
     return [end.node_name for end in node.get_publishers_info_by_topic(topic)]
 
 
-def told(system: RunningSystem, pattern: str) -> bool:
+def is_logged(system: RunningSystem, pattern: str) -> bool:
     return any(re.fullmatch(pattern, line) for line in system.log())
 
 
@@ -46,7 +46,7 @@ nodes:
     publishers: {{beat: {{type: std_msgs/msg/String, qos: beat}}}}
     timers: {{tick: {{period_ms: "{{parameters.period_ms}}", publish: {{beat: {{data: x}}}}}}}}
   listener:
-    subscriptions: {{beat: {{type: std_msgs/msg/String, qos: beat, log: "heard"}}}}
+    subscriptions: {{beat: {{type: std_msgs/msg/String, qos: beat, log: "got a message"}}}}
 """
 OF_PUBLISHER = "publisher 'beat' on /beat: nothing was published within its deadline of 200 ms"
 OF_SUBSCRIPTION = "subscription 'beat' on /beat: nothing was received within its deadline of 200 ms"
@@ -58,13 +58,13 @@ def test_a_missed_deadline_is_logged_at_once_and_then_summarized(
 ) -> None:
     monkeypatch.setattr(log, "WARNING_PERIOD_S", 1.0)
     with running(TIMED.format(kind=kind, deadline_ms=200), tmp_path) as system:
-        wait_until(lambda: len(lines(system, "heard")) > 10)
+        wait_until(lambda: len(lines(system, "got a message")) > 10)
         assert peer.set_parameter("/talker", "period_ms", 1e6) == ""
         # On a busy machine the talker may have missed one before, which is logged separately.
         more = r" \(\d+ times more within 1 s\)"
         of_talker = "; it is published by /talker"
-        wait_until(lambda: told(system, re.escape(OF_PUBLISHER) + more))
-        wait_until(lambda: told(system, re.escape(OF_SUBSCRIPTION + of_talker) + more))
+        wait_until(lambda: is_logged(system, re.escape(OF_PUBLISHER) + more))
+        wait_until(lambda: is_logged(system, re.escape(OF_SUBSCRIPTION + of_talker) + more))
         assert lines(system, OF_PUBLISHER)[0] == OF_PUBLISHER
         assert lines(system, OF_SUBSCRIPTION)[0] == OF_SUBSCRIPTION + of_talker
         for node in ("talker", "listener"):
@@ -76,8 +76,8 @@ def test_constantly_missed_deadlines_do_not_deadlock(tmp_path: Path, peer: Peer,
     # Taking the status of each froze the process within two seconds.
     with running(TIMED.format(kind=kind, deadline_ms=2), tmp_path) as system:
         wait_until(lambda: counts(system, "listener").get("deadline_missed", 0) > 1000)
-        heard = len(lines(system, "heard"))
-        wait_until(lambda: len(lines(system, "heard")) > heard + 10)
+        received = len(lines(system, "got a message"))
+        wait_until(lambda: len(lines(system, "got a message")) > received + 10)
         system.change("listener", "deactivate", "cleanup", "configure", "activate")
         before = counts(system, "listener")["deadline_missed"]
         wait_until(lambda: counts(system, "listener")["deadline_missed"] > before + 100)
@@ -85,7 +85,7 @@ def test_constantly_missed_deadlines_do_not_deadlock(tmp_path: Path, peer: Peer,
 
 def test_an_inactive_publisher_misses_no_deadline(tmp_path: Path, peer: Peer) -> None:
     with running(TIMED.format(kind="events", deadline_ms=200), tmp_path) as system:
-        wait_until(lambda: len(lines(system, "heard")) > 10)
+        wait_until(lambda: len(lines(system, "got a message")) > 10)
         assert peer.change("/talker", "deactivate")
         before = counts(system, "talker")
         wait_until(lambda: counts(system, "listener").get("deadline_missed", 0) > 3)
@@ -96,7 +96,7 @@ def test_a_kept_deadline_is_not_reported(tmp_path: Path) -> None:
     with running(TIMED.format(kind="events", deadline_ms=60_000), tmp_path) as system:
         over_s = time.monotonic() + 1.0
         wait_until(lambda: time.monotonic() > over_s, "a second of beats")
-        wait_until(lambda: lines(system, "heard"))
+        wait_until(lambda: lines(system, "got a message"))
         assert counts(system, "talker") == counts(system, "listener") == {}
 
 
@@ -107,7 +107,7 @@ qos_profiles:
 nodes:
   listener:
     subscriptions:
-      beat: {type: std_msgs/msg/String, qos: beat, external: true, log: "heard"}
+      beat: {type: std_msgs/msg/String, qos: beat, external: true, log: "got a message"}
 """
 
 
@@ -120,7 +120,7 @@ def test_a_deadline_missed_by_an_external_node_is_logged_with_its_name(
         node = system.node("listener")._context.node
         wait_until(lambda: publishers(node, "/beat") == [peer.node.get_name()], "its name")
         publisher.publish(String())
-        system.wait_for_log("heard")
+        system.wait_for_log("got a message")
         name = peer.node.get_fully_qualified_name()
         assert name in system.wait_for_log(OF_SUBSCRIPTION)
 

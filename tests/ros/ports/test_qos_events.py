@@ -56,8 +56,8 @@ def test_external_nodes_with_incompatible_qos_are_named_with_the_policy(
         peer.node.create_publisher(String, "/input", BEST_EFFORT)
         peer.node.create_subscription(String, "/output", lambda _: None, latched)
         name = peer.node.get_fully_qualified_name()
-        heard = system.wait_for_log("subscription 'input'")
-        assert heard == (
+        received = system.wait_for_log("subscription 'input'")
+        assert received == (
             f"subscription 'input' is incompatible with {name} on /input: reliability is "
             "best_effort there, reliable here; the publisher does not send lost messages again"
         )
@@ -102,14 +102,14 @@ nodes:
             publish: {{latest: {{data: "{{message.data}}"}}}}}}
   listener:
     subscriptions:
-      latest: {{type: std_msgs/msg/String, qos: latest, log: "heard {{message.data}}"}}
+      latest: {{type: std_msgs/msg/String, qos: latest, log: "received {{message.data}}"}}
 """
 
 
 @pytest.mark.parametrize("away", [("deactivate", "cleanup"), ("deactivate",)])
-@pytest.mark.parametrize(("lifespan_ms", "heard"), [(300, ["heard new"]), (60_000, None)])
+@pytest.mark.parametrize(("lifespan_ms", "received"), [(300, ["received new"]), (60_000, None)])
 def test_a_lifespan_applies_within_the_process(
-    tmp_path: Path, peer: Peer, lifespan_ms: int, heard: list[str] | None, away: tuple[str, ...]
+    tmp_path: Path, peer: Peer, lifespan_ms: int, received: list[str] | None, away: tuple[str, ...]
 ) -> None:
     with running(LATCHED.format(lifespan_ms=lifespan_ms), tmp_path) as system:
         say = peer.publisher(String, "/say")
@@ -120,23 +120,25 @@ def test_a_lifespan_applies_within_the_process(
         wait_until(lambda: time.monotonic() > over_s, "the end of the lifespan")
         back = ("configure", "activate") if "cleanup" in away else ("activate",)
         system.change("listener", *back)
-        wait_until(lambda: heard is not None or lines(system, "heard old"))
+        wait_until(lambda: received is not None or lines(system, "received old"))
 
-        def new_is_heard() -> bool:
+        def is_new_received() -> bool:
             """Publish until it arrives: on a busy machine the lifespan may end in transit."""
             say.publish(String(data="new"))
-            return "heard new" in system.log()
+            return "received new" in system.log()
 
-        wait_until(new_is_heard)
-        assert [*dict.fromkeys(lines(system, "heard"))] == (heard or ["heard old", "heard new"])
+        wait_until(is_new_received)
+        assert [*dict.fromkeys(lines(system, "received"))] == (
+            received or ["received old", "received new"]
+        )
 
 
 def test_ps_shows_the_counts(tmp_path: Path, peer: Peer) -> None:
     with running(ENDS.format(kind="events"), tmp_path) as system:
-        told = peer.listen(DiagnosticArray, "/diagnostics")
+        arrays = peer.listen(DiagnosticArray, "/diagnostics")
         peer.node.create_publisher(String, "/input", BEST_EFFORT)
         system.wait_for_log("subscription 'input'")
-        wait_until(lambda: "incompatible=1" in qos_events_of(told))
+        wait_until(lambda: "incompatible=1" in qos_events_of(arrays))
         listed = subprocess.run(
             [*COMPOSE, "ps", "ends", "--json", "--timeout", "20"],
             check=True,
@@ -148,10 +150,10 @@ def test_ps_shows_the_counts(tmp_path: Path, peer: Peer) -> None:
     assert [node["qos_events"] for node in nodes] == [{"incompatible": 1}]
 
 
-def qos_events_of(told: list[DiagnosticArray]) -> list[str]:
+def qos_events_of(arrays: list[DiagnosticArray]) -> list[str]:
     return [
         value.value
-        for message in tuple(told)
+        for message in tuple(arrays)
         for status in message.status
         for value in status.values
         if value.key == "qos_events"

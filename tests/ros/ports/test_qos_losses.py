@@ -62,8 +62,8 @@ def test_messages_that_are_lost_are_counted_one_by_one(tmp_path: Path) -> None:
             return any(len(found) > 2 for found in losses.values())
 
         wait_until(three_floods_add_up)
-        told = system.wait_for_log("lost")
-        assert told.startswith("subscription 'big' on /big: a message was lost in transit; it is ")
+        line = system.wait_for_log("lost")
+        assert line.startswith("subscription 'big' on /big: a message was lost in transit; it is ")
 
 
 SILENCE = """
@@ -72,7 +72,7 @@ qos_profiles: {alive: {extends: command, liveliness_lease_duration_ms: 500}}
 nodes:
   listener:
     subscriptions:
-      alive: {type: std_msgs/msg/String, qos: alive, external: true, log: "heard"}
+      alive: {type: std_msgs/msg/String, qos: alive, external: true, log: "got a message"}
 """
 
 
@@ -83,7 +83,7 @@ def test_a_silent_publisher_is_logged_and_one_that_leaves_is_not(
         qos = QoSProfile(depth=10, liveliness_lease_duration=Duration(nanoseconds=500_000_000))
         leaving = peer.publisher(String, "/alive", qos)
         with hand_written("hand_written_flood.py", "500", "0") as flood:
-            system.wait_for_log("heard")
+            system.wait_for_log("got a message")
             node = system.node("listener")._context.node
             wait_until(lambda: "flood" in node.get_node_names(), "its name")
             peer.node.destroy_publisher(leaving)
@@ -141,14 +141,14 @@ def test_constantly_taken_statuses_do_not_deadlock(peer: Peer) -> None:
     subscription = peer.node.create_subscription(String, "/late", lambda _: None, qos)
     publisher = peer.publisher(String, "/late", qos)
     publisher.publish(String())
-    told: list[int] = []
+    counts_seen: list[int] = []
     kind = QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED
     end = EventCounts(loop).watch_status(
-        subscription.handle, kind, lambda status: told.append(status.total_count)
+        subscription.handle, kind, lambda status: counts_seen.append(status.total_count)
     )
     try:
-        wait_until(lambda: told and told[-1] > told[0] + 3000)
-        assert told == sorted(set(told))
+        wait_until(lambda: counts_seen and counts_seen[-1] > counts_seen[0] + 3000)
+        assert counts_seen == sorted(set(counts_seen))
     finally:
         end()
         assert loop.stop(PATIENCE_S)

@@ -29,17 +29,17 @@ def test_a_timer_follows_its_parameter_and_stops_while_the_node_is_not_active(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(TIMED, tmp_path) as system:
-        heard = peer.listen(Int64, "/output", 1000)
+        received = peer.listen(Int64, "/output", 1000)
         assert peer.set_parameter("/timed", "rate_hz", 100.0) == ""
-        wait_until(lambda: len(heard) >= 10)
+        wait_until(lambda: len(received) >= 10)
         assert peer.change("/timed", "deactivate")
         statistics = system.node("timed").statistics
         sent = statistics.sent
         assert peer.set_parameter("/timed", "rate_hz", 500.0) == ""
         assert peer.change("/timed", "activate")
         wait_until(lambda: statistics.sent >= sent + 10)
-    assert [message.data for message in heard[:10]] == list(
-        range(heard[0].data, heard[0].data + 10)
+    assert [message.data for message in received[:10]] == list(
+        range(received[0].data, received[0].data + 10)
     )
 
 

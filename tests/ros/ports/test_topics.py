@@ -27,17 +27,17 @@ nodes:
 
 def test_a_reaction_publishes_and_logs_what_it_computes(tmp_path: Path, peer: Peer) -> None:
     with running(RELAY, tmp_path) as system:
-        heard = peer.listen(Int64, "/output")
+        received = peer.listen(Int64, "/output")
         system.wait_for_listener("relay", "output")
         peer.publisher(Int64, "/input").publish(Int64(data=41))
-        wait_until(lambda: heard)
-    assert heard[0].data == 42
+        wait_until(lambda: received)
+    assert received[0].data == 42
     assert system.log() == ["got 41, the 0th"]
 
 
 def test_nothing_passes_a_node_that_is_not_active(tmp_path: Path, peer: Peer) -> None:
     with running(RELAY, tmp_path) as system:
-        heard = peer.listen(Int64, "/output")
+        received = peer.listen(Int64, "/output")
         system.wait_for_listener("relay", "output")
         source = peer.publisher(Int64, "/input")
         assert peer.change("/relay", "deactivate")
@@ -46,9 +46,9 @@ def test_nothing_passes_a_node_that_is_not_active(tmp_path: Path, peer: Peer) ->
         wait_until(lambda: system.node("relay").statistics.dropped == 5)
         assert peer.change("/relay", "activate")
         source.publish(Int64(data=6))
-        wait_until(lambda: heard)
+        wait_until(lambda: received)
         counted = system.summary("/relay")
-    assert [message.data for message in heard] == [7]
+    assert [message.data for message in received] == [7]
     assert (counted.received, counted.sent, counted.dropped) == (1, 1, 5)
 
 
@@ -101,14 +101,14 @@ def test_a_node_publishes_in_transitions_but_not_while_inactive(tmp_path: Path, 
     """
     with running(TALKATIVE, tmp_path, talkative=module) as system:
         assert peer.change("/talkative", "deactivate")
-        heard = peer.listen(String, "/output")
+        received = peer.listen(String, "/output")
         system.wait_for_listener("talkative", "output")
         assert peer.change("/talkative", "activate")
         assert peer.change("/talkative", "deactivate")
         assert peer.change("/talkative", "cleanup")
-        wait_until(lambda: len(heard) == 4)
+        wait_until(lambda: len(received) == 4)
         counted = system.summary("/talkative")
-    texts = [message.data for message in heard]
+    texts = [message.data for message in received]
     assert texts == ["activate", "activate", "deactivate", "deactivate"]
     assert counted.dropped == 4
     warnings = [line for line in system.log() if "drops its messages" in line]

@@ -2,8 +2,8 @@
 
 usage: delivery_peer.py listen|talk RELIABILITY DEPTH WRITER TOPIC...
 
-``listen`` says every now and then what it has heard since, as JSON, by topic. ``talk`` publishes at
-500 Hz as writer WRITER, each message on every topic. Both go in order when standard input closes.
+``listen`` prints periodically what it has received since, as JSON, by topic. ``talk`` publishes at
+500 Hz as writer WRITER, each message on every topic. Both shut down when standard input closes.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ TELL_EVERY_S = 0.1
 
 
 def listen(node: Node, topics: list[str], profile: QoSProfile, ended: threading.Event) -> None:
-    heard: dict[str, list[int]] = {topic: [] for topic in topics}
-    for topic, numbers in heard.items():
+    received: dict[str, list[int]] = {topic: [] for topic in topics}
+    for topic, numbers in received.items():
         node.create_subscription(
             Int64, topic, lambda message, numbers=numbers: numbers.append(message.data), profile
         )
@@ -35,8 +35,8 @@ def listen(node: Node, topics: list[str], profile: QoSProfile, ended: threading.
         told_s = time.monotonic()
         while time.monotonic() < told_s + TELL_EVERY_S:
             rclpy.spin_once(node, timeout_sec=TELL_EVERY_S)
-        print(json.dumps(heard), flush=True)
-        for numbers in heard.values():
+        print(json.dumps(received), flush=True)
+        for numbers in received.values():
             numbers.clear()
 
 

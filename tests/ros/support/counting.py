@@ -41,10 +41,10 @@ class Source(Behavior):
 
 class Listener(Behavior):
     def on_configure(self):
-        self.heard = []
+        self.received = []
 
     def on_numbers(self, message):
-        self.heard.append(message)
+        self.received.append(message)
 """
 
 

@@ -28,7 +28,7 @@ class Simulator:
         self._system = system
         self._publisher = peer.publisher(Clock, "/clock")
 
-    def tell(self, *times_s: float, node: str = "a") -> None:
+    def set_time(self, *times_s: float, node: str = "a") -> None:
         """Publish each time until it is received, since a message may be lost."""
         for time_s in times_s:
             self._publisher.publish(message_of(time_s))

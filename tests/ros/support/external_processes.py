@@ -26,7 +26,7 @@ SOON_MISSED = """<builtin>
           </discovery_config>"""
 
 
-class Outsider:
+class ExternalProcess:
     """Another process that listens or talks; its output is read continuously.
 
     ``profile`` is reliability and depth; ``writer`` is who it talks as.
@@ -34,7 +34,7 @@ class Outsider:
 
     def __init__(self, what: str, profile: tuple[str, int], writer: int, folder: Path) -> None:
         profile_of_tests = Path(os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"])
-        profiles = folder / "outsider.xml"
+        profiles = folder / "external.xml"
         text = profile_of_tests.read_text(encoding="utf-8").replace("<builtin>", SOON_MISSED)
         profiles.write_text(text, encoding="utf-8")
         self._process = subprocess.Popen(
@@ -48,11 +48,11 @@ class Outsider:
                 "FASTRTPS_DEFAULT_PROFILES_FILE": str(profiles),
             },
         )
-        self.heard: dict[str, list[int]] = {topic: [] for topic in TOPICS}
+        self.received: dict[str, list[int]] = {topic: [] for topic in TOPICS}
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def __enter__(self) -> Outsider:
+    def __enter__(self) -> ExternalProcess:
         return self
 
     def __exit__(
@@ -63,9 +63,9 @@ class Outsider:
     ) -> None:
         self.go(killed=True)
 
-    def has_heard(self, count: int) -> bool:
+    def has_received(self, count: int) -> bool:
         """Return whether ``number`` messages of each topic have arrived."""
-        return all(len(numbers) >= count for numbers in self.heard.values())
+        return all(len(numbers) >= count for numbers in self.received.values())
 
     def go(self, *, killed: bool) -> int:
         """Stop it, by SIGKILL or cleanly; return its exit code."""
@@ -84,7 +84,7 @@ class Outsider:
             # Fast DDS prints errors to standard output, and a killed process stops mid-line.
             if line.startswith("{") and line.endswith("}\n"):
                 for topic, numbers in json.loads(line).items():
-                    self.heard[topic] += numbers
+                    self.received[topic] += numbers
 
 
 class Missing:
@@ -94,23 +94,23 @@ class Missing:
         self.stream = 0
         self.control = 0
 
-    def add_all(self, heard: Mapping[str, Sequence[int]]) -> None:
+    def add_all(self, received: Mapping[str, Sequence[int]]) -> None:
         """Count missing messages between the first and the last one of each topic."""
-        stream, control = (sequences_of(heard[topic]) for topic in TOPICS)
+        stream, control = (sequences_of(received[topic]) for topic in TOPICS)
         self.add_counted(stream.missing, control.missing)
 
-    def add_of_both(self, heard: Mapping[str, Sequence[int]]) -> None:
+    def add_of_both(self, received: Mapping[str, Sequence[int]]) -> None:
         """Count missing messages of the time in which both topics were received.
 
         What is lost by the way is lost when the machine is busy, so the time has to be the same.
         """
-        stream, control = (sequences_of(heard[topic]) for topic in TOPICS)
+        stream, control = (sequences_of(received[topic]) for topic in TOPICS)
         for writer in stream.last.keys() & control.last.keys():
             first = number(writer, max(stream.first[writer], control.first[writer]))
             last = number(writer, min(stream.last[writer], control.last[writer]))
             if first < last:
-                self.stream += missing_between(first, last, heard[STREAM])
-                self.control += missing_between(first, last, heard[CONTROL])
+                self.stream += missing_between(first, last, received[STREAM])
+                self.control += missing_between(first, last, received[CONTROL])
 
     def add_counted(self, stream: Mapping[int, int], control: Mapping[int, int]) -> None:
         """Add up missing messages by writer."""
@@ -127,5 +127,5 @@ def sequences_of(numbers: Iterable[int]) -> Sequences:
     return sequences
 
 
-def missing_between(first: int, last: int, heard: Iterable[int]) -> int:
-    return last - first + 1 - sum(first <= item <= last for item in heard)
+def missing_between(first: int, last: int, received: Iterable[int]) -> int:
+    return last - first + 1 - sum(first <= item <= last for item in received)
