@@ -12,10 +12,10 @@ from enum import StrEnum
 
 from composer.diagnostics import Diagnostic
 from composer.drift import Snapshot
-from composer.graph import declared, live
-from composer.graph.diagnostics import DiagnosticIndex
 from composer.graph.diagram import Graph
-from composer.graph.scene import Scene
+from composer.graph.scenes import declared, live
+from composer.graph.scenes.diagnostics import DiagnosticIndex
+from composer.graph.scenes.scene import Scene
 from composer.graph.views import connections, deployment, lifecycle, nodes, states
 from composer.model import System
 

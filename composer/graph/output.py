@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from enum import StrEnum
 
-from composer.graph import dot, html, json, mermaid, png, svg
 from composer.graph.diagram import Graph
 from composer.graph.engines import Engine, lay_out
+from composer.graph.formats import dot, html, json, mermaid, png, svg
 
 __all__ = ["Engine", "Format", "render"]
 

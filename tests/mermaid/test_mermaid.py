@@ -16,8 +16,9 @@ from typing import Any
 
 import pytest
 
-from composer.graph import View, build_graph, mermaid, scene_of
+from composer.graph import View, build_graph, scene_of
 from composer.graph.diagram import Graph
+from composer.graph.formats import mermaid
 from composer.loading import load
 from composer.resources import systems_folder
 from tests.unit.graph.test_renderers import EVIL, evil_graph

@@ -21,8 +21,8 @@ def test_the_wheel_contains_all_shared_files_and_no_others(wheel: Path) -> None:
         "composer/share/nodes/planner.yaml",
         "composer/share/schemas/system.schema.json",
         "composer/share/systems/pipeline.yaml",
-        "composer/graph/html/main.js",
-        "composer/graph/html/page.css",
+        "composer/graph/formats/html/main.js",
+        "composer/graph/formats/html/page.css",
     ):
         assert path in names
     assert [name for name in names if name.endswith("/licenses/LICENSE")]

@@ -16,7 +16,7 @@ from composer.cli.support.terminal import say, write_bytes
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
-    from composer.graph.scene import Scene
+    from composer.graph.scenes.scene import Scene
     from composer.model import System
 
 EPILOGS = {
@@ -193,9 +193,10 @@ def _drawn(
     scene: Scene, form: DiagramFormat, view: DiagramView, layout: LayoutEngine, *, live: bool
 ) -> bytes:
     from composer import graph as graphs
-    from composer.graph import mermaid, output
+    from composer.graph import output
+    from composer.graph.formats import mermaid
+    from composer.graph.formats.png import PngMissing
     from composer.graph.graphviz import GraphvizFailed
-    from composer.graph.png import PngMissing
 
     views = [view]
     if form is DiagramFormat.HTML:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
 from composer.graph.labels import rate, short_type
 from composer.graph.namespaces import Namespaces
-from composer.graph.scene import (
+from composer.graph.scenes.scene import (
     Scene,
     SceneChannel,
     SceneEndpoint,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph
-from composer.graph.scene import Scene, channels, node_key
+from composer.graph.scenes.scene import Scene, channels, node_key
 from composer.graph.views.vertices import node_vertex
 from composer.model import ChannelKind
 

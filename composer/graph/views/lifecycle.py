@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from composer.graph.diagram import Direction, Edge, EdgeKind, Graph
 from composer.graph.namespaces import Namespaces
-from composer.graph.scene import Scene
+from composer.graph.scenes.scene import Scene
 from composer.graph.views.vertices import node_vertex
 
 

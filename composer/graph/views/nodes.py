@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.graph.diagram import Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
-from composer.graph.facts import channel_facts
 from composer.graph.labels import rate, short_type
 from composer.graph.namespaces import Namespaces, parent_of
-from composer.graph.scene import (
+from composer.graph.scenes.facts import channel_facts
+from composer.graph.scenes.scene import (
     SENDING,
     Scene,
     SceneChannel,

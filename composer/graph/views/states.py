@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from composer.graph.diagram import Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
-from composer.graph.scene import Scene
+from composer.graph.scenes.scene import Scene
 
 _STATES = ("unconfigured", "inactive", "active", "finalized")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from composer.graph.diagram import Vertex, VertexKind
-from composer.graph.scene import SceneNode, node_key
+from composer.graph.scenes.scene import SceneNode, node_key
 
 
 def node_vertex(node: SceneNode, name: str, note: str, cluster: str) -> Vertex:

@@ -10,7 +10,7 @@ import pytest
 
 from composer.behavior_source.method_body import read_body
 from composer.behavior_source.publishing import PublisherUses, publisher_uses
-from composer.graph.rates import publishing_rates_hz
+from composer.graph.scenes.rates import publishing_rates_hz
 from composer.source import SourceFile
 from tests.unit.support.resolving import system_of
 

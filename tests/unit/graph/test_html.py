@@ -10,9 +10,10 @@ import subprocess
 import sys
 from html.parser import HTMLParser
 
-from composer.graph import View, build_graph, html, scene_of
+from composer.graph import View, build_graph, scene_of
 from composer.graph.diagram import Graph
 from composer.graph.engines import lay_out
+from composer.graph.formats import html
 from composer.graph.output import Engine, Format, render
 from composer.loading import load
 from composer.resources import systems_folder

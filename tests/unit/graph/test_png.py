@@ -7,9 +7,10 @@ import struct
 
 import pytest
 
-from composer.graph import View, png
+from composer.graph import View
 from composer.graph.diagram import Graph
 from composer.graph.engines import Engine, lay_out
+from composer.graph.formats import png
 from tests.unit.support.fleets import fleet_graph
 
 

@@ -11,10 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from composer.graph import View, build_graph, dot, mermaid, scene_of, svg
-from composer.graph import json as graph_json
+from composer.graph import View, build_graph, scene_of
 from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
 from composer.graph.engines import Engine
+from composer.graph.formats import dot, mermaid, svg
+from composer.graph.formats import json as graph_json
 from composer.graph.output import Format, render
 from composer.loading import load
 from composer.resources import systems_folder

@@ -9,11 +9,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from composer.graph.diagram import Graph, VertexKind
-from composer.graph.html.articles import articles
+from composer.graph.formats.html.articles import articles
+from composer.graph.formats.svg import contents
+from composer.graph.formats.svg_elements import markers, number, text
+from composer.graph.formats.theme import FORMS, color_rules, colors
 from composer.graph.layout import Layout
-from composer.graph.svg import contents
-from composer.graph.svg_elements import markers, number, text
-from composer.graph.theme import FORMS, color_rules, colors
 
 #: The parts of the script, each before those that use it.
 _SCRIPTS = (

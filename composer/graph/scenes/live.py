@@ -9,7 +9,7 @@ from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.graph.diagram import Details
 from composer.graph.labels import discovered_qos_label, qos_facts
 from composer.graph.namespaces import parent_of
-from composer.graph.scene import Scene, SceneNode, ScenePort
+from composer.graph.scenes.scene import Scene, SceneNode, ScenePort
 from composer.model import PortKind
 from composer.tree import Plain
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from composer.graph.diagram import Details
 from composer.graph.labels import qos_facts
-from composer.graph.rates import timer_rate_hz
-from composer.graph.scene import SceneChannel, SceneEndpoint
+from composer.graph.scenes.rates import timer_rate_hz
+from composer.graph.scenes.scene import SceneChannel, SceneEndpoint
 from composer.model import DEFAULT_EXECUTOR, ChannelKind, Node, Port
 from composer.tree import Plain
 

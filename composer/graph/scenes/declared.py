@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from composer.drift.compare import states_after_bring_up
-from composer.graph.diagnostics import DiagnosticIndex
-from composer.graph.facts import node_facts, port_facts
 from composer.graph.labels import qos_label
-from composer.graph.rates import publishing_rates_hz
-from composer.graph.scene import ExecutorGroup, Scene, SceneNode, ScenePort, Wait
+from composer.graph.scenes.diagnostics import DiagnosticIndex
+from composer.graph.scenes.facts import node_facts, port_facts
+from composer.graph.scenes.rates import publishing_rates_hz
+from composer.graph.scenes.scene import ExecutorGroup, Scene, SceneNode, ScenePort, Wait
 from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, System
 from composer.model.dependencies import dependency_edges
 from composer.plan import bring_up

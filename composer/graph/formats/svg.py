@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.graph import svg_elements
 from composer.graph.diagram import Graph
+from composer.graph.formats import svg_elements
+from composer.graph.formats.theme import STYLE
 from composer.graph.layout import Layout, arrange
 from composer.graph.measure import sizes, text_width
-from composer.graph.theme import STYLE
 
 _TITLE_SIZE = 14.0
 _TITLE_HEIGHT = 26.0

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from importlib.util import find_spec
 
-from composer.graph import dot, graphviz, svg
+from composer.graph import graphviz
 from composer.graph.diagram import Graph
+from composer.graph.formats import dot, svg
 from composer.graph.layout import Layout
 
 #: Pixels per layout unit for high-resolution screens, reduced for very large pictures.

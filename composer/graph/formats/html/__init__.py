@@ -7,6 +7,6 @@ in the ``.js`` files, which ``page`` joins in order.
 
 from __future__ import annotations
 
-from composer.graph.html.page import render
+from composer.graph.formats.html.page import render
 
 __all__ = ["render"]
