@@ -17,7 +17,7 @@ from composer.qos import incompatibilities
 from composer.remote.graph_names import GraphNames
 from composer.remote.session import Deadline, Session
 from composer.runtime.intra_process.ignore_local_publications import unsupported_reason
-from composer.runtime.ros.endpoints import Endpoint, TopicInfo, topic_info
+from composer.runtime.ros.endpoints import EndpointInfo, TopicInfo, topic_info
 from composer.runtime.ros.messages import MessageError, interface_class
 
 _TESTED_MIDDLEWARE = "rmw_fastrtps_cpp"
@@ -153,7 +153,9 @@ def check_types_built(used: Iterable[tuple[str, str, tuple[str, ...]]]) -> Itera
             )
 
 
-def _check_pair(topic: str, publisher: Endpoint, subscription: Endpoint) -> Iterator[CheckResult]:
+def _check_pair(
+    topic: str, publisher: EndpointInfo, subscription: EndpointInfo
+) -> Iterator[CheckResult]:
     for found in incompatibilities(publisher.qos, subscription.qos):
         yield error(
             "qos",

@@ -25,7 +25,7 @@ from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.strand import Strand
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
-from composer.runtime.intra_process.router import Router
+from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.metrics.statistics import Statistics
 
 T = TypeVar("T")
@@ -53,7 +53,7 @@ class NodeContext:
     error_log: ErrorLog
     statistics: Statistics
     names: dict[str, Any]
-    router: Router
+    router: LocalRouter
     chains: NodeChains
     events: EventCounts
     mutations: MutationCheck | None = None

@@ -30,7 +30,7 @@ S = TypeVar("S")
 Remove = Callable[[], None]
 
 
-class Router:
+class LocalRouter:
     """The topics, services and actions of one system that stay in the process.
 
     Ports join with their DDS endpoint, which exists in any case, and leave before they destroy it.

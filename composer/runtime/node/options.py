@@ -9,7 +9,7 @@ from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.clock.sim_time import SimTimeSource
 from composer.runtime.executors.event_counts import EventCounts
-from composer.runtime.intra_process.router import Router
+from composer.runtime.intra_process.router import LocalRouter
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class NodeOptions:
     bring-up, when errors do not count as faults: some nodes wait for others.
     """
 
-    router: Router
+    router: LocalRouter
     chains: Chains
     process: ProcessContext
     seen_messages: MessageSnapshots | None = None

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from composer.model import Port, PortKind
 from composer.qos import incompatibilities
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.ros.endpoints import Endpoint, topic_info
+from composer.runtime.ros.endpoints import EndpointInfo, topic_info
 
 _CHECK_PERIOD_S = 0.1
 _CHECKS = 20
@@ -48,7 +48,7 @@ class IncompatibleQos:
                 self._reported.add(text)
                 self._context.log.warn(f"{self._port.kind} '{self._port.name}' {text}")
 
-    def _incompatible(self) -> tuple[Endpoint, ...]:
+    def _incompatible(self) -> tuple[EndpointInfo, ...]:
         info = topic_info(self._context.node, self._port.full_name, ())
         others = info.subscriptions if self._is_publisher else info.publishers
         return tuple(other for other in others if any(self._reasons(other)))
@@ -57,7 +57,7 @@ class IncompatibleQos:
     def _is_publisher(self) -> bool:
         return self._port.kind is PortKind.PUBLISHER
 
-    def _reasons(self, other: Endpoint) -> Iterator[str]:
+    def _reasons(self, other: EndpointInfo) -> Iterator[str]:
         port = self._port
         topic = f"is incompatible with {other.name} on {port.full_name}"
         if other.type != port.interface.value:

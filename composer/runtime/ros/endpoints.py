@@ -15,7 +15,7 @@ UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 
 
 @dataclass(frozen=True, slots=True)
-class Endpoint:
+class EndpointInfo:
     """A publisher or a subscription of a node."""
 
     node: str
@@ -39,8 +39,8 @@ class TopicInfo:
 
     name: str
     types: tuple[str, ...]
-    publishers: tuple[Endpoint, ...]
-    subscriptions: tuple[Endpoint, ...]
+    publishers: tuple[EndpointInfo, ...]
+    subscriptions: tuple[EndpointInfo, ...]
 
 
 def topic_info(node: Node, name: str, types: tuple[str, ...]) -> TopicInfo:
@@ -53,10 +53,10 @@ def topic_info(node: Node, name: str, types: tuple[str, ...]) -> TopicInfo:
     )
 
 
-def _endpoints(infos: list[TopicEndpointInfo]) -> tuple[Endpoint, ...]:
+def _endpoints(infos: list[TopicEndpointInfo]) -> tuple[EndpointInfo, ...]:
     return tuple(sorted(map(_endpoint, infos), key=lambda item: (item.node, item.type)))
 
 
-def _endpoint(info: TopicEndpointInfo) -> Endpoint:
+def _endpoint(info: TopicEndpointInfo) -> EndpointInfo:
     node = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-    return Endpoint(node, info.topic_type, discovered_profile(info.qos_profile))
+    return EndpointInfo(node, info.topic_type, discovered_profile(info.qos_profile))

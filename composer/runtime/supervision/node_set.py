@@ -23,7 +23,7 @@ from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.executors.factory import log_exception, make_loop, place_threads
 from composer.runtime.executors.loop import Loop
 from composer.runtime.intra_process.eligibility import shared_channels
-from composer.runtime.intra_process.router import Router
+from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, chain_figures, figures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import FINALIZED
@@ -76,7 +76,7 @@ class NodeSet:
         self._options = options
         self._seen_messages = MessageSnapshots() if options.check_mutation else None
         self._executors = {executor.name.value: executor for executor in system.executors}
-        self._router = Router({})
+        self._router = LocalRouter({})
         self._chains = Chains(system, tracing=options.tracing)
         self._process: ProcessContext  # set by create()
         self.nodes: dict[str, RunningNode] = {}
@@ -97,7 +97,7 @@ class NodeSet:
         Raises CreationFailed. Then no loop runs, and the nodes created until then remain.
         """
         self._process = process
-        self._router = Router(shared_channels(self._system))
+        self._router = LocalRouter(shared_channels(self._system))
         if self._router.refusal is not None:
             self.warnings.append(
                 "topics within the process use DDS, which takes more CPU time:"

@@ -63,7 +63,7 @@ def test_values_become_fields(text: str, kind: Any, expected: Any) -> None:
     assert message(text, kind, x=7) == expected
 
 
-def test_nested_messages_keep_the_defaults_of_what_is_not_given() -> None:
+def test_nested_messages_keep_the_defaults_of_other_fields() -> None:
     text = "{pose: {pose: {position: {x: '{x}'}, orientation: {w: 1}}}, header: {frame_id: odom}}"
     odometry = message(text, Odometry, x=2)
     assert odometry.pose.pose.position.x == 2.0
@@ -79,13 +79,13 @@ def test_lists_of_messages() -> None:
     assert path.poses[1].header.stamp == Time(nanosec=250_000_000)
 
 
-def test_a_whole_message_is_passed_on_as_it_is() -> None:
+def test_a_whole_message_is_passed_unchanged() -> None:
     received = Image(data=array("B", b"\x01\x02"), width=2)
     assert message("'{message}'", Image, message=received) is received
     assert message("{data: '{message.data}'}", Image, message=received).data == received.data
 
 
-def test_each_message_is_a_new_one() -> None:
+def test_each_message_is_a_new_object() -> None:
     build = compile_message(template("{frame_id: map}"), Header, WHERE)
     first = build({})
     first.frame_id = "changed"
@@ -119,7 +119,7 @@ def test_each_message_is_a_new_one() -> None:
         ("text", Float64, "std_msgs/Float64 is made of a map of fields"),
     ],
 )
-def test_what_does_not_fit_is_told_with_the_name_of_the_field(
+def test_values_that_do_not_fit_are_errors_with_the_name_of_the_field(
     text: str, kind: Any, words: str
 ) -> None:
     with pytest.raises(MessageError) as error:
@@ -128,7 +128,7 @@ def test_what_does_not_fit_is_told_with_the_name_of_the_field(
     assert words in str(error.value)
 
 
-def test_constants_are_looked_at_when_the_template_is_compiled() -> None:
+def test_constants_are_checked_when_the_template_is_compiled() -> None:
     with pytest.raises(MessageError):
         compile_message(template("{cell_voltage: [1, x]}"), BatteryState, WHERE)({})
     with pytest.raises(MessageError):
@@ -143,7 +143,7 @@ def test_plain_data_becomes_a_message() -> None:
         convert_message({"goal": {"z": "up"}}, PlanTrajectory.Request, "request")
 
 
-def test_an_interface_that_is_not_installed_is_told_of(tmp_path: Path) -> None:
+def test_a_missing_interface_is_an_error(tmp_path: Path) -> None:
     assert interface_class("std_msgs/msg/String") is String
     for name in ("nowhere/msg/String", "std_msgs/msg/Strin", "std_msgs/srv/String", "String"):
         with pytest.raises(MessageError, match=f"'{name}'"):

@@ -78,12 +78,12 @@ def test_always_on_ports_work_while_their_node_is_inactive(
         wait_until(lambda: current, "messages of the other publisher")
         assert peer.change("/power", "deactivate")
 
-        def is_heard_alone() -> bool:
+        def is_the_only_one() -> bool:
             beats, seen = len(voltage), len(current)
             wait_until(lambda: len(voltage) > beats + 3, "the timer continues")
             return len(current) == seen
 
-        wait_until(is_heard_alone, "the messages in transit arrive, and then no more")
+        wait_until(is_the_only_one, "the messages in transit arrive, and then no more")
         assert peer.call(Trigger, "/ask").success
 
         assert peer.change("/power", "cleanup")

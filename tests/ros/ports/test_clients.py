@@ -24,11 +24,11 @@ nodes:
     timers:
       ask: {period_ms: 50, when: count == 0, call: {trigger: {}}}
 """
-TOLD = '        on_failure: {log: {level: warn, message: "failed: {failure}"}}\n'
+ON_FAILURE = '        on_failure: {log: {level: warn, message: "failed: {failure}"}}\n'
 
 
 def declared(on_failure: bool) -> str:
-    return ASKER.replace("    timers:", (TOLD if on_failure else "") + "    timers:")
+    return ASKER.replace("    timers:", (ON_FAILURE if on_failure else "") + "    timers:")
 
 
 def activate_once_the_server_is_known(system: RunningSystem) -> None:

@@ -1,7 +1,7 @@
 """Messages that are lost in transit, and publishers that fall silent: logged and counted.
 
-Whoever floods is killed after the system has gone: where a writer was killed in the middle of a
-large message, Fast DDS makes a port in shared memory anew, and crashes if that is closed meanwhile.
+The flooding process is killed after the system has ended: if a writer is killed in the middle of a
+large message, Fast DDS recreates a shared memory port, and crashes if that is closed meanwhile.
 """
 
 from __future__ import annotations

@@ -116,7 +116,7 @@ def test_a_failing_handler_sends_a_response(
 def test_pending_requests_are_refused_when_the_node_leaves_active(
     tmp_path: Path, peer: Peer
 ) -> None:
-    module = MODULE.replace("OUTCOME", "await_for_ever = None").replace(
+    module = MODULE.replace("OUTCOME", "await_forever = None").replace(
         "await self.clock.sleep(0.001)", "self.log.info('begun'); await self.clock.sleep(60.0)"
     )
     with running(HANDLED.replace("KIND", "events"), tmp_path, handled=module) as system:

@@ -89,20 +89,20 @@ class Outside:
 
     def start_all(self) -> None:
         assert self.peer.set_parameter("/subject", "fault", "") == ""
-        is_made_anew = self.peer.state("/subject") == "finalized"
+        is_recreated = self.peer.state("/subject") == "finalized"
         known = self.peer.servers("/subject/get_state")
         assert self.peer.call(Trigger, "/silence/manager/startup").success
-        if is_made_anew:
+        if is_recreated:
             wait_until(lambda: self.peer.servers("/subject/get_state") - known, "the new node")
         assert self.peer.state("/subject") == "active"
         # Of two participants in one process, one may never notice that a subscription is gone, so a
         # match proves nothing: wait for a message.
         greeting = f"greeting {next(self._greetings)}"
-        wait_until(lambda: self._is_heard(greeting), "a command is received")
+        wait_until(lambda: self._is_received(greeting), "a command is received")
         wait_until(self._ask.service_is_ready)
         wait_until(self._drive.server_is_ready)
 
-    def _is_heard(self, text: str) -> bool:
+    def _is_received(self, text: str) -> bool:
         self.order(text)
         return f"got {text}" in self.system.log_text()
 

@@ -1,4 +1,4 @@
-"""The other processes of the stress of in-process delivery: plain rclpy, as anybody would write it.
+"""The other processes of the stress of in-process delivery: in plain rclpy.
 
 usage: delivery_peer.py listen|talk RELIABILITY DEPTH WRITER TOPIC...
 
@@ -22,7 +22,7 @@ from std_msgs.msg import Int64
 from tests.ros.support.sequences import number
 
 PERIOD_S = 0.002
-TELL_EVERY_S = 0.1
+PRINT_PERIOD_S = 0.1
 
 
 def listen(node: Node, topics: list[str], profile: QoSProfile, ended: threading.Event) -> None:
@@ -32,9 +32,9 @@ def listen(node: Node, topics: list[str], profile: QoSProfile, ended: threading.
             Int64, topic, lambda message, numbers=numbers: numbers.append(message.data), profile
         )
     while not ended.is_set():
-        told_s = time.monotonic()
-        while time.monotonic() < told_s + TELL_EVERY_S:
-            rclpy.spin_once(node, timeout_sec=TELL_EVERY_S)
+        printed_s = time.monotonic()
+        while time.monotonic() < printed_s + PRINT_PERIOD_S:
+            rclpy.spin_once(node, timeout_sec=PRINT_PERIOD_S)
         print(json.dumps(received), flush=True)
         for numbers in received.values():
             numbers.clear()

@@ -1,4 +1,4 @@
-"""A plain rclpy process, as somebody else would have written it: nodes for the commands to see.
+"""A plain rclpy process with nodes for the commands.
 
 Prints ``ready`` once its services are there. It has lifecycle nodes /other/planner, /other/arm
 and /planning/planner; arm refuses to be configured, and planner in /other takes its time.

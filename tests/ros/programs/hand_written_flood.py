@@ -1,8 +1,8 @@
 """A plain rclpy process that sends more than arrives, until it is killed.
 
-Node /flood publishes numbered images on /big (best effort): a hundred large ones in one go, then
-small ones for a moment, and again. On /alive it gives a sign of life each 20 ms of that moment; its
-lease is 500 ms. Arguments: another lease in milliseconds, and how many large ones. Prints ``ready``
+Node /flood publishes numbered images on /big (best effort): a hundred large ones at once, then
+small ones for a moment, and again. On /alive it asserts its liveliness
+every 20 ms of that moment; its lease is 500 ms. Arguments: another lease in milliseconds, and how many large ones. Prints ``ready``
 at the start.
 """
 
@@ -33,7 +33,7 @@ def main() -> None:
     alive = node.create_publisher(String, "alive", qos)
     print("ready", flush=True)
     while not alive.get_subscription_count():
-        time.sleep(0.01)  # rclpy tells nobody who waits for a match
+        time.sleep(0.01)  # rclpy cannot wait for a match
     number = 0
     while True:
         for data in [_LARGE] * large + [_SMALL] * 20:

@@ -1,8 +1,8 @@
 """A plain rclpy process that loses the first request to each of its services.
 
-Node /lab/forgetful answers what nodes are asked about their lifecycle and their parameters, the
-service /lab/switch (SetBool), and hears /lab/in (String) reliably. Prints ``ready`` at the start,
-and the last part of a service's name for each request that comes.
+Node /lab/forgetful has the lifecycle and parameter services of nodes, the
+service /lab/switch (SetBool), and subscribes to /lab/in (String) reliably. Prints ``ready`` at the
+start, and the last part of a service's name for each request.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A plain rclpy process that puts a String on the pipeline's odometry topic: nobody declared it.
+"""A plain rclpy process that puts a String on the pipeline's odometry topic, undeclared.
 
 Prints ``ready``.
 """

@@ -67,7 +67,7 @@ class Talker(Node):
 
     def execute(self, handle: Any) -> Navigate.Result:
         while not self.count_subscribers("navigate/_action/feedback"):
-            time.sleep(0.005)  # a goal may be there before it is known who listens
+            time.sleep(0.005)  # a goal may be there before the subscription is discovered
         steps = 3 if handle.request.max_velocity > 0.0 else 100_000
         for step in range(steps):
             if handle.is_cancel_requested:

@@ -1,6 +1,6 @@
-"""The other process of the tests of loops: plain rclpy, as anybody would write it.
+"""The other process of the tests of loops, in plain rclpy.
 
-usage: loop_peer.py ROLE [ARGUMENT...]      the last line it prints is what it saw, as JSON
+usage: loop_peer.py ROLE [ARGUMENT...]      its last line is the result, as JSON
 """
 
 from __future__ import annotations
@@ -32,10 +32,11 @@ def finished(node: Node, future: Any) -> Any:
 
 
 def wait_until_known(node: Node) -> None:
-    """Wait until the other process has met everything that the node has by now.
+    """Wait until the other process has discovered all entities of the node.
 
-    Servers are found at once, but lose answers and feedback for whom they have not met. What a
-    participant has is announced in order, so who answers a client made last has met all before.
+    Servers are discovered at once, but lose responses and feedback to clients that they have not
+    discovered. Entities are announced in order, so a server that responds to the last client has
+    discovered all of them.
     """
     client = node.create_client(GetParameters, "bench/get_parameters")
     assert client.wait_for_service(PATIENCE_S)
@@ -83,7 +84,7 @@ def latched(node: Node, topic: str, text: str) -> object:
 
 
 def call(node: Node, name: str, times: str) -> object:
-    """Call a Trigger service so many times at once."""
+    """Call a Trigger service ``times`` times at once."""
     client = node.create_client(Trigger, name)
     assert client.wait_for_service(PATIENCE_S)
     wait_until_known(node)

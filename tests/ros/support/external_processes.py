@@ -15,10 +15,10 @@ from tests.ros.support.sequences import Sequences, number
 
 PEER = "tests.ros.programs.delivery_peer"
 ROOT = Path(__file__).parents[3]
-#: What stays in the process as far as it can, and what goes by DDS alone.
+#: A topic with in-process delivery, and one by DDS only.
 STREAM, CONTROL = TOPICS = ("/stream", "/control")
 
-#: Who is killed is missed after 3 s, and not after 20 s.
+#: A killed process is noticed after 3 s instead of 20 s.
 SOON_MISSED = """<builtin>
           <discovery_config>
             <leaseDuration><sec>3</sec></leaseDuration>

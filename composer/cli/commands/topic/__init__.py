@@ -25,7 +25,7 @@ from composer.cli.support.terminal import write
 
 if TYPE_CHECKING:
     from composer.qos import QosProfile
-    from composer.runtime.ros.endpoints import Endpoint, TopicInfo
+    from composer.runtime.ros.endpoints import EndpointInfo, TopicInfo
 
 app = typer.Typer(
     help="List, inspect, measure and publish topics.",
@@ -91,7 +91,7 @@ def _as_text(found: TopicInfo, verbose: bool) -> str:
     return "\n".join(lines)
 
 
-def _endpoint_lines(endpoint: Endpoint) -> list[str]:
+def _endpoint_lines(endpoint: EndpointInfo) -> list[str]:
     policies = ", ".join(f"{name}: {value}" for name, value in _policies(endpoint.qos).items())
     return [f"{endpoint.node}  {endpoint.type}", f"  {policies}"]
 
