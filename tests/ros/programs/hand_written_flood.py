@@ -1,9 +1,9 @@
 """A plain rclpy process that sends more than arrives, until it is killed.
 
 Node /flood publishes numbered images on /big (best effort): a hundred large ones at once, then
-small ones for a moment, and again. On /alive it asserts its liveliness
-every 20 ms of that moment; its lease is 500 ms. Arguments: another lease in milliseconds, and how many large ones. Prints ``ready``
-at the start.
+small ones for a moment, and again. On /alive it asserts its liveliness every 20 ms of that moment;
+its lease is 500 ms. Arguments: another lease in milliseconds, and the number of large ones. Prints
+``ready`` at the start.
 """
 
 from __future__ import annotations
