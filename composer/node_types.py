@@ -23,11 +23,6 @@ class NodeTypes:
     project: Project
 
     @classmethod
-    def for_file(cls, path: Path) -> NodeTypes:
-        """Return the node types that the file at ``path`` may use."""
-        return cls.of(Project.at(path.parent))
-
-    @classmethod
     def of(cls, project: Project) -> NodeTypes:
         """Return the node types of ``project`` and those that come with the composer."""
         folders = (*project.node_folders, nodes_folder().resolve())

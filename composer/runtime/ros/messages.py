@@ -106,14 +106,6 @@ def compile_message(template: Template, message_type: Any, what: str) -> Build:
     return _message(template, message_type, what)
 
 
-def convert_message(value: Any, message_type: Any, what: str) -> Any:
-    """Return a ``message_type`` from plain data: a map of fields, or seconds for a time.
-
-    Raises MessageError.
-    """
-    return _message_converter(message_type, what)(value)
-
-
 def _message(template: Template, message_type: Any, where: str) -> Build:
     match template:
         case Record():

@@ -20,7 +20,6 @@ from composer.document import parse_bytes
 from composer.runtime.ros.messages import (
     MessageError,
     compile_message,
-    convert_message,
     interface_class,
 )
 from composer.templates import Template, compile_template
@@ -137,10 +136,10 @@ def test_constants_are_checked_when_the_template_is_compiled() -> None:
 
 def test_plain_data_becomes_a_message() -> None:
     plain = {"start": {"x": 1}, "max_velocity": 2}
-    request = convert_message(plain, PlanTrajectory.Request, "request")
+    request = message("'{plain}'", PlanTrajectory.Request, plain=plain)
     assert (request.start.x, request.max_velocity) == (1.0, 2.0)
-    with pytest.raises(MessageError, match=r"request\.goal\.z takes a number"):
-        convert_message({"goal": {"z": "up"}}, PlanTrajectory.Request, "request")
+    with pytest.raises(MessageError, match=r"goal\.z takes a number"):
+        message("'{plain}'", PlanTrajectory.Request, plain={"goal": {"z": "up"}})
 
 
 def test_a_missing_interface_is_an_error(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ from composer.expand import expand
 from composer.model import PrimaryState, System
 from composer.node_types import NodeTypes
 from composer.plan import bring_up, tear_down
+from composer.project import Project
 from composer.resolve import resolve
 from composer.runtime.host import Host, HostOptions
 from composer.runtime.node.node import RunningNode
@@ -77,7 +78,7 @@ def system_of(text: str, folder: Path, **modules: str) -> System:
     assert tree is not None, diagnostics
     expanded, more = expand(tree, {})
     diagnostics += more
-    node_types = NodeTypes.for_file(folder / "system.yaml")
+    node_types = NodeTypes.of(Project.at(folder))
     system, more = resolve(expanded, source, node_types, folders={source.path: folder})
     diagnostics += more
     assert system is not None, diagnostics

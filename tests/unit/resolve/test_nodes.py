@@ -7,6 +7,7 @@ import pytest
 from composer.document import parse_document
 from composer.model import Dependency, Event, ExecutorKind, PortKind, PrimaryState
 from composer.node_types import NodeTypes
+from composer.project import Project
 from composer.resolve import resolve
 from composer.source import Located, SourceFile
 from tests.unit.support.resolving import quoted, resolve_text, system_of
@@ -291,7 +292,7 @@ def test_a_file_of_neither_kind_has_a_diagnostic(tmp_path: Path) -> None:
     source = SourceFile("compose.yaml", "nodes: {}\n")
     tree, _ = parse_document(source)
     assert tree is not None
-    system, (diagnostic,) = resolve(tree, source, NodeTypes.for_file(tmp_path / "compose.yaml"))
+    system, (diagnostic,) = resolve(tree, source, NodeTypes.of(Project.at(tmp_path)))
     assert system is None
     assert diagnostic.message == "'compose.yaml' is neither a system nor a node type"
     assert quoted(diagnostic.primary) == "nodes"
