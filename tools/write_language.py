@@ -124,7 +124,8 @@ class Schema:
             for name in ([types] if isinstance(types, str) else types)
             for word in self._words(name, part, key, alone=isinstance(types, str))
         ]
-        return _either(words) + _limits(part)
+        text, limits = _either(words), _limits(part)
+        return text if text.endswith(limits) else text + limits
 
     def described(self, part: Part) -> Part:
         """Return ``part`` merged with the definition that it references."""

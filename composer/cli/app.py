@@ -112,7 +112,7 @@ def compose(
 ) -> None:
     """Define, validate and run ROS 2 systems.
 
-    A system is declared in YAML files. Compose validates the files and runs the nodes as lifecycle
+    A system is declared in YAML files. The files are validated, and the nodes run as lifecycle
     nodes in one process. All ROS 2 tools work with a running system.
 
     Exit codes: 0 success, 1 errors in files or a failed node, 2 usage error, 3 internal error.

@@ -28,7 +28,7 @@ _INTRODUCTION = """\
 # Rules
 
 The rules of `compose validate`. A system with errors does not run; one with warnings or infos does.
-This page is generated from the rules by `python tools/write_rules.py`, and every example is tested.
+This page is generated from the rules (`make generate`), and every example is tested.
 
 To ignore a warning or an info, add a comment on the same line, or on a line of its own before it:
 `# compose: ignore[unheard-publisher]`. Errors cannot be ignored.

@@ -16,7 +16,7 @@ RULE = register(
         name="handler-signature",
         severity=Severity.ERROR,
         summary="A handler does not accept the arguments it is called with.",
-        why="Every call raises TypeError; for a lifecycle handler, already during bring-up.",
+        why="Every call raises TypeError; for a transition handler, this happens during bring-up.",
         bad="""\
 # file: system.yaml
 system: behavior

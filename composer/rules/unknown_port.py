@@ -17,7 +17,7 @@ RULE = register(
         code="RC203",
         name="unknown-port",
         severity=Severity.ERROR,
-        summary="A connection, a reaction or an instance names a port that the node does not have.",
+        summary="A connection, a reaction or a node with a type names a port that does not exist.",
         why="No data would flow: a port must be declared by the node or by its type.",
         bad="""\
 system: ports

@@ -12,7 +12,7 @@ RULE = register(
         code="RC204",
         name="unknown-timer",
         severity=Severity.ERROR,
-        summary="An instance overrides a timer that its node type does not have.",
+        summary="A node overrides a timer that its node type does not have.",
         why="A node has only the timers of its type, so the override would have no effect.",
         bad="""\
 system: source
@@ -37,7 +37,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Check the timers that instances override."""
+    """Check the timers that nodes override."""
     for node in context.system.nodes:
         for unknown in node.unknown:
             if unknown.section == "timers":

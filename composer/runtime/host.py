@@ -69,7 +69,7 @@ class HostOptions:
     ``run_for_s`` is how long it runs, ``bring_up_within_s`` the limit of the whole bring-up,
     ``stop_within_s`` that of the tear-down. ``transition_timeout_s`` overrides the system's.
     ``tracing`` records callback timings, also of callbacks without a ``budget_ms``;
-    ``check_mutation`` checks after each callback whether it has changed a message.
+    ``check_mutation`` checks after each callback whether it has modified a message.
 
     ``end_within(seconds)`` has to end the process after that time, whatever hangs in it; None
     cancels that. It is called with ``grace_s`` as soon as the system stops, and never canceled

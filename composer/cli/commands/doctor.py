@@ -37,11 +37,11 @@ def doctor(
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Check the ROS 2 setup and the running graph.
+    """Check the ROS 2 setup and the ROS graph.
 
     The command checks versions, environment variables, the network, discovery, interface packages,
     and the types and QoS policies of running nodes. Each problem is reported with a remedy. Without
-    ROS, the running graph is not checked.
+    ROS, the ROS graph is not checked.
 
     Exit code 1 if there are errors, or warnings with --strict.
     """

@@ -24,7 +24,7 @@ def rule(
         str | None,
         typer.Argument(
             metavar="CODE",
-            help="A code (RC301), a band of codes (RC3) or a name.",
+            help="A code (RC301), a code prefix (RC3) or a name.",
             show_default=False,
         ),
     ] = None,
@@ -38,11 +38,11 @@ def rule(
 
     rules = all_rules()
     found = None if code is None else find_rule(code, rules)
-    band = [item for item in rules if code is None or item.code.startswith(code.upper())]
+    matching = [item for item in rules if code is None or item.code.startswith(code.upper())]
     if found is not None:
         write_raw(explain(found))
-    elif band:
-        write(columns([(item.code, item.severity.value, item.name) for item in band]))
+    elif matching:
+        write(columns([(item.code, item.severity.value, item.name) for item in matching]))
     else:
         names = [name for item in rules for name in (item.code, item.name)]
         raise UsageError(f"there is no rule '{code}'", hint=suggestion(str(code), names))

@@ -46,7 +46,7 @@ class ReportFormat(StrEnum):
 
 
 Rules = list[str] | None
-_RULE = "a code (RC301), a band (RC3) or a name. Repeatable."
+_RULE = "a code (RC301), a code prefix (RC3) or a name. Repeatable."
 
 
 def validate(

@@ -86,7 +86,7 @@ class MutationCheck:
             if form != snapshot.form:
                 snapshot.form = form
                 kind = type(snapshot.message).__name__
-                self._report(callback, f"has changed a message ({kind}) after it was {origin}")
+                self._report(callback, f"modified a message ({kind}) after it was {origin}")
 
 
 class RememberingTarget:

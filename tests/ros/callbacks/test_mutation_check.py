@@ -55,8 +55,8 @@ class Reader(Behavior):
     def on_texts(self, message):
         self.received += 1
 """
-FORGERY = "subscription 'numbers': has changed a message (Int64) after it was received by 'numbers'"
-USED_AGAIN = "timer 'tock': has changed a message (String) after it was published by 'texts'"
+FORGERY = "subscription 'numbers': modified a message (Int64) after it was received by 'numbers'"
+USED_AGAIN = "timer 'tock': modified a message (String) after it was published by 'texts'"
 
 
 def test_callbacks_that_change_a_message_are_named(tmp_path: Path) -> None:
