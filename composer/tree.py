@@ -93,7 +93,7 @@ def plain(tree: Tree) -> Plain:
 
 
 def describe(tree: Tree) -> str:
-    """Return ``a map``, ``a list``, ``nothing``, ``true``, ``the number 5`` or ``text 'abc'``."""
+    """Return what ``tree`` is: ``a map``, ``nothing``, ``the number 5``, ``the string 'abc'``."""
     match tree:
         case Mapping():
             return "a map"
@@ -104,6 +104,6 @@ def describe(tree: Tree) -> str:
         case Scalar(value=bool()):
             return shown(tree.value)
         case Scalar(value=str()):
-            return f"text '{shown(tree.value)}'"
+            return f"the string '{shown(tree.value)}'"
         case Scalar():
             return f"the number {shown(tree.value)}"

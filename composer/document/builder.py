@@ -165,9 +165,12 @@ class TreeBuilder:
                 parent.entries.append(Entry(parent.key, tree))
             parent.awaits_value = False
         else:
-            hint = "quote a text with braces or brackets"
+            hint = "quote a string with braces or brackets"
             self._report(
-                rules.KEY_NOT_TEXT, f"a key is text, found {describe(tree)}", tree.span, hint
+                rules.KEY_NOT_TEXT,
+                f"a key must be a string, found {describe(tree)}",
+                tree.span,
+                hint,
             )
             parent.awaits_value, parent.key = True, None
 
@@ -188,7 +191,7 @@ class TreeBuilder:
         try:
             return resolve_plain(text)
         except NumberRefused as refusal:
-            hint = "leave the key out for no limit; quote the value if it is a text"
+            hint = "leave the key out for no limit; quote the value if it is a string"
             self._report(rules.BAD_NUMBER, f"'{shown(text)}' {refusal}", span, hint)
             return 1  # a placeholder, so that no other diagnostic follows
 
@@ -203,7 +206,7 @@ class TreeBuilder:
         key = scalar
         if not isinstance(scalar.value, str):
             text = shown(event.value)
-            message = f"a key is text, found {describe(scalar)}"
+            message = f"a key must be a string, found {describe(scalar)}"
             self._report(rules.KEY_NOT_TEXT, message, scalar.span, f"quote it: '{text}'")
             key = Scalar(event.value, scalar.span, scalar.verbatim, scalar.content_offset)
         first = parent.keys.setdefault(str(key.value), key)
@@ -236,7 +239,7 @@ class TreeBuilder:
         parent.text_in_braces = Scalar(text, parent.start, verbatim=False)
 
     def _report_tag(self, tag: str, mark: Mark | None) -> None:
-        hint = "remove it, and quote the value if it is a text"
+        hint = "remove it, and quote the value if it is a string"
         message = f"the tag '{shown(tag.replace('tag:yaml.org,2002:', '!!'))}' is not supported"
         self._report(rules.YAML_TAG, message, span_at(self._source, mark), hint)
 

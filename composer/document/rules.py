@@ -265,7 +265,7 @@ KEY_WITHOUT_VALUE = register(
         code="RC016",
         name="key-without-value",
         summary="A key in braces has no colon and no value.",
-        why="In YAML, braces start a map. An expression or a text with braces needs quotes.",
+        why="In YAML, braces start a map. An expression or a string with braces needs quotes.",
         bad="""\
 system: demo
 nodes:

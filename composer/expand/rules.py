@@ -73,8 +73,8 @@ NOT_A_TEXT = register(
     _error(
         code="RC284",
         name="variable-not-text",
-        summary="A variable whose value is a map or list is used inside a text.",
-        why="Maps and lists cannot be inserted into a text; use '${name}' alone.",
+        summary="A variable whose value is a map or list is used inside a string.",
+        why="Maps and lists cannot be inserted into a string; use '${name}' alone.",
         bad="""\
 system: demo
 variables: {point: {x: 1}}

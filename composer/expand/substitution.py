@@ -124,7 +124,7 @@ class Substitution:
             return part.written
         if not isinstance(found.tree, Scalar):
             kind = "map" if isinstance(found.tree, Mapping) else "list"
-            message = f"'{part.written}' is a {kind}, which cannot be inserted into a text"
+            message = f"'{part.written}' is a {kind}, which cannot be inserted into a string"
             self._report(rules.NOT_A_TEXT, message, part, scalar)
             return part.written
         text = found.tree.value if isinstance(found.tree.value, str) else shown(found.tree.value)

@@ -198,7 +198,7 @@ def _membership(node: ast.Compare, paths: list[FieldPath]) -> ast.expr:
 def _list_item(node: ast.expr) -> bool | int | float | str:
     value = literal(node)
     if value is None:
-        raise _error(node, "a list after 'in' holds numbers, texts, true and false")
+        raise _error(node, "a list after 'in' may contain only numbers, strings, true and false")
     _check_size(node, value)
     return value
 

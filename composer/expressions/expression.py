@@ -17,7 +17,7 @@ _REASONS: Mapping[type[Exception], str] = {
     KeyError: "there is no such name here",
     ZeroDivisionError: "division by zero",
     OverflowError: "the number is too large",
-    TypeError: "a text and a number have no order",
+    TypeError: "a string and a number have no order",
     ValueError: "not defined for this value",
 }
 

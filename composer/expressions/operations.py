@@ -39,7 +39,7 @@ def bounded(value: Any) -> Any:
 
 
 def comparable(value: Any) -> Any:
-    """Return ``value`` if it is a number, a text, a boolean or None."""
+    """Return ``value`` if it is a number, a string, a boolean or None."""
     if type(value) in _PLAIN_COMPARABLE:
         return value
     value = plain(value)
@@ -49,17 +49,17 @@ def comparable(value: Any) -> Any:
 
 
 def is_in(item: Any, container: Any) -> bool:
-    """Return whether ``container``, a list or a text, contains ``item``."""
+    """Return whether ``container``, a list or a string, contains ``item``."""
     item = comparable(item)
     match kind_of(type(container)):
         case Kind.TEXT if isinstance(item, str):
             return item in container
         case Kind.TEXT:
-            raise Refusal(f"{describe(item)} cannot be part of a text")
+            raise Refusal(f"{describe(item)} cannot be part of a string")
         case Kind.SEQUENCE:
             return any(plain(element) == item for element in container)
         case _:
-            raise Refusal(f"{describe(container)} is neither a list nor a text")
+            raise Refusal(f"{describe(container)} is neither a list nor a string")
 
 
 def _arithmetic(operate: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:

@@ -31,7 +31,7 @@ _HINTS = {
     "!": "write 'not'",
     "=": "write '==' to compare",
     "**": "multiply, or use sqrt() and hypot()",
-    "\\": "a text in an expression has no escapes",
+    "\\": "strings in expressions have no escapes",
     "{": "an expression inside braces has no braces of its own",
     "}": "an expression inside braces has no braces of its own",
 }
@@ -73,7 +73,7 @@ def _unexpected(source: str, offset: int, text: str) -> ExpressionError:
     if text in "'\"":
         rest = source[offset:]
         hint = _HINTS["\\"] if "\\" in rest else f"close it with {text}"
-        return ExpressionError("a text without an end", offset, len(rest), hint)
+        return ExpressionError("unterminated string", offset, len(rest), hint)
     shown = text if text.isprintable() else f"\\u{ord(text[0]):04x}"
     return ExpressionError(f"unexpected '{shown}'", offset, len(text), _HINTS.get(text))
 

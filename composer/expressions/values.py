@@ -20,7 +20,7 @@ class Kind(Enum):
 
     BOOL = "true or false"
     NUMBER = "a number"
-    TEXT = "a text"
+    TEXT = "a string"
     SEQUENCE = "a list"
     MAPPING = "a map"
     MESSAGE = "a message"

@@ -165,7 +165,7 @@ def _type(text: str, package: str) -> FieldType:
     name, limit = match["name"], match["limit"] or ""
     string_bound = int(match["string_bound"]) if match["string_bound"] else None
     if string_bound is not None and name not in TEXTS:
-        raise ValueError(f"only texts have a greatest length, not '{name}'")
+        raise ValueError(f"only strings can have a maximum length, not '{name}'")
     count = int(limit.removeprefix("<=")) if limit else None
     if count == 0 or string_bound == 0:
         raise ValueError(f"'{text}' has room for nothing")

@@ -15,7 +15,7 @@ RULE = register(
         code="RC440",
         name="invalid-expression",
         severity=Severity.ERROR,
-        summary="An expression, or a text with {...}, cannot be compiled.",
+        summary="An expression, or a string with {...}, cannot be compiled.",
         why=(
             "Expressions are a small, safe language: fields of messages, numbers, comparisons, "
             "and, or, not, and a few functions. Invalid ones are reported before anything starts, "

@@ -66,7 +66,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 continue  # shown by the diagnostic about the missing handler
             yield Diagnostic(
                 RULE,
-                f"nothing calls '{method.name}' of '{source.reference.class_name}'",
+                f"handler '{method.name}' of '{source.reference.class_name}' matches no port or "
+                "timer",
                 source.reference.text.span,
                 (Label(method.span, "defined here"),),
                 _hint(node, method.name, [handler.name for handler in known]),

@@ -10,9 +10,9 @@ _EXPRESSION = r"\{"
 _WORDS = {
     "object": "a map",
     "array": "a list",
-    "string": "text",
+    "string": "a string",
     "number": "a number",
-    "integer": "a whole number",
+    "integer": "an integer",
     "boolean": "true or false",
     "null": "null",
 }
@@ -38,7 +38,7 @@ def type_hint(schema: dict[str, Any], found: object) -> str | None:
         case str():
             return _text_hint(schema, allowed.keys(), found)
         case bool() | int() | float() if allowed.keys() == {"string"}:
-            return "quote it if it is a text"
+            return "quote it if it is a string"
         case list() if allowed.keys() == {"object"}:
             return "write 'name: ...' for each, without a dash"
         case None if allowed.keys() == {"object"}:

@@ -233,11 +233,11 @@ def _octet(value: Any, where: str) -> bytes:
 
 def _text_converter(field_type: Any, where: str) -> Convert:
     if not isinstance(field_type, BoundedString):
-        return _exactly(str, "a text", where)
+        return _exactly(str, "a string", where)
 
     def convert_value(value: Any) -> str:
         if not isinstance(value, str) or len(value) > field_type.maximum_size:
-            expected = f"a text of up to {field_type.maximum_size} letters"
+            expected = f"a string of up to {field_type.maximum_size} characters"
             raise MessageError(f"{where} takes {expected}, not {_format(value)}")
         return value
 
@@ -333,7 +333,7 @@ def _kind_of(field_type: Any) -> str:
         case BasicType():
             return f"a {field_type.typename}"
         case AbstractString() | AbstractWString():
-            return "a text"
+            return "a string"
         case NamespacedType():
             return f"a {field_type.namespaces[0]}/{field_type.name}"
         case _:

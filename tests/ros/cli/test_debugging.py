@@ -233,7 +233,7 @@ def test_published_messages_arrive() -> None:
 def test_publishing_reports_errors() -> None:
     topic = ("topic", "pub", "--once", "/lab/in", "std_msgs/msg/String")
     assert "String has no field 'dta'" in error(*topic, "{dta: hello}")
-    assert "takes a text" in error(*topic, "{data: 5}")
+    assert "takes a string" in error(*topic, "{data: 5}")
     assert "is not a YAML map" in error(*topic, "hello")
     assert "is not installed" in error("topic", "pub", "/lab/in", "std_msgs/msg/Strin")
     unused = ("topic", "pub", "--once", "/unused", "std_msgs/msg/String", "--timeout", "0.5")

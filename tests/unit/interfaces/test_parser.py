@@ -106,7 +106,7 @@ def test_service_and_action_have_their_parts() -> None:
         ("a/b/c/D d", "'a/b/c/D' is neither a primitive type nor a message"),
         ("int8[x] a", "'int8[x]' is not a type"),
         ("int8[0] a", "'int8[0]' has room for nothing"),
-        ("int8<=5 a", "only texts have a greatest length"),
+        ("int8<=5 a", "only strings can have a maximum length"),
         ("uint8 n 256", "256 is outside the range of uint8, 0 to 255"),
         ("int8 n 1.5", "'1.5' is not an integer"),
         ("float64 f nan", "'nan' is not a finite float64"),

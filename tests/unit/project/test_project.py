@@ -86,7 +86,7 @@ def test_a_table_in_pyproject_says_the_same_with_places(tmp_path: Path) -> None:
     ]
     ((line, column, message),) = reported(project.diagnostics)
     assert (line, column) == (15, 9)
-    assert message.endswith("for 'RC412', found text 'eror'")
+    assert message.endswith("for 'RC412', found the string 'eror'")
 
 
 @pytest.mark.parametrize(
@@ -97,8 +97,8 @@ def test_a_table_in_pyproject_says_the_same_with_places(tmp_path: Path) -> None:
         ("nodes:\n  - missing", (2, 5, "'missing' is not a folder")),
         ("nodes: [a.yaml]", (1, 9, "'a.yaml' is not a folder")),
         ('nodes: ["\\t"]', (1, 9, "'\\t' is not a folder")),
-        ("nodes: nodes", (1, 8, "expected a list for 'nodes', found text 'nodes'")),
-        ("select: [1]", (1, 10, "expected text in 'select', found the number 1")),
+        ("nodes: nodes", (1, 8, "expected a list for 'nodes', found the string 'nodes'")),
+        ("select: [1]", (1, 10, "expected a string in 'select', found the number 1")),
         ("ignore: [no-rule-at-all]", (1, 10, "there is no rule 'no-rule-at-all'")),
         (
             "ignore: [unknown-node]",

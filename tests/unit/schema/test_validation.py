@@ -59,7 +59,7 @@ def profile(text: str) -> str:
         ("system: demo\nnodes: {}", "nothing-there", "nodes", "'nodes' is empty", "at least one"),
         (
             "system: 5\nnodes: {robot: {}}",
-            "wrong-type", "5", "expected text for 'system', found the number 5", "quote it",
+            "wrong-type", "5", "expected a string for 'system', found the number 5", "quote it",
         ),
         (
             "system: demo\nnodes:\n  - robot: {}",
@@ -96,11 +96,11 @@ def profile(text: str) -> str:
         (node("{params: {}}"), "unknown-key", "params", "'params' is not a key", "'parameters'?"),
         (
             node("{type: relay, parameters: {a: {default: 1}}}"),
-            "wrong-type", "{", "expected true or false, a number, text or a list for 'a'", "",
+            "wrong-type", "{", "expected true or false, a number, a string or a list for 'a'", "",
         ),
         (
             node("{parameters: {a: null}}"),
-            "wrong-type", "null", "expected a map, true or false, a number, text or a list", "",
+            "wrong-type", "null", "expected a map, true or false, a number, a string or a list", "",
         ),
         (
             node("{parameters: {a: {type: float}}}"),
@@ -153,7 +153,7 @@ def profile(text: str) -> str:
         ),
         (
             subscription("{type: a/msg/B, qos: 10}"),
-            "wrong-type", "10", "expected text or a map for 'qos', found the number 10", "",
+            "wrong-type", "10", "expected a string or a map for 'qos', found the number 10", "",
         ),
         (
             subscription("{type: a/msg/B, qos: {reliability: best-effort}}"),
@@ -165,7 +165,7 @@ def profile(text: str) -> str:
         ),
         (
             subscription("{type: a/msg/B, when: true}"),
-            "wrong-type", "true", "expected text for 'when', found true", "quote it",
+            "wrong-type", "true", "expected a string for 'when', found true", "quote it",
         ),
         (
             subscription("{type: a/msg/B, publish: {out: hello}}"),
@@ -244,15 +244,15 @@ def profile(text: str) -> str:
         ),
         (
             connection("{topic: /a, from: a.b, to: [3]}"),
-            "wrong-type", "3", "expected text in 'to', found the number 3", "",
+            "wrong-type", "3", "expected a string in 'to', found the number 3", "",
         ),
         (
             connection("/a"),
-            "wrong-type", "/a", "expected a map in 'connections', found text '/a'", "",
+            "wrong-type", "/a", "expected a map in 'connections', found the string '/a'", "",
         ),
         # profiles and executors
         (profile("{depth: 0}"), "out-of-range", "0", "expected at least 1 for 'depth'", ""),
-        (profile("{depth: 1.0}"), "wrong-type", "1.0", "expected a whole number for 'depth'", ""),
+        (profile("{depth: 1.0}"), "wrong-type", "1.0", "expected an integer for 'depth'", ""),
         (
             profile("{deadline_ms: 0}"),
             "out-of-range", "0", "expected a number above 0 for 'deadline_ms', found 0", "",
