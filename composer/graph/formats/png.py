@@ -13,6 +13,8 @@ from composer.graph.layout import Layout
 #: Pixels per layout unit for high-resolution screens, reduced for very large pictures.
 _ZOOM = 2.0
 _MAX_PIXELS = 40_000_000
+#: resvg draws no text if it knows none of the fonts of the SVG, and its own default is Arial.
+_FALLBACK_FONT = "DejaVu Sans"
 
 
 class PngMissing(Exception):
@@ -39,6 +41,8 @@ def _by_resvg(graph: Graph, layout: Layout) -> bytes:
     zoom = min(_ZOOM, math.sqrt(_MAX_PIXELS / max(pixels, 1.0)))
     width, _ = svg.page_size(graph, layout)
     drawn = resvg_py.svg_to_bytes(
-        svg_string=svg.render(graph, layout), width=max(1, round(width * zoom))
+        svg_string=svg.render(graph, layout),
+        width=max(1, round(width * zoom)),
+        sans_serif_family=_FALLBACK_FONT,
     )
     return bytes(drawn)
