@@ -38,7 +38,7 @@ Timeout = Annotated[
         metavar="SECONDS",
         min=0.0,
         callback=finite,
-        help="Maximum time to wait.",
+        help="Maximum time to wait for nodes and responses.",
     ),
 ]
 DEFAULT_TIMEOUT_S = 5.0

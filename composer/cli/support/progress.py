@@ -74,7 +74,7 @@ def _code(event: Event) -> str:
 
 def summary(outcome: Outcome) -> str:
     """Return the summary of a run: a table of its nodes and one of its busiest callbacks."""
-    head = ("node", "state", "received", "sent", "calls", "dropped", "errors")
+    head = ("node", "state", "received", "sent", "requests", "dropped", "errors")
     rows = [head, *map(_row, outcome.nodes)]
     parts = [
         f"ran for {outcome.elapsed_s:.1f} s: {outcome.reason}\n{columns(rows, numbers_from=2)}"

@@ -134,7 +134,7 @@ class Stopping:
     reason: str
 
     def __str__(self) -> str:
-        return f"stopping: {self.reason}"
+        return f"shutting down: {self.reason}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -337,7 +337,7 @@ def test_the_second_of_two_hosts_shuts_down(path: Path, monkeypatch: pytest.Monk
     try:
         monkeypatch.setenv("XDG_RUNTIME_DIR", str(second_folder))
         refusal = refused("run", path, "--for", PATIENCE_S)
-        assert "stopping: system '/fleet/robot' already runs in ROS domain" in refusal
+        assert "shutting down: system '/fleet/robot' already runs in ROS domain" in refusal
         assert f"process {first.pid}" in refusal
         assert first.is_alive()
         assert first.states()["/fleet/motor"] == "active"

@@ -128,7 +128,7 @@ def test_all_requests_get_a_response(tmp_path: Path, peer: Peer) -> None:
         assert subject.state in ("unconfigured", "inactive", "active")
         assert peer.call(Trigger, "/alive").success
         assert system.stop()[0] == 0
-    stopping = next(place for place, line in enumerate(system.lines) if "stopping:" in line)
+    stopping = next(place for place, line in enumerate(system.lines) if "shutting down:" in line)
     reported = [line for line in system.lines[:stopping] if "[compose] /subject" in line]
     assert sum(answers) == len(reported), "each success is a change of state, and vice versa"
 

@@ -124,7 +124,7 @@ def test_a_thread_of_a_behavior_does_not_delay_the_end(tmp_path: Path) -> None:
         )
     )
     process = start(path, "--for", 0.1, "--grace", 1)
-    wait_for_line(process, "stopping: --for elapsed")
+    wait_for_line(process, "shutting down: --for elapsed")
     began_s = time.monotonic()
     output = rest_of(process)
     assert process.returncode == 1

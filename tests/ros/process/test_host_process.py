@@ -84,7 +84,7 @@ def test_a_signal_ends_the_pipeline_in_order(tmp_path: Path, number: signal.Sign
     text = run.text()
     assert code == 0, text
     assert took_s < end_limit_s()
-    assert f"stopping: {number.name}" in text
+    assert f"shutting down: {number.name}" in text
     assert "Traceback" not in text
     order = [
         "/control/motor_controller finalized",
@@ -122,7 +122,7 @@ def test_a_process_with_a_hanging_callback_ends_in_time(
     with compose_run(tmp_path, path) as run:
         run.wait_for("[hanging] hanging")
         run.process.send_signal(signal.SIGINT)
-        run.wait_for("stopping: SIGINT")
+        run.wait_for("shutting down: SIGINT")
         code, took_s = run.end(repeat_signal=repeat_signal)
     assert code == 1, run.text()
     assert took_s < end_limit_s()

@@ -46,7 +46,7 @@ def end_at(moment: str, delay_s: float, number: signal.Signals) -> float:
 
 def check_order(lines: list[str], state: str, case: str) -> None:
     """Check that the tear-down follows the order of the dependencies."""
-    stopping = next(place for place, line in enumerate(lines) if "stopping:" in line)
+    stopping = next(place for place, line in enumerate(lines) if "shutting down:" in line)
     down = [
         found[1] for line in lines[stopping:] if (found := re.search(rf"\] (/\S+) {state}$", line))
     ]
