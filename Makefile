@@ -17,7 +17,7 @@ INSTALL := $(PIP) install -qq
 # Every downloaded file must have one of the hashes in requirements/.
 INSTALL_PINNED := $(INSTALL) --require-hashes -r requirements
 INSTALL_PROJECT := $(INSTALL) --no-deps --no-build-isolation --editable .
-TWO_WORKERS := --numprocesses 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
+XDIST := --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 INTERFACES := $(shell find interfaces -type f)
 READY := $(STAMPS)/composer $(STAMPS)/interfaces
 # Set only if this Python has no headers: create_environment.py downloads them into the environment.
@@ -55,16 +55,16 @@ run: $(READY)
 	@echo "==> compose run $(SYSTEM)    (Ctrl-C to stop)"
 	@exec $(PYTHON) tools/run_in_foreground.py $(BIN)/compose run $(SYSTEM)
 
-# Two workers: tests with ROS mostly wait. The tests of a file share fixtures, so they stay together.
+# Three workers for two CPUs: tests with ROS mostly wait. Tests of a file share fixtures, so they stay together.
 # A dead worker fails the run: xdist would wait forever for its tests.
 test: $(READY) $(STAMPS)/dev
 	@echo "==> pytest"
-	@$(BIN)/python -m pytest $(TWO_WORKERS)
+	@$(BIN)/python -m pytest --numprocesses 3 $(XDIST)
 
 # The inner loop: a quarter of the examples that hypothesis generates otherwise.
 test-fast: $(STAMPS)/composer $(STAMPS)/dev
 	@echo "==> pytest, the fast tests"
-	@$(BIN)/python -m pytest $(TWO_WORKERS) -m "not ros and not slow" --hypothesis-profile fast \
+	@$(BIN)/python -m pytest --numprocesses 2 $(XDIST) -m "not ros and not slow" --hypothesis-profile fast \
 	  tests/unit tests/golden tests/properties tests/cli
 
 # Problems that appear only after hundreds of starts, shutdowns and transitions.
@@ -126,7 +126,7 @@ test-wheel: $(READY) $(STAMPS)/dev
 	@rm -f $(STAMPS)/composer $(STAMPS)/dev
 	@rm -rf build/tree && mkdir -p build/tree
 	@git archive HEAD ':!composer' | tar -x -C build/tree
-	@cd build/tree && $(abspath $(BIN))/python -m pytest $(TWO_WORKERS) \
+	@cd build/tree && $(abspath $(BIN))/python -m pytest --numprocesses 3 $(XDIST) \
 	  --ignore tests/packaging
 
 requirements: $(STAMPS)/tools

@@ -21,6 +21,7 @@ from tests.examples import register_profiles
 
 TESTS = Path(__file__).parent
 TESTS_WITH_ROS = TESTS / "ros"
+LONG_FILES = (TESTS_WITH_ROS, TESTS / "packaging")
 #: These start no ROS node, so all of them share a domain.
 TESTS_WITHOUT_NODES = (TESTS / "unit", TESTS / "golden", TESTS / "properties")
 FAST_DDS_PROFILE = Path(__file__).with_name("udp_on_this_computer.xml")
@@ -83,9 +84,9 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    # With xdist's --no-loadscope-reorder: the long files, which are those with ROS, come first, so
-    # that the workers finish at the same time.
-    items.sort(key=lambda item: not item.path.is_relative_to(TESTS_WITH_ROS))
+    # With xdist's --no-loadscope-reorder: the long files come first, so that the workers finish at
+    # the same time.
+    items.sort(key=lambda item: not any(map(item.path.is_relative_to, LONG_FILES)))
     if not config.getoption("--soak"):
         _deselect(config, items, "soak")
     may_skip = _may_skip()
