@@ -76,12 +76,12 @@ soak: $(READY) $(STAMPS)/dev
 check: lint test
 
 lint: $(STAMPS)/composer $(STAMPS)/dev
-	@echo "==> ruff, mypy, import-linter"
+	@echo "==> ruff, mypy, import-linter, check_words"
 	@$(BIN)/ruff check --quiet
 	@$(BIN)/ruff format --quiet --check
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports --no-logo
-#	@$(BIN)/python tools/check_words.py
+	@$(BIN)/python tools/check_words.py
 
 format: $(STAMPS)/dev
 	@$(BIN)/ruff check --quiet --fix

@@ -167,7 +167,7 @@ class TreeBuilder:
         else:
             hint = "quote a string with braces or brackets"
             self._report(
-                rules.KEY_NOT_TEXT,
+                rules.KEY_NOT_STRING,
                 f"a key must be a string, found {describe(tree)}",
                 tree.span,
                 hint,
@@ -201,13 +201,15 @@ class TreeBuilder:
             self._report(rules.MERGE_KEY, "YAML merge keys are not supported", scalar.span, hint)
             return None
         if scalar.value is None and not event.value:
-            self._report(rules.KEY_NOT_TEXT, "a key is missing before this ':'", scalar.span, None)
+            self._report(
+                rules.KEY_NOT_STRING, "a key is missing before this ':'", scalar.span, None
+            )
             return None
         key = scalar
         if not isinstance(scalar.value, str):
             text = shown(event.value)
             message = f"a key must be a string, found {describe(scalar)}"
-            self._report(rules.KEY_NOT_TEXT, message, scalar.span, f"quote it: '{text}'")
+            self._report(rules.KEY_NOT_STRING, message, scalar.span, f"quote it: '{text}'")
             key = Scalar(event.value, scalar.span, scalar.verbatim, scalar.content_offset)
         first = parent.keys.setdefault(str(key.value), key)
         if first is key:

@@ -185,10 +185,10 @@ nodes:
 """,
     )
 )
-KEY_NOT_TEXT = register(
+KEY_NOT_STRING = register(
     _error(
         code="RC012",
-        name="key-not-text",
+        name="key-not-string",
         summary="A key is a number, a boolean, a list, a map or null.",
         why="Every key of the language is a word or a name.",
         bad="""\

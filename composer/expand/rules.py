@@ -72,7 +72,7 @@ nodes:
 NOT_A_TEXT = register(
     _error(
         code="RC284",
-        name="variable-not-text",
+        name="variable-not-string",
         summary="A variable whose value is a map or list is used inside a string.",
         why="Maps and lists cannot be inserted into a string; use '${name}' alone.",
         bad="""\

@@ -86,7 +86,7 @@ nodes:
     found = errors(loading)
     for line, rule in (
         ("robot.yaml:2", "duplicate-key"),
-        ("robot.yaml:7", "variable-not-text"),
+        ("robot.yaml:7", "variable-not-string"),
         ("robot.yaml:8", "unknown-executor"),
         ("robot.yaml:9", "unknown-key"),
         ("robot.yaml:10", "invalid-expression"),

@@ -74,7 +74,7 @@ def test_callbacks_that_change_a_message_are_named(tmp_path: Path) -> None:
     assert all(line.startswith((FORGERY, USED_AGAIN)) for line in said)
 
 
-def test_without_the_option_there_is_no_check(tmp_path: Path) -> None:
+def test_mutations_are_not_checked_by_default(tmp_path: Path) -> None:
     with running(TEXT, tmp_path, changing=MODULE) as system:
         reader = system.behavior("reader")
         wait_until(lambda: reader.received > 10)

@@ -65,7 +65,7 @@ from tests.ros.support.sequences import Sequences, number
 PER_WRITER, WRITERS, LATCHED = {PER_WRITER}, {WRITERS}, {LATCHED}
 
 class Writer(Behavior):
-    '''Two threads publish, and a timer, in bursts, as the third; each so many messages.'''
+    '''Two threads publish, and a timer, in bursts, as the third: PER_WRITER messages each.'''
 
     def on_activate(self):
         self.sent = 0

@@ -157,7 +157,7 @@ class Stress:
     def __init__(self, system: RunningSystem, folder: Path) -> None:
         self._system = system
         self._folder = folder
-        #: By those who are owed everything, and by those whose QoS allows for losses.
+        #: Received by reliable subscriptions, and by those whose QoS allows losses.
         self.owed, self.missing = Missing(), Missing()
 
     def run(self, rounds: int) -> None:

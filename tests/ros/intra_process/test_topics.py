@@ -66,7 +66,7 @@ def test_local_messages_are_shared_and_external_nodes_receive_them_too(
         near, far, source = (system.behavior(name) for name in ("near", "far", "source"))
         send(system, 50)
         wait_until(lambda: len(near.received) == len(far.received) == 50)
-        # By reference: not through DDS.
+        # By reference, so DDS is not used.
         for listener in (near, far):
             assert all(a is b for a, b in zip(listener.received, source.sent, strict=True))
 

@@ -84,7 +84,7 @@ def test_a_whole_message_is_the_very_message() -> None:
         ("str(message)", "Odometry cannot be compared"),
     ],
 )
-def test_what_is_no_field_is_not_reached(source: str, reason: str) -> None:
+def test_attributes_other_than_fields_are_refused(source: str, reason: str) -> None:
     with pytest.raises(EvaluationError) as caught:
         compile_expression(source).evaluate(scope())
     assert reason in str(caught.value)

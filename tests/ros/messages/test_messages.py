@@ -28,8 +28,8 @@ WHERE = "'publish' to 'output'"
 
 
 def template(text: str) -> Template:
-    tree, _, findings = parse_bytes(f"value: {text}".encode(), "test.yaml")
-    assert tree is not None, findings
+    tree, _, diagnostics = parse_bytes(f"value: {text}".encode(), "test.yaml")
+    assert tree is not None, diagnostics
     value = tree.get("value")
     assert value is not None
     compiled, problems = compile_template(value)

@@ -1,4 +1,4 @@
-"""What is judged to fit before a start is what the runtime takes, for random values and fields."""
+"""The field checker accepts exactly the values that the runtime accepts, for random messages."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ VALUES: dict[str, Any] = {
 
 SCALARS = st.one_of(
     st.sampled_from([True, 0, 1, -1, 255, 256, 2**31, -(2**63), 2**64 - 1, 2**64]),
-    # Not beyond float32: the runtime lets rclpy turn that into infinity, the judge refuses it.
+    # Not beyond float32: the runtime lets rclpy turn that into infinity, the checker refuses it.
     st.sampled_from([0.0, 2.5, -1e38, 3e38, 1e10]),
     st.sampled_from(["", "text", "a" * 256, "{node}", "{node}!", "{now} s"]),
     st.sampled_from(["{count}", "{now}", "{count / 2}", "{count > 1}", "{state.on}"]),
@@ -76,20 +76,20 @@ def taken_by_the_runtime(value: Any, name: str) -> bool:
 
 @examples(400)
 @given(st.dictionaries(FIELDS, CONTENT, max_size=2), st.sampled_from(MESSAGES))
-def test_judge_and_runtime_agree(value: dict[str, Any], name: str) -> None:
+def test_checker_and_runtime_agree(value: dict[str, Any], name: str) -> None:
     message = INTERFACES.message(name)
     assert message is not None
-    judged = list(FieldChecker(INTERFACES, SCOPE).template(template(value), message))
-    assert taken_by_the_runtime(value, name) == (not judged), judged
+    problems = list(FieldChecker(INTERFACES, SCOPE).template(template(value), message))
+    assert taken_by_the_runtime(value, name) == (not problems), problems
 
 
 @examples(400)
 @given(CONTENT, st.sampled_from(MESSAGES), st.data())
-def test_judge_and_runtime_agree_on_fields(value: Any, name: str, data: st.DataObject) -> None:
+def test_checker_and_runtime_agree_on_fields(value: Any, name: str, data: st.DataObject) -> None:
     message = INTERFACES.message(name)
     assert message is not None
     if not message.fields:
         return
     field = data.draw(st.sampled_from(message.field_names))
-    judged = list(FieldChecker(INTERFACES, SCOPE).template(template({field: value}), message))
-    assert taken_by_the_runtime({field: value}, name) == (not judged), judged
+    problems = list(FieldChecker(INTERFACES, SCOPE).template(template({field: value}), message))
+    assert taken_by_the_runtime({field: value}, name) == (not problems), problems

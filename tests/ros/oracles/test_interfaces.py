@@ -54,7 +54,7 @@ def test_the_snapshot_is_what_is_installed() -> None:
     definitions = runpy.run_path(str(ROOT / "tools" / "bundle_interfaces.py"))["definitions"]()
     bundle = Bundle()
     names = {name for folder in ("msg", "srv", "action") for name in bundle.names(folder)}
-    packages = bundle.packages()  # others may be installed beside them
+    packages = bundle.packages()  # others may be installed as well
     assert names == {name for name in definitions if name.partition("/")[0] in packages}
     for name in names:
         definition = bundle.read(name)

@@ -1,4 +1,4 @@
-"""composer.names against rcl's own judgement, over random names."""
+"""composer.names against rcl's own validation, over random names."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ TOKENS = st.lists(
 ).map("/".join)
 
 
-def judged_alike(problem: str | None, accepted: bool) -> bool:
-    """Say whether both judge alike; the composer keeps to the design page where rcl does not."""
+def agree(problem: str | None, accepted: bool) -> bool:
+    """Return whether both agree; the composer keeps to the design page where rcl does not."""
     return problem in STRICTER or (problem is None) == accepted
 
 
@@ -61,7 +61,7 @@ def accepts(validate: Callable[..., object], *arguments: str) -> bool:
 @example("a" * MAXIMUM_NODE_NAME_LENGTH)
 @example("a" * (MAXIMUM_NODE_NAME_LENGTH + 1))
 def test_node_names(name: str) -> None:
-    assert judged_alike(node_name_problem(name), accepts(validate_node_name, name))
+    assert agree(node_name_problem(name), accepts(validate_node_name, name))
 
 
 @given(st.one_of(NAMES, TOKENS).map(lambda text: "/" + text))
@@ -69,11 +69,11 @@ def test_node_names(name: str) -> None:
 @example("/" + "a" * (MAXIMUM_NAMESPACE_LENGTH - 1))
 @example("/" + "a" * MAXIMUM_NAMESPACE_LENGTH)
 def test_namespaces(name: str) -> None:
-    assert judged_alike(namespace_problem(name), accepts(validate_namespace, name))
+    assert agree(namespace_problem(name), accepts(validate_namespace, name))
 
 
 def full_name(name: str) -> str:
-    """Return what rcl makes of a name in a node, having judged it before and after."""
+    """Return what rcl makes of a name in a node, which it validates before and after."""
     validate_topic_name(name)
     expanded = expand_topic_name(name, "n", "/")
     validate_full_topic_name(expanded)
@@ -85,7 +85,7 @@ def full_name(name: str) -> str:
 @example("/" + "a" * (MAXIMUM_TOPIC_NAME_LENGTH - 1))
 @example("/" + "a" * MAXIMUM_TOPIC_NAME_LENGTH)
 def test_topic_names(name: str) -> None:
-    assert judged_alike(topic_name_problem(name), accepts(full_name, name))
+    assert agree(topic_name_problem(name), accepts(full_name, name))
 
 
 @examples(200)

@@ -73,7 +73,7 @@ def all_profiles() -> Iterator[QosProfile]:
         )
 
 
-def test_every_pair_of_profiles_is_judged_as_rclpy_does() -> None:
+def test_every_pair_of_profiles_is_checked_as_in_rclpy() -> None:
     profiles = [(profile, rclpy_profile(profile)) for profile in all_profiles()]
     wrong = []
     for (offered, offered_ros), (requested, requested_ros) in product(profiles, profiles):

@@ -1,4 +1,4 @@
-"""What is wrong with a text as YAML: every finding, with its place, from either parser."""
+"""Diagnostics of YAML syntax, with their locations, from either parser."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def diagnostics_in(text: str) -> list[Diagnostic]:
     return parse_document(SourceFile("f", text))[1]
 
 
-def told(finding: Diagnostic) -> str:
-    return f"{finding.primary} {finding.message}"
+def located(diagnostic: Diagnostic) -> str:
+    return f"{diagnostic.primary} {diagnostic.message}"
 
 
 @pytest.mark.usefixtures("parser")
@@ -84,16 +84,16 @@ def told(finding: Diagnostic) -> str:
     ],
 )
 def test_syntax(text: str, expected: str, hint: str) -> None:
-    (finding,) = diagnostics_in(text)
-    assert told(finding) == expected
-    assert finding.rule.name == "yaml-syntax"
-    assert hint in str(finding.hint)
+    (diagnostic,) = diagnostics_in(text)
+    assert located(diagnostic) == expected
+    assert diagnostic.rule.name == "yaml-syntax"
+    assert hint in str(diagnostic.hint)
 
 
 @pytest.mark.usefixtures("parser")
 def test_misplaced_line_shows_where_its_map_begins() -> None:
-    (finding,) = diagnostics_in("x: 1\na:\n  b: 1\n c: 2")
-    assert [(str(label.span), label.message) for label in finding.related] == [
+    (diagnostic,) = diagnostics_in("x: 1\na:\n  b: 1\n c: 2")
+    assert [(str(label.span), label.message) for label in diagnostic.related] == [
         ("f:1:1", "the map begins here")
     ]
 
@@ -114,12 +114,12 @@ def test_misplaced_line_shows_where_its_map_begins() -> None:
         ("a: !!python/object:os.system {}", "yaml-tag", "f:1:4 the tag"),
         ("a: 1\nb: 2\na: 3", "duplicate-key", "f:3:1 duplicate key 'a'"),
         ("x: {a: 1, 'a': 3}", "duplicate-key", "f:1:11 duplicate key 'a'"),
-        ("1: x", "key-not-text", "f:1:1 a key must be a string, found the number 1"),
-        ("true: x", "key-not-text", "f:1:1 a key must be a string, found true"),
-        ("x: {null: y}", "key-not-text", "f:1:5 a key must be a string, found nothing"),
-        ("x: {[a]: b}", "key-not-text", "f:1:5 a key must be a string, found a list"),
-        ("x: {{a: 1}: b}", "key-not-text", "f:1:5 a key must be a string, found a map"),
-        ("x: {? : y}", "key-not-text", "f:1:"),  # one parser says 6, the other 7
+        ("1: x", "key-not-string", "f:1:1 a key must be a string, found the number 1"),
+        ("true: x", "key-not-string", "f:1:1 a key must be a string, found true"),
+        ("x: {null: y}", "key-not-string", "f:1:5 a key must be a string, found nothing"),
+        ("x: {[a]: b}", "key-not-string", "f:1:5 a key must be a string, found a list"),
+        ("x: {{a: 1}: b}", "key-not-string", "f:1:5 a key must be a string, found a map"),
+        ("x: {? : y}", "key-not-string", "f:1:"),  # one parser says 6, the other 7
         ("x: {<<: {a: 1}}", "merge-key", "f:1:5 YAML merge keys are not supported"),
         ("a: *x", "bad-alias", "f:1:4 '*x' is an alias, but no value before it is marked"),
         ("a: &x [*x]", "bad-alias", "f:1:8 '*x' is part of the value that it repeats"),
@@ -139,15 +139,15 @@ def test_misplaced_line_shows_where_its_map_begins() -> None:
         ('a: "\\r"', "forbidden-character", "f:1:4 this text contains the character U+000D"),
     ],
 )
-def test_finding(text: str, rule: str, expected: str) -> None:
-    (finding,) = diagnostics_in(text)
-    assert finding.rule.name == rule
-    assert told(finding).startswith(expected)
+def test_diagnostic(text: str, rule: str, expected: str) -> None:
+    (diagnostic,) = diagnostics_in(text)
+    assert diagnostic.rule.name == rule
+    assert located(diagnostic).startswith(expected)
 
 
 def test_second_key_shows_the_first() -> None:
-    (finding,) = diagnostics_in("x:\n  a: 1\n  b: 2\n  a: 3")
-    assert [str(label.span) for label in finding.related] == ["f:2:3"]
+    (diagnostic,) = diagnostics_in("x:\n  a: 1\n  b: 2\n  a: 3")
+    assert [str(label.span) for label in diagnostic.related] == ["f:2:3"]
 
 
 @pytest.mark.parametrize(
@@ -159,7 +159,7 @@ def test_characters_people_write(text: str) -> None:
 
 def test_all_diagnostics_in_one_run() -> None:
     text = "a: .nan\nb: !x 1\nc: 1\nc: 2\n5: x\nd: {<<: 1}\ne: {x}"
-    assert [finding.rule.code for finding in diagnostics_in(text)] == [
+    assert [diagnostic.rule.code for diagnostic in diagnostics_in(text)] == [
         "RC014", "RC010", "RC011", "RC012", "RC013", "RC016",
     ]  # fmt: skip
 
@@ -176,8 +176,8 @@ def test_all_diagnostics_in_one_run() -> None:
         ("a: !x 5", {"a": "5"}),
     ],
 )
-def test_what_is_meant_is_read_beside_the_finding(text: str, value: object) -> None:
-    tree, findings = parse_document(SourceFile("f", text))
-    assert len(findings) == 1
+def test_the_value_is_still_read(text: str, value: object) -> None:
+    tree, diagnostics = parse_document(SourceFile("f", text))
+    assert len(diagnostics) == 1
     assert tree is not None
     assert plain(tree) == value

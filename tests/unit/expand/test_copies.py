@@ -1,4 +1,4 @@
-"""``for_each``: what there is several times, and how much of it there may be."""
+"""``for_each``: copies of nodes, connections and includes, and their limits."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from tests.unit.support.checking import diagnostics_in
 
 
 def expanded(text: str) -> tuple[Mapping, list[Diagnostic]]:
-    tree, findings = parse_document(SourceFile("f", text))
-    assert findings == []
+    tree, diagnostics = parse_document(SourceFile("f", text))
+    assert diagnostics == []
     assert tree is not None
     return expand(tree, {})
 
 
 def nodes(written: str, variables: str = "{}") -> Plain:
-    tree, findings = expanded(f"system: s\nvariables: {variables}\nnodes: {written}")
-    assert [item.message for item in findings if item.rule.name != "unused-variable"] == []
+    tree, diagnostics = expanded(f"system: s\nvariables: {variables}\nnodes: {written}")
+    assert [item.message for item in diagnostics if item.rule.name != "unused-variable"] == []
     found = tree.get("nodes")
     assert found is not None
     return plain(found)
@@ -40,7 +40,7 @@ def nodes(written: str, variables: str = "{}") -> Plain:
         ("{'a_${i}': {for_each: {i: '${many}'}}}", {"a_p": {}, "a_q": {}}),
         ("{'a_${i}': {for_each: {i: '${count}'}}}", {"a_0": {}}),
         ("{'${name}_camera': {}}", {"front_camera": {}}),
-        # a name of its own goes before the file's
+        # a name of its own overrides the file's
         ("{'a_${name}': {for_each: {name: [back]}, x: '${name}'}}", {"a_back": {"x": "back"}}),
         ("{'a_${i}': {for_each: {i: 1}, x: [1, '$${i}']}}", {"a_0": {"x": [1, "${i}"]}}),
     ],
@@ -50,12 +50,12 @@ def test_nodes(written: str, result: Plain) -> None:
 
 
 def test_connections_and_includes() -> None:
-    tree, findings = expanded(
+    tree, diagnostics = expanded(
         "system: s\n"
         "include: [{for_each: {r: [a, b]}, file: '${r}.yaml'}, c.yaml]\n"
         "connections: [{for_each: {r: [a, b]}, topic: '/${r}', from: '${r}.out'}]\n"
     )
-    assert findings == []
+    assert diagnostics == []
     assert plain(tree) == {
         "system": "s",
         "include": [{"file": "a.yaml"}, {"file": "b.yaml"}, "c.yaml"],
@@ -89,11 +89,11 @@ nodes:
     timers: {{tick: {{rate_hz: 1, log: "${{i}} ticks"}}}}
   b: {{lifecycle: {{depends_on: [a_0]}}}}
 """
-    [finding] = diagnostics_in(text, tmp_path)
-    assert (finding.rule.name, str(finding.primary)) == (rule, f"system.yaml:{place}")
+    [diagnostic] = diagnostics_in(text, tmp_path)
+    assert (diagnostic.rule.name, str(diagnostic.primary)) == (rule, f"system.yaml:{place}")
 
 
-def test_what_is_wrong_in_copies_is_told_once(tmp_path: Path) -> None:
+def test_mistakes_in_copies_are_reported_once(tmp_path: Path) -> None:
     text = """\
 system: s
 nodes:
@@ -123,5 +123,7 @@ nodes:
 connections:
   - {topic: /images, from: ["c*_?.image", "*_*.image"], to: viewer.image}
 """
-    [finding] = diagnostics_in(text, tmp_path)  # a star is the only sign that stands for others
-    assert finding.message == "'c*_?.image' names node 'c*_?', which is not a node of this system"
+    [diagnostic] = diagnostics_in(text, tmp_path)  # a star is the only sign that stands for others
+    assert (
+        diagnostic.message == "'c*_?.image' names node 'c*_?', which is not a node of this system"
+    )

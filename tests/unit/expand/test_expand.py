@@ -159,11 +159,11 @@ def test_what_has_no_variables_stays_the_very_same() -> None:
         ),
         (
             system("{a: {b: 1}}", "at ${a}"),
-            "variable-not-text", "f:3:7", "'${a}' is a map", "",
+            "variable-not-string", "f:3:7", "'${a}' is a map", "",
         ),
         (
             system("{a: [1]}", "at ${a}"),
-            "variable-not-text", "f:3:7", "'${a}' is a list", "",
+            "variable-not-string", "f:3:7", "'${a}' is a list", "",
         ),
         (
             system("{a: '${a}'}", "1"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import struct
+from dataclasses import replace
 
 import pytest
 
@@ -65,3 +66,9 @@ def test_where_both_are_missing_one_sentence_says_so(monkeypatch: pytest.MonkeyP
         'a PNG needs Graphviz (apt install graphviz) or pip install "ros2-composer[png]";'
         " -f svg and -f html need neither"
     )
+
+
+def test_text_is_drawn_without_the_fonts_of_the_svg() -> None:
+    pytest.importorskip("resvg_py")
+    graph = fleet_graph(3, View.NODES)
+    assert drawn(replace(graph, title="abcd")) != drawn(replace(graph, title="dcba"))

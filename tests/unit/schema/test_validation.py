@@ -1,4 +1,4 @@
-"""What has the wrong shape: one finding for each mistake, under the very key or value."""
+"""Schema mistakes: one diagnostic each, located at the key or value."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from composer.tree import Mapping
 
 
 def tree_of(text: str) -> Mapping:
-    tree, findings = parse_document(SourceFile("f", dedent(text)))
-    assert findings == []
+    tree, diagnostics = parse_document(SourceFile("f", dedent(text)))
+    assert diagnostics == []
     assert tree is not None
     return tree
 
@@ -25,9 +25,9 @@ def diagnostics_in(text: str) -> list[Diagnostic]:
     return check_schema(tree, str(kind_of(tree)))
 
 
-def marked(finding: Diagnostic) -> str:
-    """Return the text that the finding underlines."""
-    span = finding.primary
+def marked(diagnostic: Diagnostic) -> str:
+    """Return the text that the diagnostic underlines."""
+    span = diagnostic.primary
     return span.file.line(span.line)[span.column - 1 : span.column - 1 + span.length]
 
 
@@ -266,16 +266,16 @@ def profile(text: str) -> str:
         ),
     ],
 )  # fmt: skip
-def test_finding(text: str, rule: str, mark: str, message: str, hint: str) -> None:
-    (finding,) = diagnostics_in(text)
-    assert (finding.rule.name, marked(finding)) == (rule, mark)
-    assert finding.message.startswith(message)
-    assert hint in (finding.hint or "")
+def test_diagnostic(text: str, rule: str, mark: str, message: str, hint: str) -> None:
+    (diagnostic,) = diagnostics_in(text)
+    assert (diagnostic.rule.name, marked(diagnostic)) == (rule, mark)
+    assert diagnostic.message.startswith(message)
+    assert hint in (diagnostic.hint or "")
 
 
 def test_two_keys_that_say_the_same_are_both_shown() -> None:
-    (finding,) = diagnostics_in(timer("{rate_hz: 1, period_ms: 2}"))
-    assert [label.span.column for label in finding.related] == [27]
+    (diagnostic,) = diagnostics_in(timer("{rate_hz: 1, period_ms: 2}"))
+    assert [label.span.column for label in diagnostic.related] == [27]
 
 
 @pytest.mark.parametrize(
@@ -298,7 +298,7 @@ def test_two_keys_that_say_the_same_are_both_shown() -> None:
     ],
 )
 def test_what_is_right(text: str) -> None:
-    assert [finding.message for finding in diagnostics_in(text)] == []
+    assert [diagnostic.message for diagnostic in diagnostics_in(text)] == []
 
 
 @pytest.mark.parametrize(
@@ -317,11 +317,11 @@ def test_what_is_right(text: str) -> None:
     ],
 )  # fmt: skip
 def test_variable_without_value_fits_everywhere(text: str) -> None:
-    assert [finding.message for finding in diagnostics_in(text)] == []
+    assert [diagnostic.message for diagnostic in diagnostics_in(text)] == []
 
 
 def test_all_mistakes_in_one_run() -> None:
-    findings = diagnostics_in(
+    diagnostics = diagnostics_in(
         """
         system: demo
         namspace: /robot
@@ -334,7 +334,7 @@ def test_all_mistakes_in_one_run() -> None:
           - {form: a.b, topic: /b, to: c.d}
         """
     )
-    assert sorted((str(item.primary), item.rule.code) for item in findings) == [
+    assert sorted((str(item.primary), item.rule.code) for item in diagnostics) == [
         ("f:10:6", "RC101"),
         ("f:3:1", "RC101"),
         ("f:5:20", "RC101"),
@@ -363,6 +363,6 @@ def test_kind(text: str, kind: str | None) -> None:
 
 
 def test_long_and_hostile_keys_are_cut_and_escaped() -> None:
-    (finding,) = diagnostics_in(f"system: demo\nnodes: {{a: {{}}}}\n'\xa0{'x' * 900}': 1")
-    assert finding.message.startswith("'\\xa0xxx")
-    assert len(finding.message) < 120
+    (diagnostic,) = diagnostics_in(f"system: demo\nnodes: {{a: {{}}}}\n'\xa0{'x' * 900}': 1")
+    assert diagnostic.message.startswith("'\\xa0xxx")
+    assert len(diagnostic.message) < 120

@@ -1,4 +1,4 @@
-/* In front of rmw: a middleware of a name that nobody knows. */
+/* In front of rmw: a middleware with an unknown name. */
 #include "rmw/rmw.h"
 
 const char * rmw_get_implementation_identifier(void)

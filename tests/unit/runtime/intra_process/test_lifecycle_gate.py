@@ -102,7 +102,7 @@ def test_an_earlier_deadline_is_kept_even_if_a_later_one_was_added_first(
     assert later.done()
 
 
-def test_without_a_limit_there_is_no_timer_and_closing_ends_it(
+def test_a_call_without_a_limit_needs_no_timer_and_ends_on_close(
     clock: Clock, pending: PendingFutures
 ) -> None:
     unlimited, limited = pending.add(Future()), hold(pending, 103.0)
