@@ -22,4 +22,6 @@ def register_profiles() -> None:
 
 def examples(count: int) -> settings:
     """Return the settings for a test that takes ``count`` examples by default."""
-    return settings(max_examples=round(count * _FACTORS[settings.get_current_profile_name()]))
+    return settings(
+        max_examples=round(count * _FACTORS.get(settings.get_current_profile_name(), 1.0))
+    )
