@@ -33,7 +33,7 @@ def environments() -> dict[str, tuple[list[str], list[str]]]:
         "dev": (["ros", "dev", "docs"], build),
         "test": (["test"], build),
         "interfaces": ([], interfaces),
-        "fuzz": ([], ["atheris"]),
+        "fuzz": ([], ["atheris<3.1"]),  # 3.1 has no wheel for Python 3.11
         "tools": ([], ["py-spy", "uv"]),
     }
 
