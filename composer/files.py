@@ -73,18 +73,32 @@ class _Search:
                 (self.files if _is_composer_file(path) else self.foreign)[path] = None
 
     def _yaml_files(self, folder: Path) -> Iterator[Path]:
-        for parent, folders, files in os.walk(folder, onerror=self._note_unreadable):
-            if _FOREIGN_FOLDER_MARKS.isdisjoint(files) or Path(parent) == folder:
-                folders[:] = [name for name in folders if _is_searched(name)]
-                yield from (Path(parent, name) for name in files if _has_suffix(name))
-            else:
-                folders.clear()
+        """Yield the YAML files below ``folder``. Unlike os.walk, this needs no recursion."""
+        pending = [folder]
+        while pending:
+            parent = pending.pop()
+            folders, files = self._list(parent)
+            if _FOREIGN_FOLDER_MARKS.isdisjoint(files) or parent == folder:
+                pending += (parent / name for name in folders if _is_searched(name))
+                yield from (parent / name for name in files if _has_suffix(name))
 
-    def _note_unreadable(self, error: OSError) -> None:
+    def _list(self, folder: Path) -> tuple[list[str], list[str]]:
+        """Return the names of the folders and of the other entries of ``folder``."""
+        folders: list[str] = []
+        others: list[str] = []
+        try:
+            with os.scandir(folder) as entries:
+                for entry in entries:
+                    is_folder = entry.is_dir(follow_symlinks=False)
+                    (folders if is_folder else others).append(entry.name)
+        except OSError as error:
+            self._note_unreadable(folder, error)
+        return folders, others
+
+    def _note_unreadable(self, folder: Path, error: OSError) -> None:
         why = f"this folder cannot be read: {error.strerror}"
-        self.diagnostics.append(
-            Diagnostic(UNREADABLE_FILE, why, Span(SourceFile(str(Path(error.filename))), 1, 1))
-        )
+        span = Span(SourceFile(str(folder)), 1, 1)
+        self.diagnostics.append(Diagnostic(UNREADABLE_FILE, why, span))
 
 
 def _is_searched(folder_name: str) -> bool:

@@ -44,6 +44,10 @@ def _is_unresolved_value(value: Plain) -> bool:
 
 _INTEGERS = (-(2**63), 2**63 - 1)
 _BYTES = (0, 255)
+_LIMITS = {
+    "byte": "0 to 255",
+    **dict.fromkeys(("integer", "double"), "the range of signed 64-bit integers"),
+}
 #: Tolerance for a whole number of steps, in steps.
 _TOLERANCE = 1e-6
 
@@ -71,13 +75,21 @@ def type_problem(value: Plain, kind: str) -> str | None:
     """Describe ``value`` if it does not have the ParameterType ``kind``; None if it has."""
     element = _ELEMENTS.get(ParameterType(kind))
     if element is None:
-        return None if _is_element(value, kind) else describe(value)
+        return None if _is_element(value, kind) else f"{describe(value)}{_limit(value, kind)}"
     if not isinstance(value, list):
         return describe(value)
     for index, item in enumerate(value):
         if not _is_element(item, element):
-            return f"a list with {describe(item)} at index {index}"
+            return f"a list with {describe(item)} at index {index}{_limit(item, element)}"
     return None
+
+
+def _limit(value: Plain, kind: str) -> str:
+    """Return the limit that an integer of the type ``kind`` exceeds, as the end of a message."""
+    limit = _LIMITS.get(kind)
+    if limit is None or not isinstance(value, int) or isinstance(value, bool):
+        return ""
+    return f", which is outside {limit}"
 
 
 def range_problem(parameter: Parameter, value: Plain) -> RangeProblem | None:

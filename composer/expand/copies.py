@@ -21,7 +21,7 @@ from composer.expand import rules
 from composer.expand.references import has_reference
 from composer.expand.scope import Declared
 from composer.expand.substitution import Substitution
-from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
+from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, describe
 
 FOR_EACH = "for_each"
 
@@ -123,6 +123,8 @@ def _key(key: Scalar, copy: Substitution) -> Scalar:
         return key
     name = copy.add(key, _DEPTH).tree
     if not isinstance(name, Scalar):
+        message = f"'{shown(key.value)}' is {describe(name)}, which cannot be the name of a node"
+        copy.diagnostics.append(Diagnostic(rules.NOT_A_TEXT, message, key.span))
         return key
     text = name.value if isinstance(name.value, str) else shown(name.value)
     return Scalar(text, key.span, verbatim=False)

@@ -1,116 +1,103 @@
-"""The table ``[tool.composer]`` of a pyproject.toml, as a located tree.
-
-Python's TOML parser returns no locations. This module finds them in the text: each key after its
-parent, each
-value after its key. The result is right for typical files, and never outside the table.
-"""
+"""The table ``[tool.composer]`` of a pyproject.toml, as a located tree."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from composer.diagnostics import Diagnostic, shown
+from composer.document.limits import MAX_DEPTH, MAX_INTEGER, MIN_INTEGER
+from composer.document.rules import BAD_NUMBER, NESTED_TOO_DEEP
 from composer.project.rules import BAD_SETTING
+from composer.project.toml_places import NestedTooDeep, Path, Places, find_places
 from composer.source import SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 TABLE = "[tool.composer]"
 
+_PATH: Path = ("tool", "composer")
 _HEADER = re.compile(r"^[ \t]*\[[ \t]*tool[ \t]*\.[ \t]*composer[ \t]*[\].]", re.MULTILINE)
-_OTHER_HEADER = re.compile(
-    r"^[ \t]*\[(?![ \t]*tool[ \t]*\.[ \t]*composer[ \t]*[\].])[^\n]*\][ \t]*(#|$)", re.MULTILINE
-)
-_PLACE = re.compile(r"\(at line (\d+), column (\d+)\)$")
+_LINE_AND_COLUMN = re.compile(r"\(at line (\d+), column (\d+)\)$")
+_LONG_NUMBER = re.compile(r"[0-9](?:_?[0-9]){4299,}")
 
 
 def read_table(source: SourceFile) -> tuple[Mapping | None, list[Diagnostic]] | None:
-    """Return the table and its TOML errors, or None if there is no such table."""
-    header = _HEADER.search(source.text)
-    if header is None:
+    """Return the table and the errors of its TOML, or None if there is no such table."""
+    if "composer" not in source.text:
         return None
     import tomllib  # noqa: PLC0415 - most projects have no such table
 
     try:
-        table = tomllib.loads(source.text)["tool"]["composer"]
+        places = find_places(source, _PATH)
+        content = tomllib.loads(source.text)
     except tomllib.TOMLDecodeError as error:
-        return None, [_syntax(source, str(error))]
-    except (
-        KeyError,
-        TypeError,
-        RecursionError,
-    ):  # the header is in a multi-line text, or nested too deep
+        # Errors in a file that only mentions the composer are for the tools that read it.
+        return (None, [_syntax(source, str(error))]) if _HEADER.search(source.text) else None
+    except ValueError:  # int() refuses thousands of digits
+        return None, [_long_number(source)]
+    except (NestedTooDeep, RecursionError) as problem:
+        span = problem.span if isinstance(problem, NestedTooDeep) else Span(source, 1, 1)
+        message = f"tables and arrays are nested more than {MAX_DEPTH} levels deep"
+        return None, [Diagnostic(NESTED_TOO_DEEP, message, span)]
+    tool = content.get("tool")
+    if not isinstance(tool, dict) or "composer" not in tool:
         return None
-    other = _OTHER_HEADER.search(source.text, header.end())
-    region = _Region(source, header.start(), len(source.text) if other is None else other.start())
-    start = region.span(header.start(), len(TABLE))
-    return _mapping(table, region, start), []
+    return _Builder(places).table(tool["composer"])
 
 
 def _syntax(source: SourceFile, message: str) -> Diagnostic:
-    place = _PLACE.search(message)
+    place = _LINE_AND_COLUMN.search(message)
     span = Span(source, int(place[1]), int(place[2])) if place else Span(source, 1, 1)
-    reason = shown(_PLACE.sub("", message).strip())
+    reason = shown(_LINE_AND_COLUMN.sub("", message).strip())
     return Diagnostic(BAD_SETTING, f"this is not TOML: {reason}", span)
 
 
+def _long_number(source: SourceFile) -> Diagnostic:
+    number = _LONG_NUMBER.search(source.text)
+    line = source.text.count("\n", 0, number.start()) + 1 if number is not None else 1
+    return Diagnostic(BAD_NUMBER, "this number does not fit into 64 bits", Span(source, line, 1))
+
+
 @dataclass(slots=True)
-class _Region:
-    """The part of a text that is searched; its start moves behind each match."""
+class _Builder:
+    """Builds the tree of the table, and reports what TOML allows and the settings do not."""
 
-    source: SourceFile
-    start: int
-    end: int
+    places: Places
+    diagnostics: list[Diagnostic] = field(default_factory=list)
 
-    def span(self, offset: int, length: int) -> Span:
-        """Return the span of ``length`` characters at ``offset``."""
-        before = self.source.text[:offset]
-        column = offset - (before.rfind("\n") + 1)
-        return Span(self.source, before.count("\n") + 1, column + 1, max(length, 1))
+    def table(self, table: Any) -> tuple[Mapping | None, list[Diagnostic]]:
+        """Return the tree of the table and the diagnostics."""
+        start = self.places.key(_PATH) or Span(self.places.source, 1, 1)
+        if not isinstance(table, dict):
+            message = "'tool.composer' must be a table"
+            hint = f"write the settings below the line {TABLE}"
+            return None, [Diagnostic(BAD_SETTING, message, start, hint=hint)]
+        return self._mapping(table, _PATH, start), self.diagnostics
 
-    def find(self, pattern: str) -> re.Match[str] | None:
-        """Return the first match, and continue after it next time."""
-        match = re.compile(pattern).search(self.source.text, self.start, self.end)
-        if match is not None:
-            self.start = match.end()
-        return match
+    def _mapping(self, table: dict[str, Any], path: Path, span: Span) -> Mapping:
+        entries = []
+        for name, value in table.items():
+            inner = (*path, name)
+            key = Scalar(name, self.places.key(inner) or span)
+            entries.append(Entry(key, self._tree(value, inner, key.span)))
+        return Mapping(tuple(entries), span)
 
-    def rest(self) -> _Region:
-        """Return a copy of the remaining region."""
-        return _Region(self.source, self.start, self.end)
-
-
-def _mapping(table: dict[str, Any], region: _Region, span: Span) -> Mapping:
-    return Mapping(tuple(_entries(table, region, span)), span)
-
-
-def _entries(table: dict[str, Any], region: _Region, fallback: Span) -> Iterator[Entry]:
-    for name, value in table.items():
-        within = region.rest()
-        match = within.find(rf"(?<![\w\"'-])[\"']?(?P<key>{re.escape(name)})[\"']?\s*[=.\]]")
-        span = within.span(match.start("key"), len(name)) if match is not None else fallback
-        key = Scalar(name, span)
-        yield Entry(key, _tree(value, within, span))
-
-
-def _tree(value: Any, region: _Region, fallback: Span) -> Tree:
-    match value:
-        case dict():
-            return _mapping(value, region, fallback)
-        case list():
-            return Sequence(tuple(_tree(item, region, fallback) for item in value), fallback)
-        case bool():
-            return Scalar(value, _place(region, "true" if value else "false", fallback))
-        case str():
-            return Scalar(value, _place(region, rf"[\"']{re.escape(value)}[\"']", fallback))
-        case int() | float():
-            return Scalar(value, _place(region, r"[-+\w.]+", fallback))
-        case _:
-            return Scalar(str(value), fallback)
-
-
-def _place(region: _Region, pattern: str, fallback: Span) -> Span:
-    match = region.find(pattern)
-    return fallback if match is None else region.span(match.start(), len(match[0]))
+    def _tree(self, value: Any, path: Path, fallback: Span) -> Tree:
+        span = self.places.value(path) or fallback
+        match value:
+            case dict():
+                return self._mapping(value, path, span)
+            case list():
+                items = (self._tree(item, (*path, i), span) for i, item in enumerate(value))
+                return Sequence(tuple(items), span)
+            case bool() | str() | float():
+                return Scalar(value, span)
+            case int() if MIN_INTEGER <= value <= MAX_INTEGER:
+                return Scalar(value, span)
+            case int():
+                message = "this number does not fit into 64 bits"
+                self.diagnostics.append(Diagnostic(BAD_NUMBER, message, span))
+                return Scalar(1, span)
+            case _:  # a date or a time
+                return Scalar(str(value), span)

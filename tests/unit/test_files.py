@@ -97,3 +97,12 @@ def test_pipes_and_sockets_are_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.yaml")
     (tmp_path / "folder.yaml").mkdir()
     assert find_files([tmp_path]).files == ()
+
+
+def test_folders_are_searched_at_any_depth(tmp_path: Path) -> None:
+    folder = tmp_path
+    for _ in range(1000):
+        folder /= "d"
+        folder.mkdir()
+    (folder / "a.yaml").write_text("system: a\n")
+    assert find_files([tmp_path]).files == (folder / "a.yaml",)

@@ -11,7 +11,7 @@ def node_vertex(node: SceneNode, name: str, note: str, cluster: str) -> Vertex:
     return Vertex(
         key=node_key(node),
         kind=VertexKind.NODE,
-        lines=tuple(filter(None, (name, note))),
+        lines=(name, note) if note else (name,),
         cluster=cluster,
         namespace=node.namespace,
         details=node.details,

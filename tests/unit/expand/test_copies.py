@@ -127,3 +127,21 @@ connections:
     assert (
         diagnostic.message == "'c*_?.image' names node 'c*_?', which is not a node of this system"
     )
+
+
+@pytest.mark.parametrize(
+    ("value", "kind"), [("{b: c}", "a map"), ("[]", "a list")], ids=["map", "list"]
+)
+def test_a_map_or_list_is_not_a_name(tmp_path: Path, value: str, kind: str) -> None:
+    text = f"""\
+system: s
+variables: {{a: {value}}}
+nodes:
+  ${{a}}: {{on_activate: {{log: started}}}}
+"""
+    [diagnostic] = diagnostics_in(text, tmp_path)
+    assert (diagnostic.rule.name, str(diagnostic.primary)) == (
+        "variable-not-string",
+        "system.yaml:4:3",
+    )
+    assert diagnostic.message == f"'${{a}}' is {kind}, which cannot be the name of a node"

@@ -3,8 +3,11 @@ from __future__ import annotations
 from pathlib import Path
 from textwrap import dedent
 
+import pytest
+
 from composer.graph import View, build_graph, scene_of
 from composer.graph.diagram import Graph
+from composer.graph.output import Engine, Format, render
 from composer.loading import load_bytes
 from tests.unit.support.resolving import system_of
 
@@ -148,3 +151,10 @@ def test_the_position_of_a_diagnostic_is_marked() -> None:
     wrong = {edge.target: edge.wrong for edge in graph.edges}
     assert "reliab" in wrong["node:/strict"]
     assert {vertex.key for vertex in graph.vertices if vertex.wrong} == {"node:/lost"}
+
+
+@pytest.mark.parametrize("view", View)
+def test_a_node_without_a_name_is_drawn(view: View) -> None:
+    text = 'system: a\nnodes: {"": {publishers: {"": {type: std_msgs/msg/String}}}}\n'
+    picture = render([drawn(text, view)], Format.SVG, Engine.BUNDLED)
+    assert picture.startswith(b"<svg")

@@ -196,3 +196,71 @@ def test_rules_are_ignored_selected_and_weighed_but_errors_stay(tmp_path: Path) 
     assert found("severity: {qos-implicit: error}\nignore: [RC3]") == [("qos-implicit", "error")]
     broken = TALKER.replace("String", "Strin")
     assert ("unknown-interface", "error") in found("select: [RC5]\nignore: [RC3]", broken)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "message"),
+    [
+        ("strict = " + "1" * 5000, 2, "this number does not fit into 64 bits"),
+        ("strict = 0x" + "f" * 5000, 2, "this number does not fit into 64 bits"),
+        (".".join("a" * 700) + " = 1", 2, "tables and arrays are nested more than 32 levels deep"),
+        (f"a = {'[' * 700}{']' * 700}", 2, "tables and arrays are nested more than 32 levels deep"),
+        (f"a = {'[' * 200_000}", 2, "tables and arrays are nested more than 32 levels deep"),
+        ("[tool.composer." + ".".join("a" * 700) + "]", 2, "tables and arrays are nested more"),
+        ("strict = " + '\\"' * 400_000, 2, "this is not TOML: Invalid value"),
+        ('"\\z" = 1', 2, "this is not TOML: Unescaped"),
+    ],
+    ids=["digits", "hexadecimal", "dotted", "arrays", "open", "header", "quotes", "escape"],
+)
+def test_toml_beyond_limits_is_a_diagnostic(
+    tmp_path: Path, text: str, line: int, message: str
+) -> None:
+    (tmp_path / "pyproject.toml").write_text(f"[tool.composer]\n{text}\n")
+    diagnostic = Project.at(tmp_path).diagnostics[0]
+    assert diagnostic.message.startswith(message)
+    assert diagnostic.primary.line == line
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("[tool]\ncomposer = 3\n", (2, 1)),
+        ("tool.composer = 'strict'\n", (1, 6)),
+        ("x = '''\n[tool.composer]\n'''\n[[tool.composer]]\nstrict = true\n", (4, 8)),
+    ],
+)
+def test_a_setting_in_place_of_the_table_is_a_diagnostic(
+    tmp_path: Path, text: str, place: tuple[int, int]
+) -> None:
+    (tmp_path / "pyproject.toml").write_text(text)
+    assert reported(Project.at(tmp_path).diagnostics) == [
+        (*place, "'tool.composer' must be a table")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("[tool]\ncomposer = {strict = true, ignore = ['RC9x']}\n", (2, 38)),
+        ('tool.composer.ignore = ["qos-implicit", "RC9x"]\n', (1, 41)),
+        ("[ 'tool' . \"composer\" ] # 'a\n\"ign\\u006fre\" = [\n# ]\n 'RC9x' ]\n", (4, 2)),
+        ("a = '''\n[tool.composer]\n\"\"\"'''\n[tool.composer]\nignore = ['RC9x']\n", (5, 11)),
+        ("[[a]]\nb = 1.5e3\nc = 07:32:00\n[tool.composer]\nignore=['RC9x',]\n", (5, 9)),
+    ],
+)
+def test_the_table_may_be_written_in_any_way(
+    tmp_path: Path, text: str, place: tuple[int, int]
+) -> None:
+    (tmp_path / "pyproject.toml").write_text(text)
+    (tmp_path / "a.yaml").write_text("system: a\nnodes: {one: {on_activate: {log: hi}}}\n")
+    found = load(tmp_path / "a.yaml").diagnostics
+    assert reported(found) == [(*place, "there is no rule 'RC9x'")]
+
+
+def test_keys_are_found_below_their_own_table(tmp_path: Path) -> None:
+    (tmp_path / "pyproject.toml").write_text(
+        "[[tool.composer.odd]]\na = {strict = 1}\n[[tool.composer.odd]]\nstrict = 1\n"
+        "[tool.composer.odd.more]\nnodes = 1\n[tool.composer]\nstrict = 1\n"
+    )
+    found = [item for item in Project.at(tmp_path).diagnostics if "'strict'" in item.message]
+    assert [str(item.primary).rpartition(".toml:")[2] for item in found] == ["8:10"]

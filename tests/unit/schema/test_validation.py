@@ -57,6 +57,7 @@ def profile(text: str) -> str:
         # the file
         ("system: demo", "missing-key", "system", "a system needs 'nodes' or 'in", "nodes: {"),
         ("system: demo\nnodes: {}", "nothing-there", "nodes", "'nodes' is empty", "at least one"),
+        ("system: demo\ninclude: []", "nothing-there", "include", "'include' is empty", "at least"),
         (
             "system: 5\nnodes: {robot: {}}",
             "wrong-type", "5", "expected a string for 'system', found the number 5", "quote it",
