@@ -51,6 +51,7 @@ class PublisherPort:
     def activate(self) -> None:
         """Warn again at the next message that is dropped."""
         self._warned = False
+        self._qos_events.activate()
 
     def deactivate(self) -> None:
         """Do nothing: no message waits in a publisher."""

@@ -10,6 +10,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import partial
+from math import inf
+from time import monotonic
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
@@ -46,12 +48,14 @@ class _EventKind:
     """A kind of event, how it is counted, and what is logged.
 
     ``count`` returns the number of events from a status. Without it, each signal is one event.
+    ``period_s`` is how long the port was silent before an event.
     """
 
     name: str
     kind: IntEnum
     text: str
     count: Callable[[Any], int] | None = None
+    period_s: float = 0.0
 
 
 class QosEvents:
@@ -62,7 +66,9 @@ class QosEvents:
     which has their number and distinguishes a loss from a recovery. Matches are not watched here:
     in-process delivery does (``MatchListener``), and rmw has one callback per kind of event.
 
-    Events are ignored while the node is not active.
+    Events are ignored while the node is not active. The middleware does not know lifecycle states:
+    it measures a deadline or a lease from the last message, even if that was sent before the node
+    was deactivated. So an event also counts only if the node was active for the whole period.
     """
 
     def __init__(self, context: NodeContext, port: Port) -> None:
@@ -71,6 +77,7 @@ class QosEvents:
         self._incompatible = IncompatibleQos(context, port)
         self._warnings: dict[str, RepeatedWarning] = {}
         self._stop_watching: list[Callable[[], None]] = []
+        self._active_since_s = inf  # time.monotonic
 
     def create_event_handlers(
         self, _callback_group: CallbackGroup, endpoint: Any, _topic_name: str
@@ -84,6 +91,10 @@ class QosEvents:
             with suppress(UnsupportedEventTypeError):
                 self._watch(endpoint, event)
         return []
+
+    def activate(self) -> None:
+        """Count events from now on, and those that take a period after that period."""
+        self._active_since_s = monotonic()
 
     def close(self) -> None:
         """Stop watching. Call it before the endpoint is destroyed."""
@@ -100,6 +111,7 @@ class QosEvents:
                 "deadline_missed",
                 _PUBLISHER.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED,
                 f"nothing was published within its deadline of {profile.deadline_ms:g} ms",
+                period_s=profile.deadline_ms / 1000.0,
             )
         lease_ms = profile.liveliness_lease_duration_ms
         if lease_ms is not None:
@@ -107,6 +119,7 @@ class QosEvents:
                 "liveliness_lost",
                 _PUBLISHER.RCL_PUBLISHER_LIVELINESS_LOST,
                 f"it did not assert its liveliness within its lease of {lease_ms:g} ms",
+                period_s=lease_ms / 1000.0,
             )
 
     def _subscription_events(self) -> Iterator[_EventKind]:
@@ -116,6 +129,7 @@ class QosEvents:
                 "deadline_missed",
                 _SUBSCRIPTION.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED,
                 f"nothing was received within its deadline of {profile.deadline_ms:g} ms",
+                period_s=profile.deadline_ms / 1000.0,
             )
         lease_ms = profile.liveliness_lease_duration_ms
         if lease_ms is not None:
@@ -142,7 +156,8 @@ class QosEvents:
         name = f"{self._port.kind} '{self._port.name}' on {self._port.full_name}"
 
         def on_events(number: int) -> None:
-            context.loop.call_soon(partial(self._on_events, event.name, number))
+            began_s = monotonic() - event.period_s
+            context.loop.call_soon(partial(self._on_events, event.name, number, began_s))
 
         count = event.count
         if count is None:
@@ -156,8 +171,9 @@ class QosEvents:
             context.log, context.loop, lambda: f"{name}: {event.text}{self._publishers()}"
         )
 
-    def _on_events(self, event: str, number: int) -> None:
-        if number > 0 and self._context.gate.incoming:
+    def _on_events(self, event: str, number: int, began_s: float) -> None:
+        is_active = self._context.gate.incoming and began_s >= self._active_since_s
+        if number > 0 and is_active:
             self._context.statistics.qos_events[event] += number
             self._warnings[event].on_events(number)
 

@@ -89,6 +89,7 @@ class SubscriptionPort:
     def activate(self) -> None:
         """Handle the messages that were latched meanwhile."""
         self._mailbox.restart()
+        self._qos_events.activate()
         since_s = monotonic() - self._lifespan_s
         while self._latched:
             received_s, message = self._latched.popleft()

@@ -92,6 +92,19 @@ def test_an_inactive_publisher_misses_no_deadline(tmp_path: Path, peer: Peer) ->
         assert counts(system, "talker") == before  # an inactive node must be silent
 
 
+def test_the_time_before_an_activation_does_not_count(tmp_path: Path, peer: Peer) -> None:
+    with running(TIMED.format(kind="events", deadline_ms=600), tmp_path) as system:
+        assert peer.set_parameter("/talker", "period_ms", 350.0) == ""
+        wait_until(lambda: lines(system, "got a message"))
+        assert peer.change("/talker", "deactivate")
+        over_s = time.monotonic() + 0.4
+        wait_until(lambda: time.monotonic() > over_s, "most of the deadline")
+        before, received = counts(system, "talker"), len(lines(system, "got a message"))
+        assert peer.change("/talker", "activate")
+        wait_until(lambda: len(lines(system, "got a message")) > received)
+        assert counts(system, "talker") == before
+
+
 def test_a_kept_deadline_is_not_reported(tmp_path: Path) -> None:
     with running(TIMED.format(kind="events", deadline_ms=60_000), tmp_path) as system:
         over_s = time.monotonic() + 1.0
