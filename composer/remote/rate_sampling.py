@@ -14,7 +14,7 @@ from typing import Any, Self
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from composer.remote.topics import strictest_compatible_qos
+from composer.remote.topics import measuring_qos
 from composer.remote.values import InvalidValueError, class_of
 from composer.runtime.ros.endpoints import topic_info
 from composer.runtime.ros.qos_profiles import rclpy_profile
@@ -64,7 +64,7 @@ class RateMeter:
             message_type = class_of(types[0])
         except InvalidValueError:  # not installed, so it cannot be counted
             return None
-        profile = strictest_compatible_qos([publisher.qos for publisher in publishers], _DEPTH)
+        profile = measuring_qos([publisher.qos for publisher in publishers], _DEPTH)
         return self._node.create_subscription(
             message_type, topic, _ignore, rclpy_profile(profile), raw=True
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 from rclpy.duration import Duration
@@ -72,10 +72,15 @@ class Topics:
 
     def compatible_qos(self, name: str) -> QosProfile:
         """Return the strictest profile that all publishers of a topic satisfy."""
+        return strictest_compatible_qos(self._offers(name), _SUBSCRIPTION_DEPTH)
+
+    def measuring_qos(self, name: str) -> QosProfile:
+        """Return such a profile with which no messages from before the subscription arrive."""
+        return measuring_qos(self._offers(name), _SUBSCRIPTION_DEPTH)
+
+    def _offers(self, name: str) -> list[QosProfile]:
         publishers = topic_info(self._session.node, name, ()).publishers
-        return strictest_compatible_qos(
-            [publisher.qos for publisher in publishers], depth=_SUBSCRIPTION_DEPTH
-        )
+        return [publisher.qos for publisher in publishers]
 
 
 class TopicSubscription:
@@ -130,6 +135,14 @@ def strictest_compatible_qos(offers: list[QosProfile], depth: int) -> QosProfile
         reliability=Reliability.RELIABLE if offers and reliable else Reliability.BEST_EFFORT,
         durability=Durability.TRANSIENT_LOCAL if offers and transient else Durability.VOLATILE,
     )
+
+
+def measuring_qos(offers: list[QosProfile], depth: int) -> QosProfile:
+    """Return the strictest compatible profile for measurements: latched messages do not arrive.
+
+    They would arrive at once, whenever they were published.
+    """
+    return replace(strictest_compatible_qos(offers, depth), durability=Durability.VOLATILE)
 
 
 def publish(session: Session, deadline: Deadline, publication: Publication) -> Iterator[Any]:

@@ -15,6 +15,7 @@ EXPECTED = (
     "node:/other/arm",
     "2 nodes have this name",
     "publisher:/perception/sensor_simulator./sensor_data",
+    "publisher:/other/arm./arms",
     "client:/control/motor_controller./plan_trajectory",
     "action_server:/control/motor_controller./navigate",
 )
@@ -98,6 +99,10 @@ def test_rates_are_measured(live: dict[str, Any]) -> None:
         live = drawn()
     assert found["details"]["rate_hz"] == expected
     assert found["label"][0].endswith(" Hz")
+
+
+def test_latched_messages_from_before_are_not_measured(live: dict[str, Any]) -> None:
+    assert "rate_hz" not in edges(live)["publisher:/other/arm./arms"]["details"]
 
 
 def test_endpoints_for_tools_are_left_out(live: dict[str, Any]) -> None:

@@ -185,7 +185,7 @@ def _measure(topic: str, measurement: _Measurement, qos: QosOptions, limits: _Li
         topics = Topics(session, deadline)
         name = full_name("topic", topic)
         type_name = topics.type_of(name)
-        profile = qos.applied_to(topics.compatible_qos(name))
+        profile = qos.applied_to(topics.measuring_qos(name))
         received = reported = 0
         with TopicSubscription(
             session, name, type_name, profile, raw=measurement.raw
