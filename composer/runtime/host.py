@@ -24,6 +24,7 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import rclpy
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -35,6 +36,7 @@ from composer.model.dependencies import dependency_edges, in_dependency_order
 from composer.names import join
 from composer.plan import Fault, Plan
 from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
+from composer.runtime.manager.other_instances import Instance
 from composer.runtime.node.node import NodeListener, RunningNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import StartRefused
@@ -163,11 +165,12 @@ class Host:
     def _run(self, namespace: str) -> None:
         callbacks = ManagerCallbacks(
             on_command=self._on_command,
-            on_other_instance=lambda host, pid: self._on_other_instance(namespace, host, pid),
+            on_older_instance=partial(self._on_older_instance, namespace),
             update_status=self._update_status,
             callbacks=self._node_set.callbacks,
             chains=self._node_set.chains,
             nodes=lambda: {node.full_name: node for node in tuple(self._node_set.nodes.values())},
+            write_log=self._reporter.log,
         )
         use_sim_time = self._system.use_sim_time
         manager = ManagerNode(namespace, self._status, callbacks, use_sim_time=use_sim_time)
@@ -262,9 +265,9 @@ class Host:
         else:
             self._main_queue.put(command)
 
-    def _on_other_instance(self, namespace: str, host: str, pid: str) -> None:
+    def _on_older_instance(self, namespace: str, instance: Instance) -> None:
         if not self._main_queue.stopping:
-            self._fail(str(already_running(namespace, host, pid)))
+            self._fail(str(already_running(namespace, instance.host, instance.pid)))
 
     def _update_status(self) -> None:
         nodes = tuple(self._node_set.nodes.items())

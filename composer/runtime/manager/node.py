@@ -27,12 +27,15 @@ from rclpy.qos import QoSProfile
 from rclpy.time_source import USE_SIM_TIME_NAME
 from std_srvs.srv import Trigger
 
+from composer.model import LogLevel
+from composer.runtime.callbacks.log import Log, Write
 from composer.runtime.clock.clock import NodeTime
 from composer.runtime.clock.sim_time import SimTimeSource
 from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.factory import log_exception
-from composer.runtime.executors.loop import Reply, Taken, unused_callback
+from composer.runtime.executors.loop import Reply, unused_callback
+from composer.runtime.manager.other_instances import Instance, OtherInstances
 from composer.runtime.manager.proxy_services import ProxyServices
 from composer.runtime.manager.status_messages import status_message
 from composer.runtime.metrics.diagnostics import Figures, to_message
@@ -53,31 +56,29 @@ from composer.runtime.supervision.status import Status
 COMMANDS = ("startup", "pause", "resume", "reset", "shutdown")
 _DIAGNOSTICS = "/diagnostics"
 _PERIOD_S = 1.0
-_OWN_SUBSCRIPTIONS = 1  # for other instances of the system
 #: Changes within this time, as in a bring-up, become one message.
 _BATCH_S = 0.05
 _ENDS_WITHIN_S = 0.2
 _RESPONSES_ARRIVE_WITHIN_S = 0.15
-#: If two instances started within this time, the order of host names and process ids decides.
-_SAME_START_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class ManagerCallbacks:
     """What a manager node calls, on its loop.
 
-    ``on_command(command)`` receives the commands; ``on_other_instance(host, pid)`` is called if
-    another process has run the same system for longer; ``update_status()`` updates rates and
+    ``on_command(command)`` receives the commands; ``on_older_instance(instance)`` is called while
+    the system starts if another process runs it already; ``update_status()`` updates rates and
     states; ``callbacks()`` and ``chains()`` return timings; ``nodes()`` returns the nodes by their
-    full names.
+    full names; ``write_log`` receives the lines of the manager's log.
     """
 
     on_command: Callable[[Command], None]
-    on_other_instance: Callable[[str, str], None]
+    on_older_instance: Callable[[Instance], None]
     update_status: Callable[[], None]
     callbacks: Callable[[], tuple[CallbackFigures, ...]]
     chains: Callable[[], tuple[ChainFigures, ...]]
     nodes: Callable[[], Mapping[str, RunningNode]]
+    write_log: Write
 
 
 class ManagerNode:
@@ -98,7 +99,6 @@ class ManagerNode:
         self._status = status
         self._host = host
         self._started_s = time.monotonic()
-        self._other_instances: set[tuple[str, str]] = set()
         self._loop = EventLoop(NAME, log_exception)
         self._publish_due = threading.Lock()  # held while a message with changes is due
         self._node = Node(
@@ -109,6 +109,7 @@ class ManagerNode:
             start_parameter_services=False,
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
+        self._log = Log(self._node, LogLevel.INFO, host.write_log)
         simulated_time = SimTimeSource(self._node, self._loop)
         self.process_context = ProcessContext(simulated_time, EventCounts(self._loop))
         self._clock = NodeTime(self._node, self._loop, simulated_time)
@@ -121,10 +122,13 @@ class ManagerNode:
         for command in COMMANDS:
             self._add_service(command, partial(self._on_command, command))
         self._add_service(IS_ACTIVE, self._on_is_active)
-        instances = self._node.create_subscription(
-            DiagnosticArray, f"~/{STATE_TOPIC}", self._on_state, STATE_QOS
+        self._instances = OtherInstances(
+            self._node,
+            self._loop,
+            self._instance,
+            on_older=host.on_older_instance,
+            on_permanent=self._warn_of_instance,
         )
-        self._loop.add_subscription(instances, self._on_state)
         if any(node.left_to_manager for node in status.snapshot().nodes):
             ProxyServices(self._node, self._loop, host.nodes, self._publish)
         self._loop.start()
@@ -181,8 +185,8 @@ class ManagerNode:
 
     def _tick(self) -> None:
         self._host.update_status()
-        is_external = self._state.get_subscription_count() > _OWN_SUBSCRIPTIONS
-        if is_external or self._diagnostics.get_subscription_count():
+        self._instances.check()
+        if self._state.get_subscription_count() or self._diagnostics.get_subscription_count():
             self._publish()
         if self._callbacks.get_subscription_count():
             self._publish_callbacks()
@@ -204,21 +208,15 @@ class ManagerNode:
         self._publish_due.release()
         self._publish()
 
-    def _on_state(self, taken: Taken) -> None:
-        """Check whether another process has run the same system for longer."""
-        message: DiagnosticArray = taken[0]
-        values = {item.key: item.value for item in message.status[0].values}
-        other = (values["host"], values["pid"])
+    def _instance(self) -> Instance:
         status = self._status.without_nodes
-        own = (status.host, str(status.pid))
-        if other == own:
-            return
-        if other not in self._other_instances:
-            self._other_instances.add(other)  # its first message is latched, of unknown age
-            return
-        lead_s = float(values["uptime"]) - self._uptime_s
-        if lead_s > _SAME_START_S or (abs(lead_s) <= _SAME_START_S and other < own):
-            self._host.on_other_instance(*other)
+        return Instance(status.host, status.pid, self._uptime_s)
+
+    def _warn_of_instance(self, other: Instance) -> None:
+        self._log.warn(
+            f"this system also runs on host {other.host}, process {other.pid}: their nodes have the"
+            " same names and topics; stop one of them"
+        )
 
     @property
     def _uptime_s(self) -> float:

@@ -1,7 +1,7 @@
 """The instance lock: one process per system and ROS domain.
 
 On one host, a lock file ensures that before anything starts. Processes on other hosts are detected
-by the manager node (:mod:`composer.runtime.manager.node`).
+by the manager node (:mod:`composer.runtime.manager.other_instances`).
 """
 
 from __future__ import annotations

@@ -12,6 +12,8 @@ NAME = "manager"
 #: Services: std_srvs/srv/Trigger; ChangeState for nodes without lifecycle services.
 IS_ACTIVE = "is_active"
 CHANGE_STATE = "change_state"
+#: A hidden service of each manager, with a unique name: see ``manager/other_instances.py``.
+INSTANCE_PREFIX = "_instance_"
 
 STATE_TOPIC = "state"
 #: Transient local: a late joiner gets the last message at once.

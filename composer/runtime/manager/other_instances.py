@@ -1,0 +1,195 @@
+"""Detects other processes that run the same system, on hosts that do not share the instance lock.
+
+Each manager node has a hidden service with a unique name, which responds with its host, process
+and uptime. Only such a response counts, never a message on a topic: any node can publish or replay
+one. The system that started later is refused, within its first seconds; a system that has run for
+longer reports the other one and continues.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+from uuid import uuid4
+
+from rclpy.client import Client
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from composer.runtime.executors.event_loop import EventLoop
+from composer.runtime.executors.loop import Reply, unused_callback
+from composer.runtime.ros.manager_protocol import INSTANCE_PREFIX, IS_ACTIVE
+
+#: Discovery of another participant takes up to three seconds; later, this system is not refused.
+START_S = 5.0
+_CHECK_PERIOD_S = 0.2
+_RESPONSE_WITHIN_S = 2.0
+#: The number of services that are called at the same time: other nodes cannot cause more.
+_MAX_CALLS = 4
+#: If two instances started within this time, the order of host names and process ids decides.
+_SAME_START_S = 0.1
+_HOST = re.compile(r"[\w.-]{1,253}", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class Instance:
+    """A process that runs the system, for ``uptime_s`` seconds."""
+
+    host: str
+    pid: int
+    uptime_s: float
+
+    @property
+    def text(self) -> str:
+        """The response of its service."""
+        return json.dumps(asdict(self))
+
+    def is_older_than(self, other: Instance) -> bool:
+        """Return whether it started before ``other``.
+
+        Not by the time of day, which may differ between hosts.
+        """
+        lead_s = self.uptime_s - other.uptime_s
+        if abs(lead_s) <= _SAME_START_S:
+            return (self.host, self.pid) < (other.host, other.pid)
+        return lead_s > 0.0
+
+
+def parse_instance(text: str) -> Instance | None:
+    """Return the instance that a response describes, None for anything else."""
+    try:
+        content = json.loads(text)
+        host, pid, uptime_s = content["host"], int(content["pid"]), float(content["uptime_s"])
+        is_valid = _HOST.fullmatch(host) is not None and math.isfinite(uptime_s)
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
+        return None
+    return Instance(host, pid, uptime_s) if is_valid else None
+
+
+class OtherInstances:
+    """The service that identifies this instance, and calls to those of others."""
+
+    def __init__(
+        self,
+        node: Node,
+        loop: EventLoop,
+        own: Callable[[], Instance],
+        *,
+        on_older: Callable[[Instance], None],
+        on_permanent: Callable[[Instance], None],
+    ) -> None:
+        """Add the service to the manager node, which ``loop`` serves, and start to check.
+
+        ``on_older(instance)`` is called while this system starts, for an instance that started
+        before; ``on_permanent(instance)`` once for each instance that has passed that time.
+        """
+        self._node = node
+        self._loop = loop
+        self._own = own
+        self._on_older = on_older
+        self._on_permanent = on_permanent
+        self._name = node.resolve_service_name(f"~/{INSTANCE_PREFIX}{uuid4().hex}")
+        self._known_name = node.resolve_service_name(f"~/{IS_ACTIVE}")
+        self._prefix = node.resolve_service_name(f"~/{INSTANCE_PREFIX}")
+        self._calls: dict[str, _Call] = {}
+        self._reported: set[str] = set()  # the services of instances that were reported
+        self._add_service()
+        self._loop.call_later(_CHECK_PERIOD_S, self._check_start)
+
+    def check(self) -> None:
+        """Look for other instances, and ask those that are not known."""
+        self._end_calls()
+        # Every manager has this service, and counting is cheaper than listing all services.
+        if self._node.count_services(self._known_name) <= 1:
+            return
+        found = {
+            name
+            for name, _ in self._node.get_service_names_and_types()
+            if name.startswith(self._prefix) and name != self._name
+        }
+        self._reported &= found
+        for name in sorted(found - self._reported - self._calls.keys()):
+            if len(self._calls) < _MAX_CALLS:
+                self._calls[name] = _Call(self._node, self._loop, name, self._on_response)
+
+    def _add_service(self) -> None:
+        service = self._node.create_service(Trigger, self._name, unused_callback)
+        self._loop.add_service(service, self._respond)
+
+    def _respond(self, _: Any, reply: Reply) -> None:
+        reply(Trigger.Response(success=True, message=self._own().text))
+
+    def _check_start(self) -> None:
+        self.check()
+        if self._is_starting:
+            self._loop.call_later(_CHECK_PERIOD_S, self._check_start)
+
+    @property
+    def _is_starting(self) -> bool:
+        return self._own().uptime_s < START_S
+
+    def _end_calls(self) -> None:
+        for name, call in tuple(self._calls.items()):
+            if call.is_done:
+                call.close()
+                del self._calls[name]
+
+    def _on_response(self, service: str, response: Any) -> None:
+        other = parse_instance(response.message)
+        if other is None:
+            self._reported.add(service)
+        elif self._is_starting:
+            if other.is_older_than(self._own()):
+                self._on_older(other)
+        elif other.uptime_s > START_S:  # otherwise it is about to find out
+            self._reported.add(service)
+            self._on_permanent(other)
+
+
+class _Call:
+    """One call of the service of another instance."""
+
+    def __init__(
+        self,
+        node: Node,
+        loop: EventLoop,
+        name: str,
+        on_response: Callable[[str, Any], None],
+    ) -> None:
+        self._node = node
+        self._loop = loop
+        self._name = name
+        self._on_response = on_response
+        self._end_s = time.monotonic() + _RESPONSE_WITHIN_S
+        self._client: Client = node.create_client(Trigger, name)
+        self._future: Any = None
+        loop.add_client(self._client)
+        self._send()
+
+    @property
+    def is_done(self) -> bool:
+        """Whether the response has arrived or is overdue."""
+        has_response = self._future is not None and self._future.done()
+        return has_response or time.monotonic() > self._end_s
+
+    def close(self) -> None:
+        """Destroy the client."""
+        self._loop.remove(self._client)
+        self._node.destroy_client(self._client)
+
+    def _send(self) -> None:
+        if self.is_done:
+            return
+        if not self._client.service_is_ready():
+            self._loop.call_later(_CHECK_PERIOD_S, self._send)
+            return
+        self._future = self._client.call_async(Trigger.Request())
+        self._future.add_done_callback(self._receive)
+
+    def _receive(self, future: Any) -> None:
+        self._on_response(self._name, future.result())
