@@ -46,10 +46,10 @@ class Callback(CallbackTimer):
             began_s = monotonic()
         try:
             result = self._handle() if message is EMPTY else self._handle(message)
+            rest = None if result is None else self._context.continuation(self._name, result)
         except BaseException as error:
             self._context.error_log.exception(self._name, error)
-            result = None
-        rest = None if result is None else self._context.continuation(self._name, result)
+            rest = None
         if not began_s:
             return rest
         duration_s = monotonic() - began_s

@@ -20,6 +20,7 @@ from composer.runtime.callbacks.log import ErrorLog, Log
 from composer.runtime.callbacks.mutation_check import MutationCheck
 from composer.runtime.clock.clock import NodeTime
 from composer.runtime.executors.event_counts import EventCounts
+from composer.runtime.executors.exceptions import is_closing, text_of
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.stacks import calls_user_code
@@ -92,10 +93,10 @@ class NodeContext:
         """
         try:
             result = function(*arguments)
+            return None if result is None else self.continuation(name, result)
         except BaseException as error:
             self.error_log.exception(name, error)
             return None
-        return None if result is None else self.continuation(name, result)
 
     def continuation(self, name: str, result: object) -> Coroutine[Any, Any, None] | None:
         """Return a coroutine that awaits a result of user code, or None if it is not awaitable."""
@@ -111,12 +112,13 @@ class NodeContext:
     def on_exception(self, name: str, error: BaseException) -> None:
         """Record an exception of awaited user code as a fault of ``name``.
 
-        Raises it again if it ends the coroutine. A call or sleep that was canceled because the node
-        left *active* is not a fault.
+        Call it where the exception was caught. Raises it again if it ends the coroutine. A call or
+        sleep that was canceled because the node left *active* is not a fault.
         """
-        if isinstance(error, (Cancelled, GeneratorExit)):
+        kind = type(error)  # ``__class__`` may be a property of the user
+        if issubclass(kind, Cancelled) or is_closing(error):
             raise error
-        if isinstance(error, CallCancelled) and not self.gate.incoming:
-            self.log.debug(f"{name}: {error}")
+        if issubclass(kind, CallCancelled) and not self.gate.incoming:
+            self.log.debug(f"{name}: {text_of(error)}")
         else:
             self.error_log.exception(name, error)

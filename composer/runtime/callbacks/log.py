@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
-import traceback
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import TypeAlias
 
 from rcl_interfaces.msg import Log as LogMessage
@@ -18,6 +18,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from composer.model import LogLevel
+from composer.runtime.executors.exceptions import describe, printable, report_of
 from composer.runtime.executors.tasks import Cancellable, SupportsCallLater
 from composer.runtime.metrics.statistics import Statistics
 
@@ -69,7 +70,7 @@ class Log:
         """Log ``message`` at ``level``."""
         if not self.is_enabled_for(level):
             return
-        text = str(message)
+        text = printable(message)
         self._write(level, self._name, text)
         if self._rosout is None:
             return
@@ -162,10 +163,14 @@ class ErrorLog:
 
     def exception(self, callback: str, error: BaseException) -> None:
         """Log an exception of ``callback``."""
-        self.error(callback, describe(error), traceback_of(error))
+        self._add(callback, partial(describe, error), partial(report_of, error))
 
-    def error(self, callback: str, text: str, details: str = "") -> None:
-        """Log an error of ``callback``; ``details`` only the first time."""
+    def error(self, callback: str, text: str) -> None:
+        """Log an error of ``callback``."""
+        self._add(callback, lambda: text, lambda: text)
+
+    def _add(self, callback: str, line: Callable[[], str], details: Callable[[], str]) -> None:
+        """Count an error, and log it unless there was one just before; details the first time."""
         self._statistics.errors += 1
         now_s = time.monotonic()
         if self._limit is not None:
@@ -177,9 +182,9 @@ class ErrorLog:
         self._quiet_until_s[callback] = now_s + _ERROR_PERIOD_S
         omitted = self._omitted.pop(callback, 0)
         times = f" ({omitted} more since the last message)" if omitted else ""
-        story = f"\n{details}" if details and quiet_until_s is None else ""
-        self._log.error(f"{callback}: {text}{times}{story}")
-        self._report(callback, text)
+        text = details() if quiet_until_s is None else line()
+        self._log.error(f"{callback}: {text}{times}")
+        self._report(callback, text.partition("\n")[0])
 
 
 class RepeatedWarning:
@@ -213,14 +218,3 @@ class RepeatedWarning:
             times, self._unreported = self._unreported, 0
             self._log.warn(f"{self._text()} ({times} times more within {WARNING_PERIOD_S:g} s)")
             self._timer = self._clock.call_later(WARNING_PERIOD_S, self._summarize)
-
-
-def describe(error: BaseException) -> str:
-    """Return the exception as one line: its type and its text, if any."""
-    text = " ".join(str(error).split())
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
-
-
-def traceback_of(error: BaseException) -> str:
-    """Return the traceback as text, as Python prints it."""
-    return "".join(traceback.format_exception(error)).rstrip()

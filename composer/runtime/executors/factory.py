@@ -9,6 +9,7 @@ from rclpy.logging import get_logger
 
 from composer.model import Executor, ExecutorKind
 from composer.runtime.executors.event_loop import EventLoop
+from composer.runtime.executors.exceptions import internal_report_of
 from composer.runtime.executors.loop import ExceptionHandler, Loop
 from composer.runtime.executors.wait_set.loop import WaitSetLoop
 
@@ -37,7 +38,7 @@ def make_loop(executor: Executor, on_exception: ExceptionHandler | None = None) 
 
 def log_exception(what: str, error: BaseException) -> None:
     """Log an exception that left a callback."""
-    get_logger("composer").error(f"{what}: {type(error).__name__}: {error}")
+    get_logger("composer").error(f"{what}: {internal_report_of(error)}")
 
 
 def place_threads(executor: Executor, native_thread_ids: Iterable[int]) -> tuple[str, ...]:

@@ -25,7 +25,13 @@ from rclpy.type_support import check_is_valid_srv_type
 
 from composer.behavior import TransitionFailed
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.log import describe, traceback_of
+from composer.runtime.executors.exceptions import (
+    describe,
+    internal_report_of,
+    is_closing,
+    report_of,
+    text_of,
+)
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Reply, unused_callback
 from composer.runtime.executors.tasks import within
@@ -93,6 +99,7 @@ class Lifecycle:
         self._strand = context.strand
         self._hooks = hooks
         self._log = context.log
+        self._statistics = context.statistics
         self._timeout_s = timeout_s
         self._lock = threading.Lock()
         self._current: Future[None] | None = None  # the transition that runs now
@@ -178,11 +185,13 @@ class Lifecycle:
         """Run a transition; the state machine has been acquired, and is released at the end."""
         try:
             return await self._transition(transition)
-        except (Cancelled, GeneratorExit):
+        except Cancelled:
             raise
         except BaseException as error:
+            if is_closing(error):
+                raise
             # Exceptions of user code do not get here: rcl failed, maybe without its context.
-            self._log.error(f"'{transition}' was not completed: {traceback_of(error)}")
+            self._log.error(f"'{transition}' was not completed: {internal_report_of(error)}")
             return TransitionOutcome(transition, self.state, success=False, reason=describe(error))
         finally:
             self._release()
@@ -196,7 +205,7 @@ class Lifecycle:
         cause = await self._attempt(
             transition, partial(self._hooks.on_transition, transition, start)
         )
-        if isinstance(cause, TransitionFailed):
+        if cause is not None and issubclass(type(cause), TransitionFailed):
             self._machine.trigger_transition_by_label(_FAILURE, True)
         elif cause is not None:
             self._machine.trigger_transition_by_label(_ERROR, True)
@@ -213,22 +222,26 @@ class Lifecycle:
         try:
             await self._in_time(work)
         except TransitionFailed as failure:
-            self._log.warn(f"on_{transition} refused the transition: {failure}")
+            self._log.warn(f"on_{transition} refused the transition: {text_of(failure)}")
             return failure
-        except GeneratorExit:
-            raise
         except BaseException as error:
-            self._log.error(f"on_{transition}: {describe(error)}\n{traceback_of(error)}")
+            if is_closing(error):
+                raise
+            self._log_error(f"on_{transition}", error)
             return error
         return None
+
+    def _log_error(self, handler: str, error: BaseException) -> None:
+        self._statistics.errors += 1
+        self._log.error(f"{handler}: {report_of(error)}")
 
     async def _process_error(self, cause: BaseException) -> None:
         try:
             await self._in_time(partial(self._hooks.on_error, cause))
-        except GeneratorExit:
-            raise
         except BaseException as error:
-            self._log.error(f"on_error: {describe(error)}\n{traceback_of(error)}")
+            if is_closing(error):
+                raise
+            self._log_error("on_error", error)
             self._machine.trigger_transition_by_label(_FAILURE, True)
         else:
             self._machine.trigger_transition_by_label(_SUCCESS, True)

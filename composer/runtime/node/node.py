@@ -18,9 +18,10 @@ from rclpy.node import Node as RosNode
 from composer.behavior import TransitionFailed
 from composer.model import BehaviorReference, Event, LogLevel, Node, PeriodError
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log, describe
+from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log
 from composer.runtime.callbacks.mutation_check import MessageSnapshots, MutationCheck
 from composer.runtime.clock.clock import NodeTime
+from composer.runtime.executors.exceptions import describe, shown
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.stacks import calls_user_code
@@ -309,7 +310,8 @@ class RunningNode:
             return
         if result is False:
             raise TransitionFailed(f"{name} returned False")
-        raise WrongReturn(f"{name} returned {result!r:.80}; None and True mean done, False refused")
+        text = f"{name} returned {shown(result)}; None and True mean done, False refused"
+        raise WrongReturn(text)
 
     def _release(self) -> None:
         self._context.cancel_tasks()

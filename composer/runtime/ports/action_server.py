@@ -14,6 +14,7 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.callbacks.timing import CallbackTimer
+from composer.runtime.executors.exceptions import is_closing, shown, text_of
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import sleep, within
@@ -137,7 +138,7 @@ class ActionServerPort:
             if isinstance(accepted, Awaitable):
                 accepted = await accepted
             if accepted is not True:
-                return f"accept_{self._name} returned {accepted!r:.80}"
+                return f"accept_{self._name} returned {shown(accepted)}"
         return None if self._context.gate.incoming else self._context.gate.refusal
 
     def _on_accepted(self, handle: ServerGoalHandle) -> None:
@@ -170,9 +171,11 @@ class ActionServerPort:
         except Cancelled:
             self._end(goal, None, canceled=True)
         except CallCancelled as error:
-            self._context.log.debug(f"{self._callback}: {error}")
+            self._context.log.debug(f"{self._callback}: {text_of(error)}")
             self._end(goal, None, canceled=True)
         except BaseException as error:
+            if is_closing(error):
+                raise
             name = f"on_{self._name}" if self._handlers.execute else self._callback
             self._context.error_log.exception(name, error)
             self._end(goal, None, canceled=False)
@@ -217,7 +220,7 @@ class ActionServerPort:
         It succeeds, or is canceled if that was requested.
         """
         if result is not None and not isinstance(result, self._type.Result):
-            text = f"returned {result!r:.80}, not a {self._type.__name__}.Result"
+            text = f"returned {shown(result)}, not a {self._type.__name__}.Result"
             self._context.error_log.error(f"on_{self._name}", text)
             self._end(goal, None, canceled=False)
             return

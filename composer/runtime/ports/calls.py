@@ -12,6 +12,7 @@ from composer.model import Event, Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.callbacks.timing import CallbackTimer
+from composer.runtime.executors.exceptions import text_of
 from composer.runtime.executors.futures import Future, wrap_future
 from composer.runtime.executors.tasks import sleep
 
@@ -110,9 +111,9 @@ class CallingPort:
     def _on_failure(self, error: BaseException) -> None:
         """Log a failed call that no reaction handles."""
         if isinstance(error, CallCancelled):
-            self._context.log.debug(f"{self._label}: {error}")
+            self._context.log.debug(f"{self._label}: {text_of(error)}")
         elif Event.FAILURE not in self._reactions:
-            self._context.error_log.error(self._label, str(error))
+            self._context.error_log.error(self._label, text_of(error))
 
     def _react(self, event: Event, **values: Any) -> None:
         reaction = self._reactions.get(event)

@@ -7,10 +7,10 @@ from typing import Any
 
 from composer.model import Port
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.log import describe
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.callbacks.timing import CallbackTimer
+from composer.runtime.executors.exceptions import describe, is_closing, shown
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.loop import Reply, unused_callback
 from composer.runtime.executors.stacks import calls_user_code
@@ -36,7 +36,11 @@ class PendingRequest:
         """Send ``response``, unless there was one already."""
         if self in self._pending:
             self._pending.discard(self)
-            self._reply(response)
+            try:
+                self._reply(response)
+            except BaseException:  # it cannot be sent, but another one can
+                self._pending.add(self)
+                raise
 
 
 class ServicePort:
@@ -136,12 +140,11 @@ class ServicePort:
             return None
         try:
             result = self._handler(request.content, response)
+            if not isinstance(result, self._response_type) and isinstance(result, Awaitable):
+                return self._respond_later(request, result)
+            self._respond(request, result)
         except BaseException as error:
             self._fail(request, self._callback, error)
-            return None
-        if not isinstance(result, self._response_type) and isinstance(result, Awaitable):
-            return self._respond_later(request, result)
-        self._respond(request, result)
         return None
 
     @property
@@ -152,10 +155,13 @@ class ServicePort:
     async def _respond_later(self, request: PendingRequest, result: Awaitable[Any]) -> None:
         try:
             self._respond(request, await result)
-        except (Cancelled, GeneratorExit):
+        except Cancelled:
             self._refuse(request)
             raise
         except BaseException as error:
+            if is_closing(error):
+                self._refuse(request)
+                raise
             request.respond(self._failure(f"{self._callback}: {describe(error)}"))
             self._context.on_exception(self._callback, error)
 
@@ -163,7 +169,7 @@ class ServicePort:
         if isinstance(result, self._response_type):
             request.respond(result)
             return
-        text = f"returned {result!r:.80}, not a {self._type.__name__}.Response"
+        text = f"returned {shown(result)}, not a {self._type.__name__}.Response"
         self._context.error_log.error(self._callback, text)
         request.respond(self._failure(f"{self._callback} {text}"))
 

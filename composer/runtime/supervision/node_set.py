@@ -18,8 +18,8 @@ from composer.model import (
     System,
 )
 from composer.runtime.callbacks.chains import Chains
-from composer.runtime.callbacks.log import describe
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
+from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.factory import log_exception, make_loop, place_threads
 from composer.runtime.executors.loop import Loop
 from composer.runtime.intra_process.eligibility import shared_channels

@@ -134,6 +134,8 @@ OUTCOMES = [
     ("raise ValueError('broken')", "error"),
     ("raise SystemExit(1)", "error"),
     ("raise KeyboardInterrupt", "error"),
+    ("raise GeneratorExit", "error"),
+    ("raise WithoutText", "error"),
 ]
 #: transition -> (transitions before it, state after success, after a refusal, after an error)
 TRANSITIONS = {
@@ -157,6 +159,10 @@ def test_every_outcome_of_a_handler_leads_to_a_primary_state(
     before, *ends = TRANSITIONS[transition]
     module = f"""
     from composer.behavior import Behavior, TransitionFailed
+
+    class WithoutText(Exception):
+        def __str__(self):
+            raise RuntimeError("no text")
 
     class Subject(Behavior):
         {prefix}def on_{transition}(self):

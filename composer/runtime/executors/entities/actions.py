@@ -27,6 +27,7 @@ from unique_identifier_msgs.msg import UUID
 
 from composer.runtime.executors.entities import readiness
 from composer.runtime.executors.entities.readiness import Handle, SetCallback, Signal
+from composer.runtime.executors.exceptions import is_closing
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.tasks import Report, SupportsCallLater, name_of
 
@@ -205,9 +206,9 @@ def _contained(
     async def call_and_await(argument: Any) -> Any:
         try:
             return await callback(argument)
-        except GeneratorExit:
-            raise
         except BaseException as error:
+            if is_closing(error):
+                raise
             return fail(error, argument)
 
     return call_and_await if inspect.iscoroutinefunction(callback) else call

@@ -1,0 +1,134 @@
+"""What user code raises or returns, as text.
+
+Its ``__str__`` and ``__repr__`` are user code too: they may raise, never return, or return anything
+of any size. The functions here raise nothing, and their text can be printed and published.
+"""
+
+from __future__ import annotations
+
+import os
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from composer.runtime.executors.stacks import calls_user_code
+
+_COMPOSER = f"{Path(__file__).parents[2]}{os.sep}"
+#: The example nodes of an installed composer are user code.
+_SHARE = f"{_COMPOSER}share{os.sep}"
+_IMPORT_SYSTEM = "<frozen importlib"
+#: The longest texts, in characters.
+_LINE_LENGTH = 1000
+_VALUE_LENGTH = 80
+_TRACEBACK_LENGTH = 20_000
+
+
+def describe(error: BaseException) -> str:
+    """Return an exception as one line: its type and its text, if any."""
+    kind = _call(_name, type(error)) or "exception"
+    text = _call(str, error)
+    if text is None:
+        return f"{kind}: <its text is not available: __str__ failed>"
+    line = _cut(" ".join(text.split()), _LINE_LENGTH)
+    return f"{kind}: {line}" if line else kind
+
+
+def text_of(error: BaseException) -> str:
+    """Return the text of an exception as one line; with its type if there is no text."""
+    text = _call(str, error)
+    return _cut(" ".join(text.split()), _LINE_LENGTH) if text else describe(error)
+
+
+def report_of(error: BaseException) -> str:
+    """Return :func:`describe`, followed by the lines of the traceback.
+
+    The traceback has only the frames of user code, if any; with COMPOSE_DEBUG set, all frames.
+    """
+    frames = _traceback(error, all_frames=bool(os.environ.get("COMPOSE_DEBUG")))
+    return f"{describe(error)}\n{frames}" if frames else describe(error)
+
+
+def internal_report_of(error: BaseException) -> str:
+    """Return :func:`describe`, followed by the traceback with all frames, for a bug report."""
+    return f"{describe(error)}\n{_traceback(error, all_frames=True)}"
+
+
+def shown(value: object) -> str:
+    """Return the beginning of ``repr(value)``, for messages about wrong values."""
+    text = _call(repr, value)
+    if text is None:
+        return f"a {_call(_name, type(value))} whose __repr__ failed"
+    return text[:_VALUE_LENGTH]
+
+
+def printable(text: object) -> str:
+    """Return ``str(text)`` as a plain string that can be encoded. Raises what ``str`` raises."""
+    if type(text) is str and text.isascii():
+        return text
+    return _plain(str(text))
+
+
+def is_closing(error: BaseException) -> bool:
+    """Return whether the coroutine that caught ``error`` at an ``await`` is being closed.
+
+    Then Python raises GeneratorExit at the ``await`` itself. If user code has raised it, there are
+    frames further in. Call this where the exception was caught.
+    """
+    at = error.__traceback__
+    return issubclass(type(error), GeneratorExit) and (at is None or at.tb_next is None)
+
+
+@calls_user_code
+def _call(function: Callable[[Any], str], argument: object) -> str | None:
+    """Return the text that ``function`` returns for ``argument``; None if it raises anything."""
+    try:
+        return _plain(function(argument))
+    except BaseException:
+        return None
+
+
+@calls_user_code
+def _traceback(error: BaseException, *, all_frames: bool) -> str:
+    """Return the traceback of ``error`` and its causes; empty if no frames are left."""
+    try:
+        full = traceback.TracebackException.from_exception(error)
+        if all_frames or _keep_user_frames(full):
+            return _cut(_plain("".join(full.format())).rstrip(), _TRACEBACK_LENGTH)
+    except BaseException:
+        return "<its traceback is not available>"
+    return ""
+
+
+def _keep_user_frames(full: traceback.TracebackException) -> bool:
+    """Remove the composer's frames, also those of causes; return whether any frame is left."""
+    pending = [full]
+    has_frames = False
+    while pending:
+        entry = pending.pop()
+        pending += filter(None, (entry.__cause__, entry.__context__, *(entry.exceptions or ())))
+        entry.stack[:] = [frame for frame in entry.stack if not _is_internal(frame.filename)]
+        has_frames = has_frames or bool(entry.stack)
+    return has_frames
+
+
+def _is_internal(path: str) -> bool:
+    is_composer = path.startswith(_COMPOSER) and not path.startswith(_SHARE)
+    return is_composer or path.startswith(_IMPORT_SYSTEM)
+
+
+def _name(kind: type) -> str:
+    return kind.__name__
+
+
+def _plain(text: str) -> str:
+    """Return an instance of exactly ``str``, without lone surrogates."""
+    return str.encode(text, errors="backslashreplace").decode()
+
+
+def _cut(text: str, length: int) -> str:
+    """Return ``text`` without its middle if it is longer than ``length``."""
+    if len(text) <= length:
+        return text
+    half = length // 2
+    return f"{text[:half]} ... ({len(text) - 2 * half} characters omitted) ... {text[-half:]}"

@@ -1,0 +1,181 @@
+"""What user code raises is described whatever its methods do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from composer.behavior import CallError
+from composer.runtime.executors.exceptions import (
+    describe,
+    is_closing,
+    printable,
+    report_of,
+    shown,
+    text_of,
+)
+
+
+class TextRaises(Exception):
+    def __str__(self) -> str:
+        raise ValueError("no text")
+
+
+class TextExits(Exception):
+    def __str__(self) -> str:
+        raise SystemExit(1)
+
+
+class TextIsANumber(Exception):
+    def __str__(self) -> str:
+        return 3  # type: ignore[return-value]  # noqa: PLE0307 - on purpose
+
+
+class Text(str):
+    __slots__ = ()
+
+    def split(self, *_: Any) -> Any:
+        raise RuntimeError
+
+    def __format__(self, _: str) -> str:
+        raise RuntimeError
+
+
+class TextIsASubclass(Exception):
+    def __str__(self) -> str:
+        return Text("a strange text")
+
+
+class NameRaises(type):
+    @property
+    def __name__(cls) -> str:  # type: ignore[override]
+        raise RuntimeError
+
+
+class KindWithoutName(Exception, metaclass=NameRaises):
+    pass
+
+
+class NotesRaise(Exception):
+    @property
+    def __notes__(self) -> Any:
+        raise RuntimeError
+
+
+class ReprRaises:
+    def __repr__(self) -> str:
+        raise KeyboardInterrupt
+
+
+def raised(error: BaseException) -> BaseException:
+    """Return ``error`` with a traceback."""
+    try:
+        raise error  # noqa: TRY301
+    except BaseException as caught:
+        return caught
+
+
+FAILED = "<its text is not available: __str__ failed>"
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (ValueError("two\nlines"), "ValueError: two lines"),
+        (ValueError(), "ValueError"),
+        (KeyError("a"), "KeyError: 'a'"),
+        (GeneratorExit("out"), "GeneratorExit: out"),
+        (TextRaises(), f"TextRaises: {FAILED}"),
+        (TextExits(), f"TextExits: {FAILED}"),
+        (TextIsANumber(), f"TextIsANumber: {FAILED}"),
+        (TextIsASubclass(), "TextIsASubclass: a strange text"),
+        (KindWithoutName("why"), "exception: why"),
+        (NotesRaise("why"), "NotesRaise: why"),
+        (ValueError("\udc80"), "ValueError: \\udc80"),
+    ],
+)
+def test_every_exception_has_a_line_and_a_report(error: BaseException, text: str) -> None:
+    line = describe(error)
+    assert line == text
+    assert type(line) is str
+    assert report_of(raised(error)).startswith(f"{text}\n")
+    report_of(raised(error)).encode()
+
+
+def test_a_huge_text_is_cut() -> None:
+    error = raised(ValueError("x" * 10_000_000))
+    assert len(describe(error)) < 1_100
+    assert "characters omitted" in describe(error)
+    assert len(report_of(error)) < 25_000
+
+
+def test_the_text_of_an_exception_without_text_is_its_type() -> None:
+    assert text_of(CallError("no server")) == "no server"
+    assert text_of(CallError()) == "CallError"
+    assert text_of(TextRaises()) == f"TextRaises: {FAILED}"
+
+
+def test_a_report_has_the_frames_of_user_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("COMPOSE_DEBUG", raising=False)
+    error = raised_within(lambda: printable(TextRaises()))
+    assert 'test_exceptions.py", line' in report_of(error)
+    assert "executors/exceptions.py" not in report_of(error)
+    monkeypatch.setenv("COMPOSE_DEBUG", "1")
+    assert "executors/exceptions.py" in report_of(error)
+
+
+def test_a_report_has_no_traceback_without_frames_of_user_code(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("COMPOSE_DEBUG", raising=False)
+    assert report_of(ValueError("never raised")) == "ValueError: never raised"
+
+
+def raised_within(function: Callable[[], object]) -> BaseException:
+    try:
+        function()
+    except BaseException as error:
+        return error
+    raise AssertionError
+
+
+def test_wrong_values_are_shown_whatever_they_are() -> None:
+    assert shown([1, 2]) == "[1, 2]"
+    assert len(shown("x" * 10_000)) == 80
+    assert shown(ReprRaises()) == "a ReprRaises whose __repr__ failed"
+
+
+def test_texts_are_printable() -> None:
+    assert printable("Grüße") == "Grüße"
+    assert printable("\udc80") == "\\udc80"
+    assert type(printable(Text("a"))) is str
+    assert printable(3) == "3"
+
+
+def test_closing_differs_from_a_generator_exit_of_user_code() -> None:
+    found: list[bool] = []
+
+    class Wait:
+        def __await__(self) -> Any:
+            yield None
+
+    async def user_code(*, raises: bool) -> None:
+        if raises:
+            raise GeneratorExit
+        await Wait()
+
+    async def caller(*, raises: bool) -> None:
+        try:
+            await user_code(raises=raises)
+        except BaseException as error:
+            found.append(is_closing(error))
+            raise
+
+    waiting = caller(raises=False)
+    waiting.send(None)
+    waiting.close()
+    with pytest.raises(GeneratorExit):
+        caller(raises=True).send(None)
+    assert found == [True, False]
