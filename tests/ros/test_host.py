@@ -207,6 +207,37 @@ def test_a_slow_asynchronous_handler_is_canceled(tmp_path: Path, urgent: bool) -
     assert "/control/motor inactive" in system.states()
 
 
+def test_the_end_calls_every_handler_of_the_tear_down(tmp_path: Path) -> None:
+    text = """
+    system: goodbye
+    nodes: {calm: {behavior: goodbye:Calm}, bad: {behavior: goodbye:Bad}, plain: {}}
+    """
+    module = """
+    from composer.behavior import Behavior
+
+    class Calm(Behavior):
+        def on_deactivate(self): self.log.info("deactivate")
+        def on_cleanup(self): self.log.info("cleanup")
+        async def on_shutdown(self):
+            await self.clock.sleep(0)
+            self.log.info("shutdown")
+
+    class Bad(Behavior):
+        def on_shutdown(self): raise ValueError("no way to park")
+    """
+    with running(text, tmp_path, goodbye=module) as system:
+        outcome = system.stop()
+    lines = [line for line in system.log() if "way" not in line]
+    assert lines == ["deactivate", "cleanup", "shutdown"]
+    assert "on_shutdown: ValueError: no way to park\nTraceback" in system.log_text()
+    assert outcome.exit_code == 1
+    assert {node.node: node.errors for node in outcome.nodes} == {
+        "/calm": 0,
+        "/bad": 1,
+        "/plain": 0,
+    }
+
+
 def test_a_refused_deactivation_is_reported_and_followed_by_shutdown(tmp_path: Path) -> None:
     module = """
     from composer.behavior import Behavior, TransitionFailed

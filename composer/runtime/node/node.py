@@ -115,6 +115,7 @@ class RunningNode:
         always_on_gate = LifecycleGate(model.full_name, PendingFutures(loop.call_later))
         self._always_on_context = replace(self._context, gate=always_on_gate)
         self._behavior: Any = None
+        self._cleaned_up_behavior: Any = None  # for ``on_shutdown``
         self._entities = NodeEntities(self._context, self._always_on_context)
         parameters = NodeParameters(
             self._ros, model.parameters, check=self._check_timers, changed=self._parameters_changed
@@ -205,6 +206,8 @@ class RunningNode:
             await self._deactivate(self._context, self._entities.gated)
         if transition in ("cleanup", "shutdown"):
             await self._deactivate(self._always_on_context, self._entities.always_on)
+        if transition == "shutdown" and self._behavior is None:
+            self._behavior = self._cleaned_up_behavior
         await self._call_handler(transition)
 
     async def on_error(self, cause: BaseException) -> None:
@@ -226,6 +229,8 @@ class RunningNode:
         is_configured = state in ("inactive", "active")
         _settle(self._always_on_context.gate, state, is_configured, self._entities.always_on)
         if state in ("unconfigured", FINALIZED):
+            is_clean = result.transition == "cleanup" and result.success
+            self._cleaned_up_behavior = self._behavior if is_clean else None
             self._release()
         self._listener.on_transition_end(result)
 
@@ -248,6 +253,7 @@ class RunningNode:
 
     def _configure(self) -> None:
         """Create a new behavior and new entities, so that nothing of an earlier life remains."""
+        self._cleaned_up_behavior = None
         state = self._context.names["state"]
         state.clear()
         state.update({name.value: deepcopy(value) for name, value in self.model.state})
