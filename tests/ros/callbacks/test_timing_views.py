@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from tests.ros.support.commands import COMPOSE
+from tests.ros.support.commands import output_of
 from tests.ros.support.in_process import Peer, wait_until
 from tests.ros.support.system_process import RunningSystem
 
@@ -61,9 +60,7 @@ ENOUGH = 25
 
 def compose(*arguments: str) -> dict[str, Any]:
     """Return the last line that a command prints, which is JSON."""
-    command = [*COMPOSE, *arguments, "--timeout", "20"]
-    done = subprocess.run(command, capture_output=True, check=True, text=True, timeout=40.0)
-    found: dict[str, Any] = json.loads(done.stdout)
+    found: dict[str, Any] = json.loads(output_of(*arguments, "--timeout", "20"))
     return found
 
 

@@ -12,7 +12,7 @@ from typing import TextIO
 
 import pytest
 
-from tests.ros.support.commands import COMPOSE, PATIENCE_S, Running, compose, hand_written, running
+from tests.ros.support.commands import PATIENCE_S, Running, compose, hand_written, running, start
 
 INTRUDER = "hand_written_intruder.py"
 PLANNER = "/planning/planner"
@@ -83,12 +83,7 @@ def test_an_external_publisher_of_another_type_is_reported(pipeline: Running) ->
 
 
 def test_watch_prints_new_and_resolved_differences(pipeline: Running) -> None:
-    watch = subprocess.Popen(
-        [*COMPOSE, "diff", "pipeline", "--watch", "--grace", "1.5"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    watch = start("diff", "pipeline", "--watch", "--grace", "1.5")
     try:
         assert watch.stdout is not None
         assert compose("param", "set", PLANNER, "max_velocity", "0.7").returncode == 0

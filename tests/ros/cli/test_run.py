@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -12,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ros.support.commands import COMPOSE, PATIENCE_S, compose, running
+from tests.ros.support.commands import PATIENCE_S, compose, running, start
 from tests.ros.support.in_process import Peer, wait_until
 
 
@@ -165,13 +164,7 @@ def test_an_empty_graph_is_reported_in_time(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_ctrl_c_ends_a_waiting_command_without_a_traceback(peer: Peer) -> None:
-    process = subprocess.Popen(
-        [*COMPOSE, "topic", "pub", "/unheard", "std_msgs/msg/Empty", "--once", "--timeout", "60"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
-    )
+    process = start("topic", "pub", "/unheard", "std_msgs/msg/Empty", "--once", "--timeout", "60")
     # It prints nothing until it ends; it waits once its publisher is discovered.
     wait_until(lambda: peer.node.count_publishers("/unheard"), "the command")
     process.send_signal(signal.SIGINT)

@@ -23,6 +23,7 @@ from tests.ros.support.commands import (
     errors,
     output_of,
     repeated_until,
+    start,
 )
 from tests.ros.support.in_process import wait_until
 
@@ -297,9 +298,7 @@ def test_a_command_does_not_wait_for_an_ended_process(robot: Robot) -> None:
     output_of("param", "set", "/fleet/planner", "fault", "hang")
     output_of("pause", "robot")
     limit_s = 25.0
-    with subprocess.Popen(
-        [*COMPOSE, "resume", "robot", "--timeout", str(limit_s)], stderr=subprocess.PIPE, text=True
-    ) as resuming:
+    with start("resume", "robot", "--timeout", str(limit_s)) as resuming:
         assert resuming.stderr is not None
         wait_until(lambda: robot.states()["/fleet/planner"] == "activating", "it hangs")
         robot.kill()

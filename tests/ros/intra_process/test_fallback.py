@@ -137,7 +137,7 @@ def test_every_message_arrives_once_with_any_middleware(
     path.with_name("counting.py").write_text(BEHAVIORS, encoding="utf-8")
     outside = Sequences()
     with in_front_of_rmw(middleware, tmp_path):
-        running = RunningSystem(str(path), "--log-level", "debug")
+        running = RunningSystem(str(path), "--log-level", "debug", program=COMPOSE)
     with running as system:
         system.wait_for("2 of 3 nodes active")
         peer.node.create_subscription(

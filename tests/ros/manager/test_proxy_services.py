@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any
@@ -27,7 +26,7 @@ from composer.remote.lifecycle import LifecycleClient, TransitionError
 from composer.remote.parameters import ParameterClient, ParameterRejectedError, names_by_node
 from composer.remote.session import Deadline, Session
 from composer.remote.snapshot import GraphObserver
-from tests.ros.support.commands import COMPOSE
+from tests.ros.support.commands import output_of
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 LEAN = """
@@ -200,12 +199,6 @@ def test_a_node_with_all_endpoints_has_those_of_a_lifecycle_node(
 
 
 def test_commands_work_the_same_with_proxy_services(system: RunningSystem) -> None:
-    def output_of(*arguments: str) -> str:
-        command = [*COMPOSE, *arguments]
-        done = subprocess.run(command, capture_output=True, check=False, text=True, timeout=30.0)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
     assert (
         output_of("lifecycle", "set", "talker", "deactivate") == f"{TALKER}: active -> inactive\n"
     )

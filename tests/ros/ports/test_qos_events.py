@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
 import time
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Int64, String
 
 from composer.model import ExecutorKind
-from tests.ros.support.commands import COMPOSE
+from tests.ros.support.commands import output_of
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -139,13 +138,7 @@ def test_ps_shows_the_counts(tmp_path: Path, peer: Peer) -> None:
         peer.node.create_publisher(String, "/input", BEST_EFFORT)
         system.wait_for_log("subscription 'input'")
         wait_until(lambda: "incompatible=1" in qos_events_of(arrays))
-        listed = subprocess.run(
-            [*COMPOSE, "ps", "ends", "--json", "--timeout", "20"],
-            check=True,
-            capture_output=True,
-            text=True,
-            timeout=50,
-        ).stdout
+        listed = output_of("ps", "ends", "--json", "--timeout", "20")
     nodes = json.loads(listed)["systems"][0]["nodes"]
     assert [node["qos_events"] for node in nodes] == [{"incompatible": 1}]
 

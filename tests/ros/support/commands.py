@@ -12,11 +12,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tests.ros.support.forked import ForkedCommand
+
 #: Python without the Fast DDS profile of the tests, so that ros2-composer chooses its own.
 PYTHON = (
     *("env", "-u", "FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"),
     sys.executable,
 )
+#: A new interpreter, for tests of how it starts or ends; the functions below fork.
 COMPOSE = (*PYTHON, "-m", "composer")
 PROGRAMS = Path(__file__).parents[1] / "programs"
 PATIENCE_S = 30.0
@@ -43,9 +46,7 @@ class Running:
     def __init__(self, log: Path, *arguments: str) -> None:
         self.log = log
         with log.open("w") as file:
-            self.process = subprocess.Popen(
-                [*COMPOSE, "run", *arguments], stderr=file, stdout=subprocess.PIPE, text=True
-            )
+            self.process = ForkedCommand("run", *arguments, stderr=file)
 
     def wait_for(self, text: str) -> None:
         until_s = time.monotonic() + PATIENCE_S
@@ -76,13 +77,10 @@ def running(log: Path, *arguments: str) -> Iterator[Running]:
 
 def compose(*arguments: object) -> subprocess.CompletedProcess[str]:
     """Run a command and return its result, whatever the exit code."""
-    return subprocess.run(
-        [*COMPOSE, *map(str, arguments)],
-        check=False,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-    )
+    process = start(*map(str, arguments))
+    output, error = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode is not None
+    return subprocess.CompletedProcess(process.args, process.returncode, output, error)
 
 
 def output_of(*arguments: object) -> str:
@@ -92,14 +90,12 @@ def output_of(*arguments: object) -> str:
     return done.stdout
 
 
-def start(*arguments: str) -> subprocess.Popen[str]:
+def start(*arguments: str) -> ForkedCommand:
     """Start a command."""
-    return subprocess.Popen(
-        [*COMPOSE, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    return ForkedCommand(*arguments)
 
 
-def finished(process: subprocess.Popen[str]) -> str:
+def finished(process: ForkedCommand) -> str:
     """Wait for a started command, which must succeed; return its stdout."""
     output, error = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, error

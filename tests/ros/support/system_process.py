@@ -19,7 +19,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from tests.ros.support.commands import COMPOSE
+from tests.ros.support.forked import ForkedCommand
 
 T = TypeVar("T")
 
@@ -28,18 +28,26 @@ PATIENCE_S = 20.0
 
 
 class RunningSystem:
-    """``compose run`` in a separate process, with its output read continuously."""
+    """``compose run`` in a separate process, with its output read continuously.
 
-    def __init__(self, system: str, *options: str, program: Sequence[str] = COMPOSE) -> None:
-        command = [*program, "run", system, *options]
-        self.process = subprocess.Popen(
-            command,
-            cwd=REPOSITORY,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            stdin=subprocess.DEVNULL,
-            text=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    It runs in a new interpreter if ``program`` is the command line of one.
+    """
+
+    def __init__(self, system: str, *options: str, program: Sequence[str] = ()) -> None:
+        command = ("run", system, *options)
+        environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+        self.process = (
+            subprocess.Popen(
+                [*program, *command],
+                cwd=REPOSITORY,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                stdin=subprocess.DEVNULL,
+                text=True,
+                env=environment,
+            )
+            if program
+            else ForkedCommand(*command, merged=True, cwd=REPOSITORY, env=environment)
         )
         self.lines: list[str] = []
         self._has_ended = False
