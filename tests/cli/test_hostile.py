@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pytest
 
+#: Each attack is a process of its own, under limits.
+pytestmark = pytest.mark.slow
+
 LIMITED = Path(__file__).with_name("limited.py")
 MAX_CPU = 100  # times the reference work: 2 s if that takes 20 ms
 MAX_MB = 200.0

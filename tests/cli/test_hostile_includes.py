@@ -9,6 +9,8 @@ import pytest
 
 from tests.cli.test_hostile import PLACE, validate
 
+pytestmark = pytest.mark.slow
+
 LOUD = "on_activate: {log: here}"
 
 
