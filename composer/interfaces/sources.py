@@ -79,8 +79,11 @@ class Prefix:
 
     def packages(self) -> frozenset[str]:
         """Return the packages that have registered interfaces in the ament index."""
-        index = self.root / "share" / "ament_index" / "resource_index" / "rosidl_interfaces"
-        return frozenset(_listed(index))
+        return frozenset(_listed(self._index))
+
+    def has_package(self, name: str) -> bool:
+        """Return whether the ament index lists a package with interfaces."""
+        return (self._index / name).is_file()
 
     def names(self, folder: str) -> Iterator[str]:
         """Yield the names of the installed interfaces."""
@@ -93,6 +96,10 @@ class Prefix:
         """Return the text of a definition, else its type description."""
         package, folder, type_name = split_name(name) or ("", "", "")
         return _read(self.root / "share" / package / folder, type_name, folder) if folder else None
+
+    @property
+    def _index(self) -> Path:
+        return self.root / "share" / "ament_index" / "resource_index" / "rosidl_interfaces"
 
 
 @dataclass(frozen=True, slots=True)

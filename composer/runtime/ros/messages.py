@@ -30,6 +30,8 @@ from rosidl_parser.definition import (
 )
 
 from composer.diagnostics import suggestion
+from composer.interfaces.parser import split_name
+from composer.interfaces.sources import installed_prefixes
 from composer.templates import Computed, Constant, Items, Record, Template, Text, evaluate
 
 Scope: TypeAlias = Mapping[str, Any]
@@ -84,11 +86,20 @@ class MessageError(Exception):
 def interface_class(name: str) -> Any:
     """Return the class of ``package/folder/Name``, ready for use on any thread.
 
-    Raises MessageError when it is not installed.
+    Only packages that the ament index lists are imported, because names also come from the ROS
+    graph: any node can announce ``antigravity/msg/Any``. Raises MessageError when the interface is
+    not installed.
     """
-    module, _, class_name = name.rpartition("/")
+    parts = split_name(name)
+    if parts is None:
+        raise MessageError(f"'{name}' is not the name of an interface")
+    package, folder, class_name = parts
+    if not any(prefix.has_package(package) for prefix in installed_prefixes()):
+        raise MessageError(
+            f"interface '{name}' is not installed: no package '{package}' in the ament index"
+        )
     try:
-        message_class = getattr(import_module(module.replace("/", ".")), class_name)
+        message_class = getattr(import_module(f"{package}.{folder}"), class_name)
         with _LOADING:
             check_for_type_support(message_class)
     except _NOT_INSTALLED as error:

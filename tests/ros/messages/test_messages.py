@@ -147,3 +147,26 @@ def test_a_missing_interface_is_an_error(tmp_path: Path) -> None:
     for name in ("nowhere/msg/String", "std_msgs/msg/Strin", "std_msgs/srv/String", "String"):
         with pytest.raises(MessageError, match=f"'{name}'"):
             interface_class(name)
+
+
+def test_only_packages_in_the_ament_index_are_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Any node in the ROS graph can announce a topic of any type."""
+    package = tmp_path / "trap_msgs"
+    package.mkdir()
+    imported = tmp_path / "imported"
+    package.joinpath("__init__.py").write_text(f"open({str(imported)!r}, 'w')", encoding="utf-8")
+    package.joinpath("msg.py").write_text("class Any: pass", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    names = (
+        "trap_msgs/msg/Any",
+        "trap_msgs/../Any",
+        "/msg/Any",
+        "std_msgs.msg/msg/String",
+        "a\n/b/c",
+    )
+    for name in names:
+        with pytest.raises(MessageError):
+            interface_class(name)
+    assert not imported.exists()
