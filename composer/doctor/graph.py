@@ -76,7 +76,7 @@ def check_discovery(session: Session, deadline: Deadline) -> CheckResult:
 def check_graph(session: Session, deadline: Deadline) -> Iterator[CheckResult]:
     """Check names, types and QoS profiles of all nodes in the graph."""
     names = GraphNames(session, deadline)
-    nodes = names.nodes()
+    nodes = [name for name, _ in names.names("node")]
     if not nodes:
         yield note(
             "graph",
@@ -84,8 +84,8 @@ def check_graph(session: Session, deadline: Deadline) -> Iterator[CheckResult]:
             "start one ('compose run pipeline') in a terminal with the same ROS_DOMAIN_ID",
         )
         return
-    topics = [topic_info(session.node, *named) for named in names.topics()]
-    services = names.services()
+    topics = [topic_info(session.node, *named) for named in names.names("topic")]
+    services = names.names("service")
     problems = [
         *check_node_names(nodes),
         *(result for topic in topics for result in check_endpoints(topic)),

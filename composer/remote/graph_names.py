@@ -8,18 +8,17 @@ from typing import Any, TypeVar
 
 from rclpy.action.graph import (
     get_action_client_names_and_types_by_node,
-    get_action_names_and_types,
     get_action_server_names_and_types_by_node,
 )
 from rclpy.node import Node
 
+from composer.names import is_hidden
 from composer.remote.name_matching import find_node, full_name, not_found_error
 from composer.remote.session import Deadline, RosError, Session
+from composer.runtime.process.graph_socket import NameAndTypes, visible
+from composer.runtime.ros.graph import names_and_types
 
 T = TypeVar("T")
-
-#: A name and its types. More than one type is a mistake in some node.
-NameAndTypes = tuple[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +44,6 @@ class ActionInfo:
     clients: tuple[str, ...]
 
 
-def is_hidden(name: str) -> bool:
-    """Say whether a part of the name starts with an underscore.
-
-    See 'hidden' in the ROS 2 design article 'Topic and Service name mapping'.
-    """
-    return any(part.startswith("_") for part in name.split("/"))
-
-
 class GraphNames:
     """Looks up names in the ROS graph, all within one time limit."""
 
@@ -61,22 +52,15 @@ class GraphNames:
         self._deadline = deadline
         self._node: Node = session.node
 
-    def nodes(self, *, hidden: bool = False) -> tuple[str, ...]:
-        """Return the full names of all nodes; a name that two nodes share is listed twice."""
-        return self._settled(lambda: self._nodes(hidden))
+    def names(self, kind: str, *, hidden: bool = False) -> tuple[NameAndTypes, ...]:
+        """Return all nodes, topics, services or actions, sorted, with their types.
 
-    def topics(self, *, hidden: bool = False) -> tuple[NameAndTypes, ...]:
-        """Return all topics and their types."""
-        found = self._settled(lambda: _sorted(self._node.get_topic_names_and_types(), hidden))
-        return found if self._session.others() else ()  # only the topics of this session
-
-    def services(self, *, hidden: bool = False) -> tuple[NameAndTypes, ...]:
-        """Return all services and their types."""
-        return self._settled(lambda: _sorted(self._node.get_service_names_and_types(), hidden))
-
-    def actions(self) -> tuple[NameAndTypes, ...]:
-        """Return all actions and their types."""
-        return self._settled(lambda: _sorted(get_action_names_and_types(self._node), hidden=False))
+        Nodes have no types. A name that two nodes share is listed twice.
+        """
+        found = self._settled(lambda: names_and_types(self._node, kind))
+        if kind == "topic" and not self._session.others():
+            return ()  # they are those of this session
+        return found if hidden else visible(found)
 
     def node(self, name: str, *, hidden: bool = False) -> NodeInfo:
         """Return the endpoints of a node. Raises NotFoundError."""
@@ -90,7 +74,7 @@ class GraphNames:
 
     def find_node(self, name: str) -> str:
         """Return the full name of the node that ``name`` refers to. Raises NotFoundError."""
-        return find_node(self._session, self._deadline, name, lambda: self._nodes(hidden=True))
+        return find_node(self._session, self._deadline, name, self._nodes)
 
     def types(self, kind: str, name: str) -> tuple[str, ...]:
         """Return the types of a topic, service or action, once it is discovered.
@@ -100,7 +84,7 @@ class GraphNames:
         absolute = full_name(kind, name)
 
         def known() -> dict[str, tuple[str, ...]]:
-            return dict(_sorted(_names_and_types(self._node, kind), hidden=True))
+            return dict(names_and_types(self._node, kind))
 
         types = self._session.search(lambda: known().get(absolute), self._deadline)
         if types is None:
@@ -122,9 +106,8 @@ class GraphNames:
     def _settled(self, poll: Callable[[], T]) -> T:
         return self._session.wait_until_settled(poll, self._deadline)
 
-    def _nodes(self, hidden: bool) -> tuple[str, ...]:
-        names = (f"{namespace.rstrip('/')}/{name}" for name, namespace in self._session.others())
-        return tuple(sorted(name for name in names if hidden or not is_hidden(name)))
+    def _nodes(self) -> tuple[str, ...]:
+        return tuple(name for name, _ in names_and_types(self._node, "node"))
 
     def _node_info(self, full_name: str, hidden: bool) -> NodeInfo:
         namespace, _, name = full_name.rpartition("/")
@@ -146,7 +129,7 @@ class GraphNames:
 
     def _action_info(self, name: str, types: tuple[str, ...]) -> ActionInfo:
         servers, clients = [], []
-        for node in self._nodes(hidden=True):
+        for node in self._nodes():
             info = self._node_info(node, hidden=True)
             servers += [node for found, _ in info.action_servers if found == name]
             clients += [node for found, _ in info.action_clients if found == name]
@@ -155,19 +138,9 @@ class GraphNames:
 
 def type_mismatch_hint(session: Session, kind: str, name: str, type_name: str) -> str | None:
     """Return a hint if other nodes use ``name`` with another type, else None."""
-    known = dict(_sorted(_names_and_types(session.node, kind), hidden=True)).get(name, ())
+    known = dict(names_and_types(session.node, kind)).get(name, ())
     others = [other for other in known if other != type_name]
     return f"other nodes use type {', '.join(others)}, not {type_name}" if others else None
-
-
-def _names_and_types(node: Node, kind: str) -> Iterable[tuple[str, list[str]]]:
-    match kind:
-        case "topic":
-            return node.get_topic_names_and_types()
-        case "service":
-            return node.get_service_names_and_types()
-        case _:
-            return get_action_names_and_types(node)
 
 
 def _sorted(found: Iterable[tuple[str, list[str]]], hidden: bool) -> tuple[NameAndTypes, ...]:

@@ -172,7 +172,7 @@ def names_by_node(session: Session, deadline: Deadline) -> dict[str, list[str] |
     # Nodes without parameter services are left out.
     services = {
         name: name.removesuffix(_LIST_SERVICE)
-        for name, _ in GraphNames(session, deadline).services()
+        for name, _ in GraphNames(session, deadline).names("service")
         if name.endswith(_LIST_SERVICE)
     }
     proxies = Proxies(session)

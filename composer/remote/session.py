@@ -16,32 +16,28 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from composer.runtime.process import dds_profiles
 from composer.runtime.process.dds_participants import count_participants, enlarge_receive_buffers
 from composer.runtime.process.instance_lock import local_systems
-from composer.runtime.ros.endpoints import UNKNOWN_NODE
+from composer.runtime.ros.graph import (
+    COMMAND_PREFIX,
+    SETTLE_S,
+    are_nodes_known,
+    other_nodes,
+    participants,
+)
 from composer.runtime.ros.manager_protocol import NAME
 
 T = TypeVar("T")
 H = TypeVar("H", bound=Hashable)
 
 _SPIN_S = 0.01
-#: The endpoints of a participant arrive 0.1 to 0.2 s after the participant itself; lost
-#: announcements are repeated 0.11 s later. Fast DDS 2 defines these times in EDPUtils.hpp.
-_SETTLE_S = 0.15
 #: How long to wait for the first other node, which may be on another computer.
 _FIRST_NODE_S = 0.5
 #: Fast DDS repeats the announcement of a participant every 3 s.
 _ANNOUNCED_WITHIN_S = 3.5
-#: The topic with which each ROS 2 participant announces its nodes, by its DDS name.
-_PARTICIPANTS_TOPIC = "ros_discovery_info"
-#: The length of the participant's prefix in the id of an endpoint (DDSI-RTPS, 9.3.1).
-_PARTICIPANT_BYTES = 12
-#: The nodes of commands, which are left out of listings.
-_NAME_PREFIX = "_compose_"
 
 
 class RosError(Exception):
@@ -107,7 +103,7 @@ class Session:
         # Without signal handlers: Ctrl-C remains Python's KeyboardInterrupt.
         self._context.init([])
         self.node = _SessionNode(
-            f"{_NAME_PREFIX}{os.getpid()}",
+            f"{COMMAND_PREFIX}{os.getpid()}",
             context=self._context,
             use_global_arguments=False,
             enable_rosout=False,
@@ -130,13 +126,7 @@ class Session:
 
     def others(self) -> tuple[tuple[str, str], ...]:
         """Return name and namespace of every known node except those of commands."""
-        return tuple(
-            sorted(
-                (name, namespace)
-                for name, namespace in self.node.get_node_names_and_namespaces()
-                if not name.startswith(_NAME_PREFIX)
-            )
-        )
+        return other_nodes(self.node)
 
     def unresponsive_systems(self) -> dict[str, str]:
         """Return the systems of this computer that are not discovered, with their process ids.
@@ -181,9 +171,9 @@ class Session:
 
     def _is_discovery_complete(self, unchanged_since_s: float) -> bool:
         """Say whether all participants are discovered, given when the result last changed."""
-        participants, others = self._discovered()
-        last_change_s = self._last_discovery.at_s((participants, others))
-        ready_s = max(last_change_s, unchanged_since_s) + _SETTLE_S
+        count, others = self._discovered()
+        last_change_s = self._last_discovery.at_s((count, others))
+        ready_s = max(last_change_s, unchanged_since_s) + SETTLE_S
         if not others:
             ready_s = max(ready_s, self.node.joined_s + _FIRST_NODE_S)
         now_s = time.monotonic()
@@ -191,36 +181,11 @@ class Session:
             return False
         if now_s >= self.node.joined_s + _ANNOUNCED_WITHIN_S:
             return True
-        return participants >= count_participants(self._domain_id) and self._are_nodes_known()
-
-    def _are_nodes_known(self) -> bool:
-        """Say whether each participant has announced its nodes, which it does last."""
-        node = self.node
-        participants = node.get_publishers_info_by_topic(_PARTICIPANTS_TOPIC, no_mangle=True)
-        publishers = [
-            endpoint
-            for topic, _ in node.get_topic_names_and_types()
-            for endpoint in node.get_publishers_info_by_topic(topic)
-        ]
-        named = [endpoint for endpoint in publishers if endpoint.node_name != UNKNOWN_NODE]
-        announced = {_participant(endpoint) for endpoint in named}
-        return len(named) == len(publishers) and announced.issuperset(
-            map(_participant, participants)
-        )
+        return count >= count_participants(self._domain_id) and are_nodes_known(self.node)
 
     def _discovered(self) -> tuple[int, tuple[tuple[str, str], ...]]:
-        """Return the number of known participants, including this one, and the nodes.
-
-        Publishers and subscriptions are announced separately; a participant counts with both.
-        """
-        node, topic = self.node, _PARTICIPANTS_TOPIC
-        publishers = node.get_publishers_info_by_topic(topic, no_mangle=True)
-        subscriptions = node.get_subscriptions_info_by_topic(topic, no_mangle=True)
-        return min(len(publishers), len(subscriptions)), self.others()
-
-
-def _participant(endpoint: TopicEndpointInfo) -> bytes:
-    return bytes(endpoint.endpoint_gid[:_PARTICIPANT_BYTES])
+        """Return the number of known participants, including this one, and the nodes."""
+        return len(participants(self.node)), self.others()
 
 
 class _LastChange:

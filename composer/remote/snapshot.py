@@ -16,7 +16,7 @@ from rclpy.node import Node
 
 from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.model import PortKind
-from composer.remote.graph_names import is_hidden
+from composer.names import is_hidden
 from composer.remote.parameters import plain_value
 from composer.remote.proxies import LIFECYCLE, PARAMETERS, Proxies
 from composer.remote.rate_sampling import RateMeter

@@ -22,7 +22,7 @@ from composer.cli.support.options import (
     finite,
 )
 from composer.cli.support.output import as_json, as_yaml, print_names
-from composer.cli.support.ros import ros_session
+from composer.cli.support.ros import graph_names, ros_session
 from composer.cli.support.terminal import say, write
 
 app = typer.Typer(
@@ -48,10 +48,7 @@ def list_actions(
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """List actions."""
-    with ros_session("compose action", timeout) as (session, deadline):
-        from composer.remote.graph_names import GraphNames
-
-        actions = GraphNames(session, deadline).actions()
+    actions = graph_names("compose action", "action", timeout)
     print_names("action", actions, types=types, count=count, json=json)
 
 

@@ -9,7 +9,7 @@ import typer
 
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Count, Hidden, Json, Timeout, examples
 from composer.cli.support.output import as_json, say_none_found
-from composer.cli.support.ros import ros_session
+from composer.cli.support.ros import graph_names, ros_session
 from composer.cli.support.terminal import columns, write
 
 app = typer.Typer(
@@ -38,14 +38,11 @@ def list_nodes(
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """List nodes."""
-    with ros_session("compose node", timeout) as (session, deadline):
-        from composer.remote.graph_names import GraphNames
-
-        nodes = GraphNames(session, deadline).nodes(hidden=hidden)
+    nodes = [name for name, _ in graph_names("compose node", "node", timeout, hidden=hidden)]
     if count:
         write(str(len(nodes)))
     elif json:
-        write(as_json(list(nodes), indent=2))
+        write(as_json(nodes, indent=2))
     elif nodes:
         write("\n".join(nodes))
     else:

@@ -16,7 +16,7 @@ from composer.cli.support.options import (
     examples,
 )
 from composer.cli.support.output import as_json, as_yaml, print_names
-from composer.cli.support.ros import ros_session
+from composer.cli.support.ros import graph_names, ros_session, types_of
 from composer.cli.support.terminal import write
 
 app = typer.Typer(
@@ -43,20 +43,14 @@ def list_services(
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """List services."""
-    with ros_session("compose service", timeout) as (session, deadline):
-        from composer.remote.graph_names import GraphNames
-
-        services = GraphNames(session, deadline).services(hidden=hidden)
+    services = graph_names("compose service", "service", timeout, hidden=hidden)
     print_names("service", services, types=types, count=count, json=json)
 
 
 @app.command("type", epilog=examples("compose service type /plan_trajectory"))
 def type_of(service: Service, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
     """Print the type of a service."""
-    with ros_session("compose service", timeout) as (session, deadline):
-        from composer.remote.graph_names import GraphNames
-
-        types = GraphNames(session, deadline).types("service", service)
+    types = types_of("compose service", "service", service, timeout)
     write(as_json(list(types), indent=2) if json else "\n".join(types))
 
 

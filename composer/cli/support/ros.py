@@ -13,6 +13,7 @@ from composer.cli.support.terminal import keep_stdout_for_data
 if TYPE_CHECKING:
     from composer.model import Node, System
     from composer.remote.session import Deadline, Session
+    from composer.runtime.process.graph_socket import NameAndTypes
 
 
 def require_ros(command: str) -> None:
@@ -72,3 +73,37 @@ def ros_session(
             yield session, deadline
     except RosError as error:
         raise CommandError(str(error), hint=error.hint) from error
+
+
+def graph_names(
+    command: str, kind: str, timeout_s: float, *, hidden: bool = False
+) -> tuple[NameAndTypes, ...]:
+    """Return the names of all nodes, topics, services or actions in the ROS graph, and their types.
+
+    A running system on this computer answers at once; without one, join the ROS graph.
+    """
+    require_ros(command)
+    from composer.remote.local_graph import local_names
+
+    found = local_names(kind, timeout_s, hidden=hidden)
+    if found is not None:
+        return found
+    with ros_session(command, timeout_s) as (session, deadline):
+        from composer.remote.graph_names import GraphNames
+
+        return GraphNames(session, deadline).names(kind, hidden=hidden)
+
+
+def types_of(command: str, kind: str, name: str, timeout_s: float) -> tuple[str, ...]:
+    """Return the types of a topic, service or action. Raises CommandError if there is none."""
+    require_ros(command)
+    from composer.remote.local_graph import local_names
+
+    known = dict(local_names(kind, timeout_s, hidden=True) or ())
+    absolute = name if name.startswith("/") else f"/{name}"
+    if absolute in known:
+        return known[absolute]
+    with ros_session(command, timeout_s) as (session, deadline):
+        from composer.remote.graph_names import GraphNames
+
+        return GraphNames(session, deadline).types(kind, name)

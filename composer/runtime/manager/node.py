@@ -35,6 +35,7 @@ from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.factory import log_exception
 from composer.runtime.executors.loop import Reply, unused_callback
+from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.other_instances import Instance, OtherInstances
 from composer.runtime.manager.proxy_services import ProxyServices
 from composer.runtime.manager.status_messages import status_message
@@ -42,6 +43,7 @@ from composer.runtime.metrics.diagnostics import Figures, to_message
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.node import RunningNode
 from composer.runtime.node.options import ProcessContext
+from composer.runtime.process.graph_socket import GraphSocket
 from composer.runtime.ros.manager_protocol import (
     CALLBACKS_QOS,
     CALLBACKS_TOPIC,
@@ -131,6 +133,8 @@ class ManagerNode:
         )
         if any(node.left_to_manager for node in status.snapshot().nodes):
             ProxyServices(self._node, self._loop, host.nodes, self._publish)
+        self._graph = GraphObserver(self._node, self._state.topic_name)
+        self._graph_socket = GraphSocket(namespace, self._graph.view, self._on_graph_error)
         self._loop.start()
         self._loop.call_every(_PERIOD_S, self._tick)
         self._loop.call_soon(self._publish)
@@ -141,6 +145,7 @@ class ManagerNode:
 
         In shared memory, a response would disappear together with the node.
         """
+        self._graph_socket.close(_ENDS_WITHIN_S)
         self._status.on_change(lambda: None)
         self._loop.call_soon(self._publish)
         if linger:
@@ -186,10 +191,14 @@ class ManagerNode:
     def _tick(self) -> None:
         self._host.update_status()
         self._instances.check()
+        self._graph.note_participants()
         if self._state.get_subscription_count() or self._diagnostics.get_subscription_count():
             self._publish()
         if self._callbacks.get_subscription_count():
             self._publish_callbacks()
+
+    def _on_graph_error(self, error: Exception) -> None:
+        self._node.get_logger().error(f"cannot send the ROS graph to a command: {error!r}")
 
     def _publish_callbacks(self) -> None:
         figures: tuple[Figures, ...] = (

@@ -74,6 +74,11 @@ def local_systems() -> dict[str, str]:
     return pids
 
 
+def socket_path(name: str) -> Path:
+    """Return the path of the Unix socket of a system, next to its lock file."""
+    return _path(name, ".sock")
+
+
 def _domain() -> str:
     return os.environ.get("ROS_DOMAIN_ID") or _DEFAULT_DOMAIN
 
@@ -83,12 +88,16 @@ def _folder() -> Path:
     return Path(parent, f"ros2-composer-{os.getuid()}")
 
 
+def _path(name: str, suffix: str) -> Path:
+    return _folder() / f"{_domain()}{name.replace('/', '.')}{suffix}"
+
+
 def _open(name: str) -> TextIO | None:
     """Open the lock file of a system; None if there cannot be one, and thus no lock."""
     if os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "OFF":
         return None  # no process discovers another one
-    folder = _folder()
-    path = folder / f"{_domain()}{name.replace('/', '.')}{_SUFFIX}"
+    path = _path(name, _SUFFIX)
+    folder = path.parent
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
         if folder.stat().st_uid != os.getuid():

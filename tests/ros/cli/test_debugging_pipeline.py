@@ -10,8 +10,14 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import yaml
+from std_msgs.msg import String
 
-from tests.ros.support.commands import PATIENCE_S, listed, output_of, running
+from composer.remote.graph_names import GraphNames
+from composer.remote.local_graph import local_names
+from composer.remote.session import Deadline, Session
+from composer.runtime.process.graph_socket import KINDS
+from tests.ros.support.commands import PATIENCE_S, hand_written, listed, output_of, running
+from tests.ros.support.in_process import Peer, wait_until
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -20,6 +26,37 @@ def pipeline(tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int) ->
         run.wait_for("3 of 3 nodes active")
         yield
         run.stop(signal.SIGTERM)
+
+
+@pytest.fixture
+def session(monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
+    """A session with the discovery range of the system."""
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    with Session() as session:
+        yield session
+
+
+def test_the_manager_sees_the_same_graph_as_a_new_node(session: Session, peer: Peer) -> None:
+    peer.node.create_publisher(String, "/of_an_external_node", 10)
+    names = GraphNames(session, Deadline(PATIENCE_S))
+    topic = ("/of_an_external_node", ("std_msgs/msg/String",))
+    # A command of another test may still be there.
+    wait_until(lambda: topic in (local_names("topic", PATIENCE_S) or ()), "the view of the manager")
+    session.wait_for(lambda: topic in names.names("topic") or None, Deadline(PATIENCE_S))
+    for kind in KINDS:
+        for hidden in (False, True):
+            expected = names.names(kind, hidden=hidden)
+            wait_until(
+                lambda: local_names(kind, PATIENCE_S, hidden=hidden) == expected,  # noqa: B023
+                f"each {kind}",
+            )
+    assert "/pipeline/manager" in dict(local_names("node", PATIENCE_S) or ())
+
+
+def test_a_killed_process_is_not_listed(session: Session) -> None:
+    with hand_written("hand_written_forgetful.py"):
+        wait_until(lambda: "/lab/forgetful" in dict(local_names("node", PATIENCE_S) or ()))
+    assert "/lab/forgetful" not in dict(local_names("node", PATIENCE_S) or ())
 
 
 #: Part of the output of each command; they only read, so they can run in parallel.

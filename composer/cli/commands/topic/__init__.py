@@ -20,7 +20,7 @@ from composer.cli.support.options import (
     examples,
 )
 from composer.cli.support.output import as_json, print_names
-from composer.cli.support.ros import ros_session
+from composer.cli.support.ros import graph_names, ros_session
 from composer.cli.support.terminal import write
 
 if TYPE_CHECKING:
@@ -50,10 +50,7 @@ def list_topics(
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """List topics."""
-    with ros_session("compose topic", timeout) as (session, deadline):
-        from composer.remote.graph_names import GraphNames
-
-        topics = GraphNames(session, deadline).topics(hidden=hidden)
+    topics = graph_names("compose topic", "topic", timeout, hidden=hidden)
     print_names("topic", topics, types=types, count=count, json=json)
 
 

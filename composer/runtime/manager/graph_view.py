@@ -1,0 +1,75 @@
+"""The manager's view of the ROS graph, and whether it is complete."""
+
+from __future__ import annotations
+
+import time
+
+from rclpy.node import Node
+
+from composer.runtime.process.dds_participants import count_participants
+from composer.runtime.process.graph_socket import KINDS, GraphView
+from composer.runtime.ros.graph import (
+    SETTLE_S,
+    are_nodes_known,
+    names_and_types,
+    participant,
+    participants,
+)
+
+#: How long to wait for a process that has just started; commands wait longer than that.
+_COMPLETE_WITHIN_S = 0.4
+_POLL_S = 0.02
+#: The bytes of a participant's prefix that Fast DDS derives from the computer.
+_HOST = slice(2, 4)
+
+
+class GraphObserver:
+    """Looks at the graph for commands.
+
+    DDS does not report when discovery is complete, and shows a killed process for up to 20 s. The
+    view counts as complete if it has as many participants on this computer as Linux lists sockets,
+    and if they have been known for a while or nothing changes anymore.
+    """
+
+    def __init__(self, node: Node, own_topic: str) -> None:
+        """``own_topic`` is a topic that ``node`` publishes, by its full name."""
+        self._node = node
+        self._own_topic = own_topic
+        self._domain_id = node.context.get_domain_id()
+        self._recent: frozenset[bytes] = frozenset()
+        self._settled: frozenset[bytes] = frozenset()
+
+    def note_participants(self) -> None:
+        """Note which participants are known. Call it every second."""
+        self._settled, self._recent = self._recent, participants(self._node)
+
+    def view(self) -> GraphView | None:
+        """Return the graph, None if it may be incomplete. Any thread may call."""
+        end_s = time.monotonic() + _COMPLETE_WITHIN_S
+        last: GraphView | None = None
+        changed_s = 0.0
+        while True:
+            known = participants(self._node)
+            view = {kind: names_and_types(self._node, kind) for kind in KINDS}
+            now_s = time.monotonic()
+            if view != last:
+                last, changed_s = view, now_s
+            is_settled = known <= self._settled or now_s >= changed_s + SETTLE_S
+            if is_settled and self._are_all_known(known):
+                return view
+            if now_s > end_s:
+                return None
+            time.sleep(_POLL_S)
+
+    def _are_all_known(self, known: frozenset[bytes]) -> bool:
+        """Say whether every process on this computer is known, and no ended one is."""
+        host = self._own_host()
+        local = sum(prefix[_HOST] == host for prefix in known)
+        return local == count_participants(self._domain_id) and are_nodes_known(self._node)
+
+    def _own_host(self) -> bytes | None:
+        name = self._node.get_name()
+        for endpoint in self._node.get_publishers_info_by_topic(self._own_topic):
+            if endpoint.node_name == name:
+                return participant(endpoint)[_HOST]
+        return None

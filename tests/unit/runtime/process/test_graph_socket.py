@@ -1,0 +1,127 @@
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from composer.runtime.process import graph_socket
+from composer.runtime.process.graph_socket import GraphSocket, GraphView, read_graph, visible
+from composer.runtime.process.instance_lock import socket_path
+
+VIEW: GraphView = {
+    "node": (("/a", ()), ("/_hidden", ())),
+    "topic": (("/chatter", ("std_msgs/msg/String", "std_msgs/msg/Int32")),),
+    "service": (),
+    "action": (("/navigate", ("composer_interfaces/action/Navigate",)),),
+}
+LIMIT_S = 10.0
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("run")))
+    found = socket_path("/robot").parent
+    found.mkdir()
+    return found
+
+
+@pytest.fixture
+def serve() -> Iterator[Callable[[Callable[[], GraphView | None]], list[Exception]]]:
+    """Serve a view as the system /robot; return the list of errors."""
+    sockets: list[GraphSocket] = []
+
+    def start(view: Callable[[], GraphView | None]) -> list[Exception]:
+        errors: list[Exception] = []
+        sockets.append(GraphSocket("/robot", view, errors.append))
+        return errors
+
+    yield start
+    for item in sockets:
+        item.close(LIMIT_S)
+
+
+def test_a_view_arrives_unchanged(serve: Callable[..., list[Exception]]) -> None:
+    serve(lambda: VIEW)
+    assert read_graph("/robot", LIMIT_S) == VIEW
+    assert read_graph("/robot", LIMIT_S) == VIEW
+    assert read_graph("/other", LIMIT_S) is None
+
+
+def test_a_large_view_arrives(serve: Callable[..., list[Exception]]) -> None:
+    topics = tuple((f"/topic_{number}", ("std_msgs/msg/String",)) for number in range(20_000))
+    serve(lambda: {**VIEW, "topic": topics})
+    found = read_graph("/robot", LIMIT_S)
+    assert found is not None
+    assert found["topic"] == topics
+
+
+def test_an_incomplete_view_is_none(serve: Callable[..., list[Exception]]) -> None:
+    serve(lambda: None)
+    assert read_graph("/robot", LIMIT_S) is None
+
+
+def test_an_error_is_reported_and_the_next_command_served(
+    serve: Callable[..., list[Exception]],
+) -> None:
+    problems = [ValueError("broken")]
+
+    def view() -> GraphView:
+        if problems:
+            raise problems.pop()
+        return VIEW
+
+    errors = serve(view)
+    assert read_graph("/robot", LIMIT_S) is None
+    assert [str(error) for error in errors] == ["broken"]
+    assert read_graph("/robot", LIMIT_S) == VIEW
+
+
+def test_the_view_of_another_discovery_range_is_not_used(
+    serve: Callable[..., list[Exception]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    serve(lambda: VIEW)
+    # Server and client share an environment here: each reads it once, the server first.
+    ranges = iter([["LOCALHOST"], ["SUBNET"]])
+    monkeypatch.setattr(graph_socket, "_environment", lambda: next(ranges))
+    assert read_graph("/robot", LIMIT_S) is None
+
+
+def test_a_system_that_does_not_respond_costs_no_more_than_the_limit(
+    serve: Callable[..., list[Exception]],
+) -> None:
+    released = threading.Event()
+    serve(lambda: VIEW if released.wait(LIMIT_S) else None)
+    began_s = time.monotonic()
+    assert read_graph("/robot", 0.02) is None
+    assert time.monotonic() - began_s < LIMIT_S / 2
+    released.set()
+
+
+def test_the_socket_of_a_killed_process_is_replaced(
+    folder: Path, serve: Callable[..., list[Exception]]
+) -> None:
+    socket_path("/robot").touch()
+    assert read_graph("/robot", LIMIT_S) is None
+    serve(lambda: VIEW)
+    assert read_graph("/robot", LIMIT_S) == VIEW
+
+
+def test_no_file_is_left_at_the_end(folder: Path) -> None:
+    server = GraphSocket("/robot", lambda: VIEW, lambda _: None)
+    assert len(list(folder.iterdir())) == 1
+    server.close(LIMIT_S)
+    assert list(folder.iterdir()) == []
+
+
+def test_a_name_too_long_for_a_socket_is_accepted() -> None:
+    system = "/" + "x" * 150
+    server = GraphSocket(system, lambda: VIEW, lambda _: None)
+    assert read_graph(system, LIMIT_S) is None
+    server.close(LIMIT_S)
+
+
+def test_hidden_names_are_left_out() -> None:
+    assert visible(VIEW["node"]) == (("/a", ()),)
