@@ -85,10 +85,13 @@ def _node_files(context: Context) -> dict[str, _NodeFile]:
     others = [connection.span for connection in system.connections]
     others += [profile.name.span for profile in system.qos_profiles]
     others += [executor.name.span for executor in system.executors]
+    others_in: dict[str, list[tuple[int, int]]] = {}
+    for span in others:
+        others_in.setdefault(span.file.path, []).append((span.line, span.column))
     node_files = {}
     for path, found in names.items():
         starts = sorted(found)
-        following = [(span.line, span.column) for span in others if span.file.path == path]
+        following = others_in.get(path, [])
         # The first known part after the last node starts here.
         end = min((place for place in following if starts and place > starts[-1]), default=None)
         node_files[path] = _NodeFile(starts, found, end)

@@ -84,9 +84,8 @@ class IncludeResolver:
     def _merge_included(self, file: SystemFile, include: Include) -> Part:
         span = include.file.span
         if len(self._stack) > MAX_INCLUDE_DEPTH:
-            raise LimitExceeded(
-                f"files include each other more than {MAX_INCLUDE_DEPTH} deep", span
-            )
+            message = f"files include each other more than {MAX_INCLUDE_DEPTH} deep"
+            raise LimitExceeded(message, span, "include the file directly")
         known = self.included.get(file.source.path, ())
         self.included[file.source.path] = (*known, span)
         tree = self.merge(file, include.arguments)

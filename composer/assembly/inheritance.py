@@ -98,7 +98,7 @@ def _base(
         return None
     if len(files) > MAX_INCLUDE_DEPTH:
         message = f"node types extend each other more than {MAX_INCLUDE_DEPTH} deep"
-        raise LimitExceeded(message, name.span)
+        raise LimitExceeded(message, name.span, "extend the base type directly")
     tree, source, found = read_document(path, shown_path(path))
     diagnostics += found
     if tree is None:

@@ -99,7 +99,7 @@ class Wildcards:
             self._found[pattern] = tuple(
                 name for name in self.names if matches_wildcard(pattern, name)
             )
-        self.limits.add(len(self._found[pattern]), span)
+        self.limits.match(len(self._found[pattern]), span)
         return self._found[pattern]
 
 

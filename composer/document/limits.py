@@ -1,6 +1,6 @@
 """Limits for the size of files.
 
-They allow any file written by hand and generated systems of 2000 nodes and 6000 connections. A file
+They allow any file written by hand and generated systems of 10 000 nodes. A file
 beyond a limit is refused within about one second and 200 MB.
 """
 
@@ -16,13 +16,16 @@ MAX_DEPTH = 32
 MAX_VALUES = 250_000
 
 #: Copies made by all ``for_each`` of one file.
-MAX_COPIES = 2_000
+MAX_COPIES = 10_000
 
 #: Files that a system includes, counting each include.
-MAX_INCLUDES = 500
+MAX_INCLUDES = 5_000
 
-#: Keys, values, maps and lists in all files that a system includes, and matches of patterns.
-MAX_INCLUDED_VALUES = 50_000
+#: Keys, values, maps and lists in all files that a system includes, again for each include.
+MAX_INCLUDED_VALUES = 200_000
+
+#: Node names that the patterns of a system stand for.
+MAX_MATCHES = 50_000
 
 #: Nesting depth of includes.
 MAX_INCLUDE_DEPTH = 16

@@ -61,7 +61,7 @@ class Substitution:
         self.growth.copies += copies
         if self.growth.copies > MAX_COPIES:
             message = f"with this, the file makes more than {MAX_COPIES:,} copies"
-            raise self._too_large(tree, message)
+            raise self._too_large(tree, message, "use fewer values")
 
     def add(self, tree: Tree, depth: int) -> Sized:
         """Return ``tree`` with its variables replaced, adding to the counts."""
@@ -149,8 +149,10 @@ class Substitution:
             self._report(rules.UNKNOWN_VARIABLE, message, reference, scalar, hint)
         return found
 
-    def _too_large(self, tree: Tree, message: str) -> TooLarge:
-        return TooLarge(Diagnostic(rules.TOO_LARGE, message, tree.span))
+    def _too_large(
+        self, tree: Tree, message: str, hint: str = "use shorter values, or fewer variables"
+    ) -> TooLarge:
+        return TooLarge(Diagnostic(rules.TOO_LARGE, message, tree.span, hint=hint))
 
     def _report(
         self,

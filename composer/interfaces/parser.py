@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
 
+from composer.diagnostics import shown
+from composer.document.limits import MAX_NUMBER_LENGTH
 from composer.interfaces.definitions import (
     FLOATS,
     INTEGER_RANGES,
@@ -40,6 +41,8 @@ _MESSAGE_TYPE = re.compile(
 )
 _FIELD_NAME = re.compile(r"(?!.*__)(?!.*_$)[a-z][a-z0-9_]*", re.ASCII)
 _CONSTANT_NAME = re.compile(r"(?!.*__)(?!.*_$)[A-Z][A-Z0-9_]*", re.ASCII)
+_QUOTED = re.compile(r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\"""")
+_UNQUOTED = re.compile(r"""[^,'"]+|[,'"]""")
 _SEPARATOR = "---"
 _QUOTES = ("'", '"')
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
@@ -68,7 +71,7 @@ def parse_definition(name: str, text: str) -> Interface:
     """
     names = split_name(name)
     if names is None:
-        raise ValueError(f"'{name}' is not the name of an interface")
+        raise ValueError(f"'{shown(name)}' is not the name of an interface")
     package, folder, _ = names
     parts = _parts(text)
     expected = {"msg": 1, "srv": 2, "action": 3}[folder]
@@ -120,14 +123,15 @@ def _parts(text: str) -> list[_Lines]:
 def _message(name: str, package: str, lines: _Lines) -> Message:
     fields: list[Field] = []
     constants: list[MessageConstant] = []
+    names: set[str] = set()
     for number, line in lines:
         try:
             item = _member(line, package)
         except ValueError as error:
             raise DefinitionError(str(error), number) from None
-        known: Iterable[Field | MessageConstant] = (*fields, *constants)
-        if any(item.name == other.name for other in known):
-            raise DefinitionError(f"'{item.name}' is defined twice", number)
+        if item.name in names:
+            raise DefinitionError(f"'{shown(item.name)}' is defined twice", number)
+        names.add(item.name)
         if isinstance(item, Field):
             fields.append(item)
         else:
@@ -139,14 +143,16 @@ def _member(line: str, package: str) -> Field | MessageConstant:
     type_text, _, rest = line.partition(" ")
     rest = rest.strip()
     if not rest:
-        raise ValueError(f"'{line}' has no name behind the type")
+        raise ValueError(f"'{shown(line)}' has no name behind the type")
     type_ = _type(type_text, package)
     if "=" in rest:
         name, _, value = rest.partition("=")
         return _constant(type_, name.strip(), value.strip())
     name, _, default = rest.partition(" ")
     if not _FIELD_NAME.fullmatch(name):
-        raise ValueError(f"'{name}' is not a field name: lower case letters, digits, single '_'")
+        raise ValueError(
+            f"'{shown(name)}' is not a field name: lower case letters, digits, single '_'"
+        )
     return Field(name, type_, _default(type_, default.strip()) if default.strip() else None)
 
 
@@ -154,21 +160,23 @@ def _constant(type_: FieldType, name: str, value: str) -> MessageConstant:
     if type_.is_array or not type_.is_primitive:
         raise ValueError(f"a constant has a primitive type, not {type_}")
     if not _CONSTANT_NAME.fullmatch(name):
-        raise ValueError(f"'{name}' is not a constant's name: upper case letters, digits, '_'")
+        raise ValueError(
+            f"'{shown(name)}' is not a constant's name: upper case letters, digits, '_'"
+        )
     return MessageConstant(name, type_, _value(type_, value))
 
 
 def _type(text: str, package: str) -> FieldType:
     match = _TYPE.fullmatch(text)
     if match is None:
-        raise ValueError(f"'{text}' is not a type")
+        raise ValueError(f"'{shown(text)}' is not a type")
     name, limit = match["name"], match["limit"] or ""
     string_bound = int(match["string_bound"]) if match["string_bound"] else None
     if string_bound is not None and name not in TEXTS:
-        raise ValueError(f"only strings can have a maximum length, not '{name}'")
+        raise ValueError(f"only strings can have a maximum length, not '{shown(name)}'")
     count = int(limit.removeprefix("<=")) if limit else None
     if count == 0 or string_bound == 0:
-        raise ValueError(f"'{text}' has room for nothing")
+        raise ValueError(f"'{shown(text)}' has room for nothing")
     bounded = limit.startswith("<=")
     return FieldType(
         _type_name(name, package),
@@ -186,7 +194,7 @@ def _type_name(name: str, package: str) -> str:
         return name
     match = _MESSAGE_TYPE.fullmatch(name)
     if match is None:
-        raise ValueError(f"'{name}' is neither a primitive type nor a message")
+        raise ValueError(f"'{shown(name)}' is neither a primitive type nor a message")
     return f"{match['package'] or package}/msg/{match['name']}"
 
 
@@ -196,7 +204,7 @@ def _default(type_: FieldType, text: str) -> Plain:
     if not type_.is_array:
         return _value(type_, text)
     if not (text.startswith("[") and text.endswith("]")):
-        raise ValueError(f"the default of an array is a list in brackets, not {text}")
+        raise ValueError(f"the default of an array is a list in brackets, not {shown(text)}")
     values: list[Plain] = [_value(type_.element, item) for item in _items(text[1:-1])]
     too_many = type_.array_bound is not None and len(values) > type_.array_bound
     if too_many or type_.array_size not in (None, len(values)):
@@ -206,9 +214,22 @@ def _default(type_: FieldType, text: str) -> Plain:
 
 def _items(text: str) -> list[str]:
     """Return the items between commas outside quotes."""
-    quoted = r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\""""
-    items = re.findall(rf"\s*((?:{quoted}|[^,])+)", text)
-    return [item.strip() for item in items if item.strip()]
+    items: list[list[str]] = [[]]
+    at = 0
+    unclosed: set[str] = set()  # quotes that are not closed behind ``at`` either
+    while at < len(text):
+        first = text[at]
+        quoted = _QUOTED.match(text, at) if first in _QUOTES and first not in unclosed else None
+        if quoted is None and first in _QUOTES:
+            unclosed.add(first)
+        part = (quoted or _UNQUOTED.match(text, at) or [first])[0]
+        if part == ",":
+            items.append([])
+        else:
+            items[-1].append(part)
+        at += len(part)
+    stripped = ("".join(parts).strip() for parts in items)
+    return [item for item in stripped if item]
 
 
 def _value(type_: FieldType, text: str) -> ScalarValue:
@@ -221,15 +242,17 @@ def _value(type_: FieldType, text: str) -> ScalarValue:
         return _float(name, text)
     if name in TEXTS:
         return _text(type_, text)
-    raise ValueError(f"'{text}' is not a value of type {type_}")
+    raise ValueError(f"'{shown(text)}' is not a value of type {type_}")
 
 
 def _integer(name: str, text: str) -> int:
     low, high = INTEGER_RANGES[name]
+    if len(text) > MAX_NUMBER_LENGTH:
+        raise ValueError(f"'{shown(text)}' has more than {MAX_NUMBER_LENGTH} digits")
     try:
         value = int(text) if text.lstrip("+-").isdigit() else int(text, 0)
     except ValueError:
-        raise ValueError(f"'{text}' is not an integer") from None
+        raise ValueError(f"'{shown(text)}' is not an integer") from None
     if not low <= value <= high:
         raise ValueError(f"{value} is outside the range of {name}, {low} to {high}")
     return value
@@ -239,9 +262,9 @@ def _float(name: str, text: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise ValueError(f"'{text}' is not a number") from None
+        raise ValueError(f"'{shown(text)}' is not a number") from None
     if not math.isfinite(value):
-        raise ValueError(f"'{text}' is not a finite {name}")
+        raise ValueError(f"'{shown(text)}' is not a finite {name}")
     return value
 
 

@@ -13,7 +13,15 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from composer.diagnostics import Diagnostic, Rule, Severity, nearest, register, registered_rules
+from composer.diagnostics import (
+    Diagnostic,
+    Rule,
+    Severity,
+    nearest,
+    register,
+    registered_rules,
+    shown,
+)
 from composer.source import SourceFile, Span
 
 RULE = register(
@@ -89,8 +97,9 @@ def without_ignored(
         if diagnostic.severity is Severity.ERROR or not ignores:
             kept.append(diagnostic)
     if complete:
+        names = tuple(name for rule in registered_rules() for name in (rule.code, rule.name))
         unused = (ignore for ignore in ignores_in(source) if ignore.span not in used)
-        kept += [_unused(ignore, is_error=ignore.span in errors) for ignore in unused]
+        kept += [_unused(ignore, names, is_error=ignore.span in errors) for ignore in unused]
     return kept
 
 
@@ -98,12 +107,24 @@ def ignores_in(source: SourceFile) -> Iterator[Ignore]:
     """Yield the rules that the comments of a file ignore."""
     if _MARK not in source.text:
         return
+    waiting: list[tuple[int, re.Match[str]]] = []  # comments about the next line with content
     for number, text in enumerate(source.lines, start=1):
         found = _COMMENT.search(text) if _MARK in text else None
-        if found is None:
-            continue
-        line = _next_line(source, number) if _ONLY_COMMENT.match(text) else number
-        for name in _NAME.finditer(text, *found.span("names")):
+        if _ONLY_COMMENT.match(text) is None:
+            waiting += [] if found is None else [(number, found)]
+            yield from _ignores(waiting, number, source)
+            waiting.clear()
+        elif found is not None:
+            waiting.append((number, found))
+    yield from _ignores(waiting, len(source.lines), source)
+
+
+def _ignores(
+    comments: Iterable[tuple[int, re.Match[str]]], line: int, source: SourceFile
+) -> Iterator[Ignore]:
+    """Yield the rules that ``comments`` ignore on ``line``."""
+    for number, comment in comments:
+        for name in _NAME.finditer(comment.string, *comment.span("names")):
             length = name.end() - name.start()
             yield Ignore(name[0], line, Span(source, number, name.start() + 1, length))
 
@@ -125,20 +146,13 @@ class _Table:
         return self._files[path].get(span.line, [])
 
 
-def _next_line(source: SourceFile, number: int) -> int:
-    """Return the first line after line ``number`` that is not blank or a comment."""
-    following = range(number + 1, len(source.lines) + 1)
-    return next((line for line in following if not _ONLY_COMMENT.match(source.line(line))), number)
-
-
-def _unused(ignore: Ignore, *, is_error: bool) -> Diagnostic:
+def _unused(ignore: Ignore, names: tuple[str, ...], *, is_error: bool) -> Diagnostic:
     if is_error:
-        message = f"'{ignore.rule}' is an error here"
+        message = f"'{shown(ignore.rule)}' is an error here"
         return Diagnostic(RULE, message, ignore.span, hint="errors cannot be ignored; fix it")
-    names = {name for rule in registered_rules() for name in (rule.code, rule.name)}
     if ignore.rule in names:
         message = f"there is no '{ignore.rule}' to ignore here"
         return Diagnostic(RULE, message, ignore.span, hint="remove the comment")
     close = nearest(ignore.rule, names)
     hint = f"did you mean '{close}'?" if close is not None else "'compose rule' lists the rules"
-    return Diagnostic(RULE, f"no rule is named '{ignore.rule}'", ignore.span, hint=hint)
+    return Diagnostic(RULE, f"no rule is named '{shown(ignore.rule)}'", ignore.span, hint=hint)

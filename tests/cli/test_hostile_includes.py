@@ -36,8 +36,8 @@ BOMBS: dict[str, tuple[dict[str, str], str, str]] = {
         {"s0": often("s0", "s1", 40), "s1": often("s1", "many", 40), "many": MANY},
         "too-much-included", "s1.yaml:3:31"),
     "very many of few": (
-        {"s0": often("s0", "s1", 30), "s1": often("s1", "s2", 30), "s2": FEW},
-        "too-much-included", "s1.yaml:3:31"),
+        {"s0": often("s0", "s1", 99), "s1": often("s1", "s2", 99), "s2": FEW},
+        "too-much-included", "s0.yaml:3:31"),
     "large files": (
         {"s0": "system: s\ninclude: [s1.yaml, s2.yaml, s3.yaml]\n",
          **{f"s{number}": FEW.replace("n:", f"n{number}:") + PADDING for number in (1, 2, 3)}},

@@ -105,4 +105,10 @@ def test_folders_are_searched_at_any_depth(tmp_path: Path) -> None:
         folder /= "d"
         folder.mkdir()
     (folder / "a.yaml").write_text("system: a\n")
-    assert find_files([tmp_path]).files == (folder / "a.yaml",)
+    try:
+        assert find_files([tmp_path]).files == (folder / "a.yaml",)
+    finally:  # pytest's own cleanup is recursive
+        (folder / "a.yaml").unlink()
+        while folder != tmp_path:
+            folder.rmdir()
+            folder = folder.parent

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import gc
-import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from composer.loading import load
+from composer.loading import load, load_bytes
+from tests.unit.support.growth import assert_linear
 
 SMALL, LARGE = 100, 800
 STRING = "type: std_msgs/msg/String"
@@ -64,25 +65,69 @@ def write(path: Path, parts: list[tuple[str, str]], count: int) -> None:
     path.write_text("".join(lines))
 
 
-def seconds(path: Path, rule: str) -> float:
-    gc.collect()
-    start_s = time.process_time()
-    loading = load(path)
-    taken_s = time.process_time() - start_s
-    assert rule in {diagnostic.rule.name for diagnostic in loading.diagnostics}
-    return taken_s
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("parts", "rule"), SYSTEMS.values(), ids=SYSTEMS)
 def test_growth(tmp_path: Path, parts: list[tuple[str, str]], rule: str) -> None:
-    small, large = tmp_path / "small.yaml", tmp_path / "large.yaml"
-    write(small, parts, SMALL)
-    write(large, parts, LARGE)
-    small_s = min(seconds(small, rule) for _ in range(3))
-    ratios: list[float] = []
-    for _ in range(3):  # what is slow by chance is not so three times
-        ratios.append(seconds(large, rule) / small_s)
-        if ratios[-1] < 3 * LARGE / SMALL:
-            return
-    pytest.fail(f"{LARGE // SMALL} times the size takes {ratios} times the time")
+    for count in (SMALL, LARGE):
+        write(tmp_path / f"{count}.yaml", parts, count)
+
+    def validate(count: int) -> None:
+        loading = load(tmp_path / f"{count}.yaml")
+        assert rule in {diagnostic.rule.name for diagnostic in loading.diagnostics}
+
+    assert_linear(validate, SMALL, LARGE)
+
+
+PORT = f"{{{STRING}, qos: command, external: true}}"
+NODE = f"{{publishers: {{a: {PORT}}}, lifecycle: {{depends_on: [first]}}}}"
+
+
+def written(count: int) -> str:
+    return "".join(f"  n{number}: {NODE}\n" for number in range(count))
+
+
+def copied(count: int) -> str:
+    return f"  n${{i}}: {{for_each: {{i: {count}}}, {NODE[1:]}\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("nodes", [written, copied])
+def test_many_valid_nodes(tmp_path: Path, nodes: Callable[[int], str]) -> None:
+    def validate(count: int) -> None:
+        text = f"system: large\nnodes:\n  first: {{publishers: {{a: {PORT}}}}}\n{nodes(count)}"
+        loading = load_bytes(text.encode(), tmp_path, shown="large.yaml")
+        assert loading.system is not None
+        assert len(loading.system.nodes) == count + 1
+        assert loading.diagnostics == []
+
+    assert_linear(validate, 500, 4_000)
+
+
+@pytest.mark.slow
+def test_many_included_nodes(tmp_path: Path) -> None:
+    part = f"system: part\nnodes:\n  first: {{publishers: {{a: {PORT}}}}}\n{written(4)}"
+    (tmp_path / "part.yaml").write_text(part)
+
+    def validate(count: int) -> None:
+        place = "prefix: 'p${i}_', namespace: 'p${i}'"
+        text = f"system: a\ninclude: [{{for_each: {{i: {count}}}, file: part.yaml, {place}}}]\n"
+        loading = load_bytes(text.encode(), tmp_path, shown="large.yaml")
+        assert loading.system is not None
+        assert len(loading.system.nodes) == 5 * count
+        assert loading.diagnostics == []
+
+    assert_linear(validate, 100, 800)
+
+
+def test_loading_pauses_the_cycle_collection_only_while_it_runs(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text(f"system: a\nnodes: {{first: {{publishers: {{a: {PORT}}}}}}}")
+    collections: list[str] = []
+    gc.callbacks.append(lambda phase, _: collections.append(phase))
+    try:
+        before = gc.isenabled()
+        for _ in range(20):
+            load(tmp_path / "a.yaml")
+        assert gc.isenabled() == before
+    finally:
+        gc.callbacks.pop()
+    assert collections == []

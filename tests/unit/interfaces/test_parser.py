@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from composer.interfaces import (
@@ -16,6 +18,7 @@ from composer.interfaces import (
     split_name,
 )
 from composer.interfaces.parser import without_comments
+from tests.unit.support.growth import assert_linear
 
 NAME = "demo_msgs/msg/Demo"
 
@@ -162,3 +165,24 @@ def test_a_field_is_found_by_name() -> None:
 )
 def test_a_type_is_shown_as_it_is_written(text: str) -> None:
     assert str(message(f"{text} a").fields[0].type) == text
+
+
+LARGE: dict[str, Callable[[int], str]] = {
+    "fields": lambda count: "".join(f"bool f{number}\n" for number in range(count)),
+    "escaped quotes": lambda count: "string[] a [" + '\\"' * count + "]",
+    "commas and quotes": lambda count: "string[] a [" + "',\"" * count + "]",
+}
+
+
+@pytest.mark.parametrize("text", LARGE.values(), ids=LARGE)
+def test_large_definitions_take_linear_time(text: Callable[[int], str]) -> None:
+    assert_linear(lambda count: message(text(count)), 500, 4000)
+
+
+@pytest.mark.parametrize(
+    "line", ["x" * 5000, "bool " + "X" * 5000, "int64 a " + "1" * 5000, "int64 A=0x" + "f" * 5000]
+)
+def test_messages_about_long_texts_are_short(line: str) -> None:
+    with pytest.raises(DefinitionError) as raised:
+        message(line)
+    assert len(raised.value.message) < 200

@@ -7,6 +7,9 @@ import pytest
 from composer.diagnostics import Diagnostic, Severity
 from composer.loading import load
 from composer.project import Project
+from composer.project.toml import read_table
+from composer.source import SourceFile
+from tests.unit.support.growth import assert_linear
 
 PYPROJECT = """\
 [project]
@@ -264,3 +267,15 @@ def test_keys_are_found_below_their_own_table(tmp_path: Path) -> None:
     )
     found = [item for item in Project.at(tmp_path).diagnostics if "'strict'" in item.message]
     assert [str(item.primary).rpartition(".toml:")[2] for item in found] == ["8:10"]
+
+
+def test_many_keys_take_linear_time(tmp_path: Path) -> None:
+    def read(count: int) -> None:
+        keys = "".join(f"k{number} = {number}\n" for number in range(count))
+        source = SourceFile("pyproject.toml", f"[tool.composer]\n{keys}")
+        table = read_table(source)
+        assert table is not None
+        assert table[0] is not None
+        assert table[0].entries[-1].key.span.line == count + 1
+
+    assert_linear(read, 200, 1600)

@@ -9,6 +9,7 @@ import pytest
 from composer.rules.unused_ignore import ignores_in
 from composer.source import SourceFile
 from tests.unit.support.checking import diagnostics_in, quoted, rules_broken
+from tests.unit.support.growth import assert_linear
 
 SYSTEM = """\
 system: demo
@@ -114,3 +115,12 @@ def test_spans_of_rules_in_a_comment_are_exact() -> None:
         ("one", 1, 27),
         ("RC301", 1, 32),
     ]
+
+
+def test_many_comments_take_linear_time() -> None:
+    def read(count: int) -> None:
+        text = "system: a\n" + "# compose: ignore[qos-implicit]\n" * count + "nodes: {}\n"
+        lines = {ignore.line for ignore in ignores_in(SourceFile("a.yaml", text))}
+        assert lines == {count + 2}
+
+    assert_linear(read, 300, 2400)
