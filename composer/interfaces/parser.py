@@ -11,7 +11,6 @@ import math
 import re
 
 from composer.diagnostics import shown
-from composer.document.limits import MAX_NUMBER_LENGTH
 from composer.interfaces.definitions import (
     FLOATS,
     INTEGER_RANGES,
@@ -44,6 +43,7 @@ _CONSTANT_NAME = re.compile(r"(?!.*__)(?!.*_$)[A-Z][A-Z0-9_]*", re.ASCII)
 _QUOTED = re.compile(r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\"""")
 _UNQUOTED = re.compile(r"""[^,'"]+|[,'"]""")
 _SEPARATOR = "---"
+_MAX_DIGITS = 100  # of an integer
 _QUOTES = ("'", '"')
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 _Lines = list[tuple[int, str]]
@@ -247,8 +247,8 @@ def _value(type_: FieldType, text: str) -> ScalarValue:
 
 def _integer(name: str, text: str) -> int:
     low, high = INTEGER_RANGES[name]
-    if len(text) > MAX_NUMBER_LENGTH:
-        raise ValueError(f"'{shown(text)}' has more than {MAX_NUMBER_LENGTH} digits")
+    if len(text) > _MAX_DIGITS:
+        raise ValueError(f"'{shown(text)}' has more than {_MAX_DIGITS} digits")
     try:
         value = int(text) if text.lstrip("+-").isdigit() else int(text, 0)
     except ValueError:

@@ -12,14 +12,36 @@ from composer.report.snippet import BOLD, FRAME, Annotation, Style, draw, snippe
 _COLORS = {Severity.ERROR: "31", Severity.WARNING: "33", Severity.INFO: "36"}
 
 
-def render(diagnostics: Sequence[Diagnostic], *, color: bool = False) -> str:
-    """Return the diagnostics, separated by blank lines, and the summary.
+#: The default maximum number of diagnostics in a report as text.
+MAX_DIAGNOSTICS = 200
 
-    ``color`` adds ANSI colors.
+
+def render(
+    diagnostics: Sequence[Diagnostic],
+    *,
+    color: bool = False,
+    maximum: int | None = MAX_DIAGNOSTICS,
+) -> str:
+    """Return the diagnostics, separated by blank lines, and the summary of all of them.
+
+    ``color`` adds ANSI colors. Of more than ``maximum`` diagnostics, the most severe are shown, in
+    the same order; None shows all.
     """
     style = Style(color)
-    blocks = [_diagnostic(diagnostic, style) for diagnostic in diagnostics]
-    return "\n\n".join([*blocks, summary(diagnostics)]) + "\n"
+    shown = _most_severe(diagnostics, maximum)
+    blocks = [_diagnostic(diagnostic, style) for diagnostic in shown]
+    total = summary(diagnostics)
+    if len(shown) < len(diagnostics):
+        total += f"; showing {len(shown)} of {len(diagnostics)}"
+    return "\n\n".join([*blocks, total]) + "\n"
+
+
+def _most_severe(diagnostics: Sequence[Diagnostic], maximum: int | None) -> Sequence[Diagnostic]:
+    if maximum is None or len(diagnostics) <= maximum:
+        return diagnostics
+    ranks = {severity: rank for rank, severity in enumerate(Severity)}
+    numbers = sorted(range(len(diagnostics)), key=lambda n: ranks[diagnostics[n].severity])
+    return [diagnostics[number] for number in sorted(numbers[:maximum])]
 
 
 def summary(diagnostics: Iterable[Diagnostic]) -> str:

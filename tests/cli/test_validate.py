@@ -240,3 +240,22 @@ def test_colors_are_only_for_terminals_unless_forced(
     assert "\x1b[" in compose("validate", "broken.yaml").out
     monkeypatch.setenv("NO_COLOR", "1")
     assert "\x1b[" not in compose("validate", "broken.yaml").out
+
+
+@pytest.mark.parametrize(
+    ("options", "shown"),
+    [((), 200), (("--max-diagnostics", "7"), 7), (("--max-diagnostics", "0"), 0)],
+)
+def test_text_has_a_maximum_of_diagnostics(
+    folder: Path, options: tuple[str, ...], shown: int
+) -> None:
+    Path("repeated.yaml").write_text("system: a\nnodes: {b: {}}\n" + "nodes: {}\n" * 300)
+    done = compose("validate", "repeated.yaml", *options)
+    assert done.code == 1
+    assert done.out.count("error[RC011 ") == (shown or 300)
+    assert done.out.endswith(
+        f"found 300 errors; showing {shown} of 300\n" if shown else "found 300 errors\n"
+    )
+    assert ("use --max-diagnostics 0" in done.err) == bool(shown)
+    done = compose("validate", "repeated.yaml", *options, "--format", "json")
+    assert len(json.loads(done.out)["diagnostics"]) == 300

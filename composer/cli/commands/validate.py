@@ -82,6 +82,15 @@ def validate(
     ignore: Annotated[
         Rules, typer.Option(metavar="RULE", help=f"Do not report this rule: {_RULE}")
     ] = None,
+    max_diagnostics: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=0,
+            help="Show at most N diagnostics as text, errors first; 0 for all. Default: 200.",
+            show_default=False,
+        ),
+    ] = None,
     stdin_name: Annotated[
         str,
         typer.Option(
@@ -95,11 +104,13 @@ def validate(
     composer.yaml or in the [tool.composer] table of its pyproject.toml: strict, select, ignore,
     severity, nodes and interfaces.
 
-    Exit code 1 if there are errors, or warnings with --strict.
+    The formats json, sarif and github always have all diagnostics.
+
+    Exit code 1 if there are errors, or warnings with --strict, also if they are not shown.
     """
     checked = _check(paths, stdin_name)
     diagnostics = _selected(checked.diagnostics, select or [], ignore or [])
-    _print(diagnostics, output_format or _default_format())
+    _print(diagnostics, output_format or _default_format(), max_diagnostics)
     suffix = "" if diagnostics else ": no problems found"
     say(f"{checked.files} file{'' if checked.files == 1 else 's'} checked{suffix}")
     if checked.foreign:
@@ -174,16 +185,25 @@ def _default_format() -> ReportFormat:
     return ReportFormat.GITHUB if os.environ.get("GITHUB_ACTIONS") == "true" else ReportFormat.TEXT
 
 
-def _print(diagnostics: list[Diagnostic], output_format: ReportFormat) -> None:
+def _print(
+    diagnostics: list[Diagnostic], output_format: ReportFormat, max_diagnostics: int | None
+) -> None:
     if output_format is ReportFormat.TEXT:
         if diagnostics:
-            from composer.report.text import render as render_text
-
-            write_raw(render_text(diagnostics, color=use_color(sys.stdout)))
+            _print_text(diagnostics, max_diagnostics)
         return
     # Imported on demand: the other formats are rarely used and slow to import.
     render = import_module(f"composer.report.{output_format}").render
     write_raw(render(diagnostics))
+
+
+def _print_text(diagnostics: list[Diagnostic], max_diagnostics: int | None) -> None:
+    from composer.report.text import MAX_DIAGNOSTICS, render
+
+    maximum = MAX_DIAGNOSTICS if max_diagnostics is None else max_diagnostics or None
+    write_raw(render(diagnostics, color=use_color(sys.stdout), maximum=maximum))
+    if maximum is not None and len(diagnostics) > maximum:
+        say("use --max-diagnostics 0 to show all diagnostics")
 
 
 def _is_error(diagnostic: Diagnostic, strict: bool) -> bool:

@@ -129,3 +129,15 @@ def test_color_changes_only_escape_sequences() -> None:
 )
 def test_the_summary_counts(severities: list[Severity], line: str) -> None:
     assert summary(diagnostic("a", "a", made_by=rule(severity)) for severity in severities) == line
+
+
+def test_of_too_many_diagnostics_the_most_severe_are_shown_in_order() -> None:
+    severities = [Severity.INFO, Severity.WARNING, Severity.ERROR, Severity.WARNING, Severity.ERROR]
+    found = [
+        replace(diagnostic("key: wrong", "wrong"), rule=rule(severity), message=f"number {number}")
+        for number, severity in enumerate(severities)
+    ]
+    report = render(found, maximum=3)
+    assert re.findall(r"number (\d)", report) == ["1", "2", "4"]
+    assert report.endswith("\n\nfound 2 errors, 2 warnings, 1 info; showing 3 of 5\n")
+    assert render(found, maximum=5) == render(found)
