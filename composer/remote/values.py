@@ -12,6 +12,7 @@ from composer.document import parse_document
 from composer.expressions import EvaluationError
 from composer.interfaces import Interfaces
 from composer.interfaces.index import similar_interface
+from composer.remote.field_paths import path_steps
 from composer.remote.session import RosError
 from composer.runtime.ros.messages import MessageError, compile_message, interface_class
 from composer.source import SourceFile
@@ -108,12 +109,12 @@ def to_plain(value: Any) -> Any:
 
 
 def part(value: Any, path: str) -> Any:
-    """Return the part of a message that ``path`` names: ``pose.position.x``, ``ranges.3``.
+    """Return the part of a message that ``path`` names: ``pose.position.x``, ``ranges[3]``.
 
     Raises InvalidValueError.
     """
-    for name in path.split("."):
-        value = _step(value, name, path)
+    for step in path_steps(path):
+        value = _step(value, step, path)
     return value
 
 
@@ -132,15 +133,16 @@ def age_s(message: Any, arrived_s: float) -> float:
     return float(now_s - (stamp.sec + stamp.nanosec * 1e-9))
 
 
-def _step(value: Any, name: str, path: str) -> Any:
-    if hasattr(value, "get_fields_and_field_types"):
+def _step(value: Any, step: str | int, path: str) -> Any:
+    if isinstance(step, str) and hasattr(value, "get_fields_and_field_types"):
         fields = value.get_fields_and_field_types()
-        if name in fields:
-            return getattr(value, name)
-        raise InvalidValueError(f"'{path}': there is no field '{name}'", suggestion(name, fields))
-    if name.isdigit() and hasattr(value, "__getitem__") and not isinstance(value, str):
+        if step in fields:
+            return getattr(value, step)
+        raise InvalidValueError(f"'{path}': there is no field '{step}'", suggestion(step, fields))
+    if isinstance(step, int) and hasattr(value, "__getitem__") and not isinstance(value, str):
         try:
-            return value[int(name)]
+            return value[step]
         except IndexError as error:
-            raise InvalidValueError(f"'{path}': there are only {len(value)} items") from error
-    raise InvalidValueError(f"'{path}': {value!r:.60} has no part '{name}'")
+            count = f"{len(value)} item{'' if len(value) == 1 else 's'}"
+            raise InvalidValueError(f"'{path}': index {step} of {count}") from error
+    raise InvalidValueError(f"'{path}': {value!r:.60} has no part '{step}'")

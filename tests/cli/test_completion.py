@@ -5,11 +5,26 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from composer.cli.support.completion import (
+    Complete,
+    complete_action,
+    complete_message_type,
+    complete_node,
+    complete_rule,
+    complete_running_system,
+    complete_service,
+    complete_topic,
+    complete_type,
+    silent,
+)
 from composer.cli.support.system_arguments import complete_system
+from composer.runtime.process.graph_socket import GraphSocket, GraphView
+from composer.runtime.process.instance_lock import hold_instance_lock
 
 
 def complete(*words: str) -> list[str]:
@@ -35,6 +50,70 @@ def test_commands_options_and_choices_are_completed() -> None:
 
 def test_the_names_of_example_systems_are_completed() -> None:
     assert complete("run", "pi") == ["pipeline"]
+
+
+@pytest.fixture
+def robot(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[None]:
+    """What a running system provides: its lock, and its view of the graph."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("run")))
+    view: GraphView = {
+        "node": (("/control/arm", ()), ("/planning/planner", ()), ("/planning/_hidden", ())),
+        "topic": (("/sensor_data", ("std_msgs/msg/String",)), ("/status", ())),
+        "service": (("/plan", ()),),
+        "action": (("/navigate", ()), ("/navigate_back", ())),
+    }
+    with hold_instance_lock("/fleet/robot"):
+        server = GraphSocket("/fleet/robot", lambda: view, lambda _: None)
+        yield
+        server.close(10.0)
+
+
+@pytest.mark.usefixtures("robot")
+def test_names_of_a_running_system_are_completed() -> None:
+    assert complete("topic", "echo", "/se") == ["/sensor_data"]
+    assert complete("lifecycle", "set", "pl") == ["planner"]
+    assert complete("lifecycle", "set", "planner", "act") == ["activate"]
+
+
+@pytest.mark.usefixtures("robot")
+@pytest.mark.parametrize(
+    ("complete_names", "typed", "offered"),
+    [
+        (complete_node, "", ["/control/arm", "/planning/planner"]),
+        (complete_node, "/pl", ["/planning/planner"]),
+        (complete_node, "a", ["arm"]),
+        (complete_node, "/planning/_", ["/planning/_hidden"]),
+        (complete_topic, "s", ["sensor_data", "status"]),
+        (complete_topic, "/x", []),
+        (complete_service, "/", ["/plan"]),
+        (complete_action, "/navigate_", ["/navigate_back"]),
+        (complete_running_system, "", ["robot"]),
+        (complete_running_system, "/f", ["/fleet/robot"]),
+        (complete_rule, "RC202", ["RC202"]),
+        (complete_rule, "unknown-node-", ["unknown-node-type"]),
+        (complete_type, "std_srvs/srv/E", ["std_srvs/srv/Empty"]),
+        (complete_message_type, "std_srvs/srv/E", []),
+    ],
+)
+def test_names(complete_names: Complete, typed: str, offered: list[str]) -> None:
+    assert complete_names(typed) == offered
+
+
+def test_without_a_system_no_name_is_completed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    assert complete_topic("/") == complete_node("") == []
+
+
+def test_a_failure_is_silent() -> None:
+    @silent
+    def broken(incomplete: str) -> list[str]:
+        raise RuntimeError(incomplete)
+
+    assert broken("x") == []
 
 
 @pytest.mark.parametrize(

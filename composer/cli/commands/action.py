@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from composer.cli.commands.service import split_values
+from composer.cli.support.completion import complete_action
 from composer.cli.support.errors import FAILED
 from composer.cli.support.options import (
     DEFAULT_TIMEOUT_S,
@@ -36,7 +37,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Action = Annotated[str, typer.Argument(metavar="ACTION")]
+Action = Annotated[str, typer.Argument(metavar="ACTION", autocompletion=complete_action)]
 
 
 @app.command("list", epilog=examples("compose action list -t"))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from composer.cli.support.completion import complete_type
 from composer.cli.support.errors import CommandError
 from composer.cli.support.options import Json, examples
 from composer.cli.support.output import as_json
@@ -27,6 +28,13 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
+
+Type = Annotated[
+    str,
+    typer.Argument(
+        metavar="TYPE", help="Such as std_msgs/msg/String.", autocompletion=complete_type
+    ),
+]
 
 
 @app.command("list", epilog=examples("compose interface list", "compose interface list -s"))
@@ -62,7 +70,7 @@ def list_interfaces(
     ),
 )
 def show(
-    name: Annotated[str, typer.Argument(metavar="TYPE", help="Such as std_msgs/msg/String.")],
+    name: Type,
     *,
     flat: Annotated[bool, typer.Option("--flat", help="Do not expand nested messages.")] = False,
     json: Json = False,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.cli.support.completion import complete_node, complete_running_system
 from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
 from composer.cli.support.output import as_json, say_none_found
@@ -40,9 +41,16 @@ NodeName = Annotated[
         metavar="NODE",
         help="The full name (/planning/planner), or its last part (planner) if unambiguous.",
         show_default=False,
+        autocompletion=complete_node,
     ),
 ]
+_TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
 _EXAMPLE = "for example: compose lifecycle set planner deactivate"
+
+
+def _complete_word(incomplete: str) -> list[str]:
+    transitions = [name for name in _TRANSITIONS if incomplete and name.startswith(incomplete)]
+    return [*complete_node(incomplete), *transitions]
 
 
 @contextmanager
@@ -127,6 +135,7 @@ def set_state(
             help="Nodes (names or patterns), followed by configure, activate, deactivate, cleanup "
             "or shutdown. With --to, no transition is given.",
             show_default=False,
+            autocompletion=_complete_word,
         ),
     ] = None,
     *,
@@ -146,6 +155,7 @@ def set_state(
             metavar="SYSTEM",
             help="Change all nodes of a running system, in order.",
             show_default=False,
+            autocompletion=complete_running_system,
         ),
     ] = None,
     timeout: Timeout = DEFAULT_TIMEOUT_S,

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from composer.cli.support.completion import complete_node
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Count, Hidden, Json, Timeout, examples
 from composer.cli.support.output import as_json, say_none_found
 from composer.cli.support.ros import graph_names, ros_session
@@ -54,7 +55,9 @@ def info(
     name: Annotated[
         str,
         typer.Argument(
-            metavar="NODE", help="The full name of a node, or its last part if unambiguous."
+            metavar="NODE",
+            help="The full name of a node, or its last part if unambiguous.",
+            autocompletion=complete_node,
         ),
     ],
     *,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
 from composer.cli.support.output import as_json, as_yaml, say_none_found
@@ -35,7 +36,9 @@ app = typer.Typer(
 Node = Annotated[
     str,
     typer.Argument(
-        metavar="NODE", help="The full name of a node, or its last part if unambiguous."
+        metavar="NODE",
+        help="The full name of a node, or its last part if unambiguous.",
+        autocompletion=complete_node,
     ),
 ]
 Name = Annotated[str, typer.Argument(metavar="PARAMETER")]
@@ -57,6 +60,7 @@ def list_parameters(
             metavar="[NODE]",
             help="The full name of a node, or its last part. Default: all nodes.",
             show_default=False,
+            autocompletion=complete_node,
         ),
     ] = None,
     *,

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from composer.cli.support.completion import complete_rule
 from composer.cli.support.errors import UsageError
 from composer.cli.support.options import examples
 from composer.cli.support.terminal import columns, write, write_raw
@@ -26,6 +27,7 @@ def rule(
             metavar="CODE",
             help="A code (RC301), a code prefix (RC3) or a name.",
             show_default=False,
+            autocompletion=complete_rule,
         ),
     ] = None,
 ) -> None:

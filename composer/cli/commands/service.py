@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from composer.cli.support.completion import complete_service
 from composer.cli.support.options import (
     DEFAULT_TIMEOUT_S,
     Count,
@@ -30,7 +31,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Service = Annotated[str, typer.Argument(metavar="SERVICE")]
+Service = Annotated[str, typer.Argument(metavar="SERVICE", autocompletion=complete_service)]
 
 
 @app.command("list", epilog=examples("compose service list", "compose service list -t"))

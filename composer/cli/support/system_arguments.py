@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.cli.support.completion import complete_running_system
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.terminal import say, use_color
 
@@ -40,13 +41,17 @@ RunningSystem = Annotated[
         metavar="SYSTEM",
         help="The name of a running system (pipeline, /robot1/pipeline), or its file.",
         show_default=False,
+        autocompletion=complete_running_system,
     ),
 ]
 #: The default is every running system, or the only one.
 AnyRunningSystem = Annotated[
     str | None,
     typer.Argument(
-        metavar="[SYSTEM]", help="The name of a running system, or its file.", show_default=False
+        metavar="[SYSTEM]",
+        help="The name of a running system, or its file.",
+        show_default=False,
+        autocompletion=complete_running_system,
     ),
 ]
 

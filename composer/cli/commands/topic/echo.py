@@ -24,6 +24,18 @@ if TYPE_CHECKING:
     from composer.remote.topics import TopicSubscription
 
 
+def _path(path: str | None) -> str | None:
+    """Check ``--field`` before ROS starts."""
+    from composer.remote.field_paths import path_steps
+
+    if path is not None:
+        try:
+            path_steps(path)
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from error
+    return path
+
+
 @format_options
 @qos_options
 def echo(
@@ -46,8 +58,9 @@ def echo(
         str | None,
         typer.Option(
             metavar="PATH",
-            help="Print only this field, such as pose.position.x.",
+            help="Print only this field, such as pose.position.x or transforms[0].header.",
             show_default=False,
+            callback=_path,
         ),
     ] = None,
     condition: Filter = None,

@@ -8,6 +8,7 @@ import typer
 
 from composer.cli.commands.topic.qos_options import QosOptions, qos_options
 from composer.cli.commands.topic.receiving import Topic
+from composer.cli.support.completion import complete_message_type
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, finite
 from composer.cli.support.output import as_json
 from composer.cli.support.ros import ros_session
@@ -18,7 +19,12 @@ from composer.cli.support.terminal import say, write
 def pub(
     topic: Topic,
     type_name: Annotated[
-        str, typer.Argument(metavar="TYPE", help="The message type, such as std_msgs/msg/String.")
+        str,
+        typer.Argument(
+            metavar="TYPE",
+            help="The message type, such as std_msgs/msg/String.",
+            autocompletion=complete_message_type,
+        ),
     ],
     content: Annotated[
         str,

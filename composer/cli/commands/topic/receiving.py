@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from composer.cli.support.completion import complete_topic
 from composer.cli.support.errors import UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, finite
 
 if TYPE_CHECKING:
     from composer.expressions import Expression
 
-Topic = Annotated[str, typer.Argument(metavar="TOPIC")]
+Topic = Annotated[str, typer.Argument(metavar="TOPIC", autocompletion=complete_topic)]
 
 Filter = Annotated[
     str | None,

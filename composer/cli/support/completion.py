@@ -1,0 +1,117 @@
+"""Shell completion of names in the ROS graph, of rules and of interface types.
+
+Names come only from the systems that run on this computer: joining the ROS graph takes too long for
+a key press. A failure offers nothing, because the shell would print it into the command line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import wraps
+
+#: A busy system delays a key press no longer than this.
+_WITHIN_S = 0.3
+
+Complete = Callable[[str], list[str]]
+
+
+def silent(complete: Complete) -> Complete:
+    """Return ``complete`` without its errors: nothing is offered instead."""
+
+    @wraps(complete)
+    def without_errors(incomplete: str) -> list[str]:
+        try:
+            return complete(incomplete)
+        except Exception:  # whatever it is, the shell cannot show it
+            return []
+
+    return without_errors
+
+
+@silent
+def complete_node(incomplete: str) -> list[str]:
+    """Complete the full name of a node, or its last part."""
+    names = _graph_names("node", incomplete)
+    if incomplete and not incomplete.startswith("/"):
+        names = [name.rpartition("/")[2] for name in names]
+    return _starting_with(incomplete, names)
+
+
+@silent
+def complete_topic(incomplete: str) -> list[str]:
+    """Complete the name of a topic; the leading slash may be missing."""
+    return _absolute("topic", incomplete)
+
+
+@silent
+def complete_service(incomplete: str) -> list[str]:
+    """Complete the name of a service."""
+    return _absolute("service", incomplete)
+
+
+@silent
+def complete_action(incomplete: str) -> list[str]:
+    """Complete the name of an action."""
+    return _absolute("action", incomplete)
+
+
+@silent
+def complete_running_system(incomplete: str) -> list[str]:
+    """Complete the full name of a running system, or its last part."""
+    from composer.runtime.process.instance_lock import local_systems
+
+    names = sorted(local_systems())
+    if not incomplete.startswith("/"):
+        names = [name.rpartition("/")[2] for name in names]
+    return _starting_with(incomplete, names)
+
+
+@silent
+def complete_rule(incomplete: str) -> list[str]:
+    """Complete the code or the name of a rule."""
+    from composer.report.rule_page import all_rules
+
+    rules = all_rules()
+    return _starting_with(
+        incomplete, [*(item.code for item in rules), *(item.name for item in rules)]
+    )
+
+
+@silent
+def complete_message_type(incomplete: str) -> list[str]:
+    """Complete a message type."""
+    return _types(incomplete, "msg")
+
+
+@silent
+def complete_type(incomplete: str) -> list[str]:
+    """Complete a message, service or action type."""
+    return _types(incomplete, "msg", "srv", "action")
+
+
+def _types(incomplete: str, *folders: str) -> list[str]:
+    from composer.interfaces import Interfaces
+
+    interfaces = Interfaces.load()
+    return _starting_with(
+        incomplete, [name for folder in folders for name in interfaces.names(folder)]
+    )
+
+
+def _absolute(kind: str, incomplete: str) -> list[str]:
+    names = _graph_names(kind, incomplete)
+    if incomplete and not incomplete.startswith("/"):
+        names = [name.removeprefix("/") for name in names]
+    return _starting_with(incomplete, names)
+
+
+def _graph_names(kind: str, incomplete: str) -> list[str]:
+    """Return the names of one kind, hidden ones only if they are asked for."""
+    from composer.remote.local_graph import local_names
+
+    found = local_names(kind, _WITHIN_S, hidden="/_" in incomplete) or ()
+    return [name for name, _ in found]
+
+
+def _starting_with(incomplete: str, names: Iterable[str]) -> list[str]:
+    return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
