@@ -13,7 +13,7 @@ function main() {
     const picture = currentPicture();
     if (placed.has(picture)) return;
     placed.add(picture);
-    viewportOf(picture).start();
+    viewportOf(picture).fit();
   }
 
   const tabs = createTabs(pictures, {

@@ -8,8 +8,6 @@ const LEAST_SCALE = 0.2;
 const MOST_PIXELS_A_UNIT = 4;
 /** A small picture is not blown up beyond this when all of it is shown. */
 const COMFORTABLE_PIXELS_A_UNIT = 1.6;
-/** A picture that would be smaller than this is not shown whole at first. */
-const LEAST_PIXELS_A_UNIT = 0.3;
 /** What is gone to is shown at least this big. */
 const READABLE_PIXELS_A_UNIT = 1.1;
 const DRAG_BEGINS_PIXELS = 4;
@@ -31,19 +29,10 @@ function createViewport(picture) {
     svg.dataset.scale = scale.toFixed(3);
   }
 
+  /** Show all of it. */
   function fit() {
     scale = Math.min(1, COMFORTABLE_PIXELS_A_UNIT / pixelsPerUnit());
     shift = { x: (size.width * (1 - scale)) / 2, y: (size.height * (1 - scale)) / 2 };
-    show();
-  }
-
-  /** Show it first: all of it, or of a very tall one its beginning, as wide as it is. */
-  function start() {
-    const { width, height } = svg.getBoundingClientRect();
-    fit();
-    if (pixelsPerUnit() * scale >= LEAST_PIXELS_A_UNIT || size.height * width < size.width * height) return;
-    scale = width / size.width / pixelsPerUnit();
-    shift = { x: (size.width * (1 - scale)) / 2, y: 0 };
     show();
   }
 
@@ -102,7 +91,7 @@ function createViewport(picture) {
 
   listenToWheel(svg, zoomAt, pointAt);
   listenToPointers(svg, { zoomAt, pan, pointAt });
-  return { start, fit, zoom, center, reveal, uncover };
+  return { fit, zoom, center, reveal, uncover };
 }
 
 function listenToWheel(svg, zoomAt, pointAt) {
