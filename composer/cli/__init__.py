@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from composer.cli.support.errors import FAILED, CommandError
+from composer.cli.support.streams import TolerantStream, drop
 
 INTERNAL = 3
 INTERRUPTED = 128 + signal.SIGINT
@@ -27,6 +28,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     ``arguments`` defaults to those of the process. No exception is raised.
     """
     _open_missing_streams()
+    stderr = sys.stderr
+    sys.stderr = TolerantStream(stderr)
     try:
         from composer.cli.app import application
 
@@ -45,6 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED if _is_caused_by_interrupt(error) else _internal_error(error)
     finally:
         _flush()
+        sys.stderr = stderr
     return 0
 
 
@@ -105,9 +109,7 @@ def _internal_error(error: Exception) -> int:
 
 def _flush() -> None:
     """Flush stdout now: at interpreter exit, a closed pipe would print a traceback."""
-    from composer.cli.support.terminal import drop_stdout
-
     try:
         sys.stdout.flush()
     except OSError:
-        drop_stdout()
+        drop(sys.stdout)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+
+import pytest
 
 NOISY = """
 import os
@@ -23,3 +26,16 @@ def test_output_of_libraries_goes_to_stderr() -> None:
     )
     assert done.stdout == "data\nmore data\n"
     assert done.stderr == "noise of a library\ntalk\n"
+
+
+@pytest.mark.parametrize("target", ["full disk", "closed pipe"])
+def test_messages_that_cannot_be_written_do_not_change_the_exit_code(target: str) -> None:
+    if target == "full disk":
+        writing = os.open("/dev/full", os.O_WRONLY)
+    else:
+        reading, writing = os.pipe()
+        os.close(reading)
+    command = [sys.executable, "-m", "composer", "validate", "no_such_file.yaml"]
+    done = subprocess.run(command, stderr=writing, check=False, timeout=30)
+    os.close(writing)
+    assert done.returncode == 2

@@ -228,19 +228,21 @@ def _numbers(options: dict[str, float | None]) -> list[str]:
 
 
 def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
+    from composer.cli.support.console import queued_output
     from composer.cli.support.process import end_now
     from composer.cli.support.progress import Progress, summary
     from composer.plan import tear_down
     from composer.runtime.host import Host
     from composer.runtime.process import StartRefused
 
-    progress = Progress(sys.stderr)
-    host = Host(system, plan, tear_down(system), options, progress.show)
-    try:
-        outcome = host.run()
-    except StartRefused as refusal:
-        raise CommandError(str(refusal), hint=refusal.hint) from refusal
-    say(summary(outcome))
+    with queued_output():
+        progress = Progress(sys.stderr)
+        host = Host(system, plan, tear_down(system), options, progress.show)
+        try:
+            outcome = host.run()
+        except StartRefused as refusal:
+            raise CommandError(str(refusal), hint=refusal.hint) from refusal
+        say(summary(outcome))
     if outcome.hung:
         end_now(outcome.exit_code)
     return outcome

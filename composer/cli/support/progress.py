@@ -47,7 +47,7 @@ class Progress:
         code = _code(event)
         if self._color and code:
             line = f"\x1b[{code}m{line}\x1b[0m"
-        print(line, file=self._stream, flush=True)
+        self._stream.write(f"{line}\n")
 
 
 def _severity(event: Event) -> str:

@@ -7,6 +7,8 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn, TextIO
 
+from composer.cli.support.streams import drop
+
 #: The exit code that shells report after a write to a closed pipe (128 + SIGPIPE).
 CLOSED_PIPE = 141
 
@@ -85,13 +87,6 @@ def keep_stdout_for_data() -> None:
     sys.stdout = os.fdopen(ours, "w", encoding=stdout.encoding, errors=stdout.errors)
 
 
-def drop_stdout() -> None:
-    """Redirect stdout to the null device, so that later writes to a closed pipe do not fail."""
-    null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, sys.stdout.fileno())
-    os.close(null)
-
-
 def _end_quietly() -> NoReturn:
-    drop_stdout()
+    drop(sys.stdout)
     raise SystemExit(CLOSED_PIPE)

@@ -182,7 +182,8 @@ class Reporter:
 
     def __init__(self, listener: Report | None) -> None:
         self._listener = listener
-        self._lock = threading.Lock()
+        # Reentrant: garbage collection may run a finalizer that logs, at any allocation.
+        self._lock = threading.RLock()
         self._started_at_s = time.monotonic()
 
     @property

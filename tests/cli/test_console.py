@@ -1,0 +1,135 @@
+"""Console output waits in a bounded queue, and never delays who writes."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+from composer.cli.support.console import OutputQueue
+
+LIMIT_S = 20.0
+
+
+class FullPipe:
+    """A pipe that accepts nothing until it is read."""
+
+    def __init__(self) -> None:
+        self.reading, self.writing = os.pipe()
+        fcntl.fcntl(self.writing, fcntl.F_SETPIPE_SZ, 4096)
+        self.filling = os.write(self.writing, b"x" * 4096)
+
+    def close_writing(self) -> None:
+        os.close(self.writing)
+
+    def read(self) -> bytes:
+        """Read until the last writer has closed the pipe, without what filled it."""
+        with os.fdopen(self.reading, "rb") as pipe:
+            return pipe.read()[self.filling :]
+
+
+def test_text_is_written_in_order() -> None:
+    reading, writing = os.pipe()
+    queue = OutputQueue(writing)
+    os.close(writing)
+    lines = [f"line {number} ä\n" for number in range(1000)]
+    for line in lines:
+        queue.put(line)
+    queue.close()
+    with os.fdopen(reading, encoding="utf-8") as pipe:
+        assert pipe.read() == "".join(lines)
+
+
+def test_the_oldest_lines_are_dropped_and_counted_while_nothing_reads() -> None:
+    pipe = FullPipe()
+    queue = OutputQueue(pipe.writing, max_waiting=50)
+    pipe.close_writing()
+    queue.put("first\n")
+    while queue._texts:  # until the thread has taken it
+        threading.Event().wait(0.001)
+    for number in range(100):
+        queue.put(f"line {number:02}\n")
+    received: list[bytes] = []
+    reader = threading.Thread(target=lambda: received.append(pipe.read()))
+    reader.start()
+    queue.close()
+    reader.join(LIMIT_S)
+    first, note, *rest = received[0].decode().splitlines()
+    assert first == "first"
+    assert note == "... 94 lines dropped: the output was blocked"
+    assert rest == [f"line {number:02}" for number in range(94, 100)]
+
+
+def test_the_end_does_not_wait_for_a_pipe_that_nothing_reads() -> None:
+    pipe = FullPipe()
+    queue = OutputQueue(pipe.writing)
+    queue.put("text\n")
+    closing = threading.Thread(target=queue.close)
+    closing.start()
+    closing.join(2.0)
+    assert not closing.is_alive()
+    pipe.close_writing()
+    os.close(pipe.reading)
+
+
+def test_a_closed_pipe_drops_everything() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    queue = OutputQueue(writing)
+    os.close(writing)
+    queue.put("text\n")
+    queue.close()
+    queue.put("more\n")
+
+
+def test_lines_that_a_full_disk_refuses_are_counted() -> None:
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        queue = OutputQueue(full.fileno())
+        queue.put("one\ntwo\n")
+        queue.close()
+    assert queue._dropped_lines == 2
+
+
+PROGRAM = """
+import os, sys
+from composer.cli.support.console import queued_output
+with queued_output():
+    print("from Python")
+    print("a message", file=sys.stderr)
+    if os.fork() == 0:
+        print("from a forked process", flush=True)
+        os._exit(0)
+    os.wait()
+    for _ in range(LINES):
+        os.write(2, b"from C code" * 100)
+print("the end")
+"""
+
+
+def run(lines: int, stderr: int) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", f"LINES = {lines}\n{PROGRAM}"],
+        stdout=subprocess.PIPE,
+        stderr=stderr,
+        text=True,
+        check=False,
+        timeout=LIMIT_S,
+    )
+
+
+def test_prints_of_every_origin_arrive() -> None:
+    done = run(1, subprocess.PIPE)
+    assert sorted(done.stdout.splitlines()) == ["from Python", "from a forked process", "the end"]
+    assert "a message\n" in done.stderr
+    assert "from C code" in done.stderr
+
+
+def test_c_code_does_not_wait_for_a_pipe_that_nothing_reads() -> None:
+    pipe = FullPipe()
+    done = run(100, pipe.writing)
+    assert done.returncode == 1
+    pipe.close_writing()
+    assert b"from C code" not in pipe.read(), "an error instead of a wait"

@@ -1,0 +1,65 @@
+"""The output of a running system: what nothing reads does not stop it."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+from textwrap import dedent
+
+from std_msgs.msg import Int64
+
+from tests.ros.support.commands import COMPOSE, PATIENCE_S
+from tests.ros.support.in_process import Peer, end_limit_s, wait_until
+
+LOUD = """
+system: loud
+nodes:
+  loud:
+    behavior: loud:Loud
+    publishers: {beat: {type: std_msgs/msg/Int64, external: true}}
+    timers: {tick: {period_ms: 5}}
+"""
+MODULE = """
+import sys
+import rclpy.logging
+from composer.behavior import Behavior
+from std_msgs.msg import Int64
+
+class Loud(Behavior):
+    beats = 0
+
+    def on_tick(self):
+        self.beats += 1
+        self.log.info("x" * 10_000)
+        print("y" * 10_000)
+        print("z" * 10_000, file=sys.stderr)
+        rclpy.logging.get_logger("rcl").error("c" * 100)
+        self.publishers.beat.publish(Int64(data=self.beats))
+"""
+
+
+def test_a_system_whose_output_nothing_reads_runs_and_ends_in_time(
+    tmp_path: Path, peer: Peer
+) -> None:
+    (tmp_path / "loud.yaml").write_text(dedent(LOUD), encoding="utf-8")
+    (tmp_path / "loud.py").write_text(dedent(MODULE), encoding="utf-8")
+    reading, writing = os.pipe()
+    fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
+    command = [*COMPOSE, "run", str(tmp_path / "loud.yaml")]
+    process = subprocess.Popen(command, stdout=writing, stderr=writing)
+    os.close(writing)
+    try:
+        beats = peer.listen(Int64, "/beat")
+        wait_until(lambda: beats and beats[-1].data > 50, "beats while the output is blocked")
+        process.send_signal(signal.SIGINT)
+        stopped_s = time.monotonic()
+        assert process.wait(PATIENCE_S) == 0
+        assert time.monotonic() - stopped_s < end_limit_s(), "the end took too long"
+    finally:
+        process.kill()
+        process.wait()
+        os.close(reading)
