@@ -32,6 +32,7 @@ TARGETS = (
     Target("timer 500 Hz p50, N=100", "jitter us", EVENTS, 1.5),
     Target("external process, one processor", _CPU, EVENTS, 0.8),
     Target("service, N=10, p50", "round trip us", EVENTS, 1 / 5),
+    Target("action, N=10, p50", "round trip us", EVENTS, 1 / 5),
     Target("pipeline.yaml", "CPU ms/s", "rclpy, SingleThreadedExecutor", 1 / 4),
     Target(f"start, N=300, {large_systems.COMPOSED}", "s", large_systems.HAND_WRITTEN, 1.1),
     Target(f"start, N=300, {large_systems.LEAN}", "s", large_systems.HAND_WRITTEN, 1 / 8),

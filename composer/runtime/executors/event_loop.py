@@ -5,19 +5,15 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-from rclpy.action.server import ActionServer
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
-from composer.runtime.executors.entities.actions import expire_goals, has_goals
 from composer.runtime.executors.entities.node_executor import NodeExecutor
 from composer.runtime.executors.entities.source_group import EntitySource, SourceGroup
 from composer.runtime.executors.entities.sources import is_implicit, source_of
 from composer.runtime.executors.entity_loop import EntityLoop
 from composer.runtime.executors.loop import ExceptionHandler
 from composer.runtime.executors.scheduler import Scheduler
-
-_EXPIRY_PERIOD_S = 1.0  # of the results that action servers keep
 
 
 class EventLoop(EntityLoop, Scheduler):
@@ -49,11 +45,6 @@ class EventLoop(EntityLoop, Scheduler):
             for entity in _entities_of(node):
                 self.remove(entity)
 
-    def add_action_server(self, server: ActionServer) -> None:
-        """Handle the server's goal, cancel and result requests, and discard old results."""
-        super().add_action_server(server)
-        self.call_later(_EXPIRY_PERIOD_S, lambda: self._expire(server))
-
     def remove(self, entity: object) -> None:
         """Stop serving an entity. Call it before the entity is destroyed."""
         with self._changing:
@@ -71,13 +62,6 @@ class EventLoop(EntityLoop, Scheduler):
             for entities in self._nodes.values():
                 entities.discard(entity)
             self._group_of[entity] = self.add_group(source)
-
-    def _expire(self, server: ActionServer) -> None:
-        if server not in self._group_of:
-            return
-        self.call_later(_EXPIRY_PERIOD_S, lambda: self._expire(server))
-        if has_goals(server):
-            self.run_task(expire_goals(server))
 
 
 class _ImplicitEntities:

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from rclpy.action.server import ActionServer
 from unique_identifier_msgs.msg import UUID
 
 from composer.model import Isolation, Port
 from composer.runtime.executors.entities import actions
+from composer.runtime.executors.entities.goal_server import GoalServer
 from composer.runtime.executors.futures import Future
 from composer.runtime.intra_process.copying import copy_of
 
@@ -26,7 +26,7 @@ OnFeedback = Callable[[Any], None]
 class LocalActionServer:
     """Passes goals and cancel requests to the server's loop, and feedback and results back."""
 
-    def __init__(self, port: Port, server: ActionServer, spawn: Spawn) -> None:
+    def __init__(self, port: Port, server: GoalServer, spawn: Spawn) -> None:
         """``spawn`` runs a coroutine on the server's loop."""
         self._server = server
         self._spawn = spawn
@@ -83,6 +83,7 @@ class LocalActionServer:
 
         def respond(result: Any) -> None:
             self._listeners.pop(identity, None)
+            self._server.discard_result(identity)
             result.result = self._passed(result.result)
             response.set_result(result)
 

@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any
 
-from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
+from rclpy.action.server import CancelResponse, GoalResponse, ServerGoalHandle
 
 from composer.behavior import CallCancelled
 from composer.model import FeedbackSteps, Port
@@ -14,6 +14,7 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.callbacks.timing import CallbackTimer
+from composer.runtime.executors.entities.goal_server import GoalServer
 from composer.runtime.executors.exceptions import is_closing, shown, text_of
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.stacks import calls_user_code
@@ -65,7 +66,7 @@ class ActionServerPort:
         self._timer = CallbackTimer(context, statistics, port.budget_ms)
         self._queue = queue_for(context, self._run, None, depth=None, reentrant=port.reentrant)
         profile = rclpy_profile(port.qos.profile)
-        self._server = ActionServer(
+        self._server = GoalServer(
             context.node,
             self._type,
             port.full_name,
@@ -248,7 +249,7 @@ class ActionServerPort:
         response = self._type.Impl.GetResultService.Response()
         response.status = goal.status
         response.result = self._type.Result() if result is None else result
-        self._server._result_futures[goal.identity].set_result(response)
+        self._server.end(goal.identity, response)
         goal.ended.set_result(None)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from action_msgs.srv import CancelGoal
 
+from composer.runtime.executors.entities import goal_server
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 TEXT = """
@@ -131,6 +132,21 @@ def test_goals_have_the_same_outcomes_in_process_and_by_dds(
         assert client.outcomes[-1] == "CallCancelled"
         goals = system.node("server")._entities.action_servers["go"]._goals
         wait_until(lambda: not goals, "the end of the unawaited goal")
+
+
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
+def test_the_results_of_ended_goals_are_not_kept(
+    tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(goal_server, "KEPT_STATUSES", 2)
+    text = TEXT.replace("KIND", kind).replace("DELIVERY", "auto")
+    with running(text, tmp_path, going=MODULE) as system:
+        outcomes = system.behavior("client").outcomes
+        for count in range(1, 8):
+            go(system, 1.0)
+            wait_until(lambda count=count: len(outcomes) == count)
+        server = system.node("server")._entities.action_servers["go"]._server
+        wait_until(lambda: len(server._goal_handles) <= 2, "the other goals")
 
 
 def test_an_external_node_can_cancel_a_goal_of_the_process(tmp_path: Path) -> None:

@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from action_msgs.msg import GoalStatus
+from action_msgs.msg import GoalStatus, GoalStatusArray
 from composer_interfaces.action import Navigate
 from rclpy.action import ActionClient
+from rclpy.qos import qos_profile_action_status_default
 
+from composer.runtime.executors.entities import goal_server
 from tests.ros.support.in_process import Peer, finished, running, wait_until
 
 SERVER = """
@@ -142,6 +144,34 @@ def test_a_client_cancels_a_goal(tmp_path: Path, peer: Peer, kind: str) -> None:
         status, result = navigator.result(handle)
     assert len(answer.goals_canceling) == 1
     assert (status, result.message) == (GoalStatus.STATUS_CANCELED, "stopped")
+
+
+INSTANT = """
+from composer.behavior import Behavior
+from composer_interfaces.action import Navigate
+
+class Handled(Behavior):
+    def on_navigate(self, goal):
+        return Navigate.Result(message=str(goal.request.target.x))
+"""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_few_ended_goals_are_kept(
+    tmp_path: Path, peer: Peer, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(goal_server, "KEPT_STATUSES", 2)
+    monkeypatch.setattr(goal_server, "KEPT_RESULTS", 3)
+    with running(handled(kind), tmp_path, handled=INSTANT):
+        statuses = peer.listen(
+            GoalStatusArray, "/navigate/_action/status", qos_profile_action_status_default
+        )
+        navigator = Navigator(peer)
+        handles = [navigator.send(float(number)) for number in range(10)]
+        outcomes = [navigator.result(handle) for handle in handles]
+    assert max(len(item.status_list) for item in statuses) <= 3
+    assert [result.message for _, result in outcomes[-3:]] == ["7.0", "8.0", "9.0"]
+    assert {status for status, _ in outcomes[:4]} == {GoalStatus.STATUS_UNKNOWN}
 
 
 def test_one_goal_runs_at_a_time_and_waiting_ones_can_be_canceled(

@@ -54,6 +54,10 @@ class _Role:
     ready_flags: tuple[str, ...]  # the attributes that select what ``take_data`` takes
 
 
+#: Converting the statuses of all goals of a server to Python objects takes longer than a goal, and
+#: ports do not use them: an event-driven loop leaves the last one in the reader. With a wait set,
+#: which would be ready forever, they are taken.
+_STATUS = "_is_status_ready"
 _SERVER = _Role(
     "action server",
     "_handle",
@@ -68,9 +72,9 @@ _CLIENT = _Role(
     (
         "_is_goal_response_ready",
         "_is_feedback_ready",
-        "_is_status_ready",
         "_is_cancel_response_ready",
         "_is_result_response_ready",
+        _STATUS,
     ),
 )
 #: The attributes of an action client with the requests that wait for each kind of response.
@@ -91,6 +95,7 @@ class ActionSource:
     ) -> None:
         self._waitable: Any = waitable
         self._role = _SERVER if isinstance(waitable, ActionServer) else _CLIENT
+        self._taken = self._role.ready_flags
         self.may_skip = self._role is _CLIENT
         self._handle: Handle = getattr(waitable, self._role.handle)
         self._executor = executor
@@ -102,7 +107,8 @@ class ActionSource:
         return f"{self._role.name} of {self._waitable._action_type.__name__}"
 
     def attach(self, signal: Signal) -> None:
-        """Signal all items of the action."""
+        """Signal all items of the action, except the statuses of goals."""
+        self._taken = tuple(flag for flag in self._role.ready_flags if flag != _STATUS)
         signal.attach(self._handle, *self._role.setters)
 
     def detach(self, signal: Signal) -> None:
@@ -113,7 +119,7 @@ class ActionSource:
         """Return one item, by its kind."""
         waitable = self._waitable
         waitable._is_goal_expired = False  # handled by expire_goals
-        for selected in self._role.ready_flags:
+        for selected in self._taken:
             for flag in self._role.ready_flags:
                 setattr(waitable, flag, flag == selected)
             if taken := waitable.take_data():
@@ -144,11 +150,6 @@ class ActionSource:
             and getattr(self._waitable, _PENDING[kind]).get(item[0]) not in self._waitable._futures
             for kind, item in taken.items()
         )
-
-
-def has_goals(server: ActionServer) -> bool:
-    """Return whether the server keeps goals, running or ended."""
-    return bool(server._goal_handles)
 
 
 async def expire_goals(server: ActionServer) -> None:

@@ -65,7 +65,6 @@ ACTION_CLIENT = tuple(
         "cancel_client",
         "result_client",
         "feedback_subscription",
-        "status_subscription",
     )
 )
 
