@@ -26,7 +26,7 @@ class GoalServer(ActionServer):
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         """Create the server; the arguments are rclpy's, without ``result_timeout``."""
-        # Zero: rcl discards an ended goal whenever it is told to.
+        # Zero: rcl discards ended goals on request.
         super().__init__(*arguments, result_timeout=0, **options)
         self._changing = threading.Lock()
         #: The ended goals that rcl keeps, and whether their result was delivered.
