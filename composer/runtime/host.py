@@ -72,6 +72,7 @@ class HostOptions:
     ``stop_within_s`` that of the tear-down. ``transition_timeout_s`` overrides the system's.
     ``tracing`` records callback timings, also of callbacks without a ``budget_ms``;
     ``check_mutation`` checks after each callback whether it has modified a message.
+    ``fail_on_error`` makes errors of user code and failed calls a failure of the run.
 
     ``end_within(seconds)`` has to end the process after that time, whatever hangs in it; None
     cancels that. It is called with ``grace_s`` as soon as the system stops, and never canceled
@@ -89,6 +90,7 @@ class HostOptions:
     end_within: Callable[[float | None], None] = lambda _: None
     tracing: bool = True
     check_mutation: bool = False
+    fail_on_error: bool = False
     ends_process: bool = False
 
 
@@ -297,6 +299,8 @@ class Host:
             if not self._supervisor.tear_down(self._down, self._tear_down_end_s, limit_s):
                 self._failed = True
         self._summary = tuple(_summary(node) for node in self._node_set.nodes.values())
+        if self._options.fail_on_error and any(node.errors for node in self._summary):
+            self._failed = True
 
     def _close(self, manager: ManagerNode) -> None:
         for item in (*self._shutdown_commands, *self._main_queue.drain()):

@@ -30,6 +30,7 @@ EPILOGS = {
         "compose run pipeline --dry-run                        print the plan; needs no ROS",
         "compose run pipeline --set planner.max_velocity=0.5   set a parameter",
         "compose run pipeline --namespace /robot1              use another namespace",
+        "compose run pipeline --for 10 --fail-on-error         test that no handler fails",
         "compose run pipeline --use-sim-time                   use the time of a simulator",
         "compose run pipeline --autostart inactive             configure nodes, do not activate",
         "compose run pipeline --wait --timeout 10              run in the background",
@@ -117,6 +118,13 @@ def run(
             help="Report callbacks that modify published or received messages. Slow.",
         ),
     ] = False,
+    fail_on_error: Annotated[
+        bool,
+        typer.Option(
+            "--fail-on-error",
+            help="Exit with code 1 if a handler has raised an error or a call has failed.",
+        ),
+    ] = False,
     wait: Annotated[
         bool,
         typer.Option("--wait", help="Run in the background; return once the system is up."),
@@ -149,7 +157,8 @@ def run(
     process. They are brought up in dependency order and shut down in reverse order. If the bring-up
     fails, it is rolled back. Press Ctrl-C to shut down.
 
-    Exit code 1 if the system has errors, the bring-up fails, or a node fails permanently.
+    Exit code 1 if the system has errors, the bring-up fails, or a node fails permanently. Errors of
+    handlers are reported in the summary; use --fail-on-error in tests.
     """
     declared = _load(system, settings or [], namespace, use_sim_time=use_sim_time)
     from composer.model import PrimaryState
@@ -174,12 +183,15 @@ def run(
         given += ["--use-sim-time"] if use_sim_time else []
         given += [] if tracing else ["--no-tracing"]
         given += ["--check-mutation"] if check_mutation else []
+        given += ["--fail-on-error"] if fail_on_error else []
         limits = _numbers({"--for": run_for, "--timeout": up_s, "--grace": grace})
         limit_s = up_s + grace + _START_S
         write(run_in_background(declared.name.value, [*given, *limits], limit_s))
         return
     options = _options(run_for, timeout, grace, log_level)
-    options = replace(options, tracing=tracing, check_mutation=check_mutation)
+    options = replace(
+        options, tracing=tracing, check_mutation=check_mutation, fail_on_error=fail_on_error
+    )
     outcome = _run(declared, plan, options)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TextIO
 
 from composer.cli.support.callback_tables import summary_table
@@ -26,6 +27,7 @@ from composer.runtime.supervision.events import (
 
 _GREEN, _YELLOW, _RED, _DIM = "32", "33", "31", "2"
 _MAX_CALLBACKS = 10
+_MAX_NODES_WITH_ERRORS = 5
 
 
 class Progress:
@@ -83,9 +85,21 @@ def summary(outcome: Outcome) -> str:
     if called:
         parts.append(summary_table(called, _MAX_CALLBACKS))
     parts += [f"chain {chain.chain}: {chain.text}" for chain in outcome.chains]
+    if any(node.errors for node in outcome.nodes):
+        parts.append(_error_line(outcome.nodes))
     return "\n".join(parts)
 
 
 def _row(node: NodeSummary) -> tuple[str, ...]:
     counts = (node.received, node.sent, node.calls, node.dropped, node.errors)
     return (node.node, node.state, *map(str, counts))
+
+
+def _error_line(nodes: Sequence[NodeSummary]) -> str:
+    """Return how many errors there were, and in which nodes, the worst first."""
+    failed = sorted((node for node in nodes if node.errors), key=lambda node: -node.errors)
+    shown = [f"{node.node} ({node.errors})" for node in failed[:_MAX_NODES_WITH_ERRORS]]
+    more = [f"{len(failed) - len(shown)} more"] if len(failed) > len(shown) else []
+    total = sum(node.errors for node in failed)
+    what = "1 error" if total == 1 else f"{total} errors"
+    return f"{what} in {'node' if len(failed) == 1 else 'nodes'} {', '.join(shown + more)}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.compose import compose as in_process
 from tests.ros.support.commands import PATIENCE_S, compose, running, start
 from tests.ros.support.in_process import Peer, wait_until
 
@@ -116,6 +118,42 @@ def test_a_node_that_fails_ends_the_run_with_exit_code_1(tmp_path: Path) -> None
     assert "no milk" in done.stderr
     assert "rolling back because of /bad" in done.stderr
     assert states_in(done.stderr)[-1].endswith("finalized")
+
+
+def test_errors_are_in_the_summary_and_may_fail_the_run(tmp_path: Path) -> None:
+    path = tmp_path / "failing.yaml"
+    path.write_text(
+        """
+        system: failing
+        nodes:
+          worse: {behavior: failing:Bad, timers: {tick: {period_ms: 3}}}
+          bad: {behavior: failing:Bad, timers: {tick: {period_ms: 10}}}
+          good: {}
+        """,
+        encoding="utf-8",
+    )
+    path.with_suffix(".py").write_text(
+        "class Bad:\n    def on_tick(self):\n        raise ValueError('no map')\n", encoding="utf-8"
+    )
+    for options, code in (((), 0), (("--fail-on-error",), 1)):
+        done = compose("run", path, "--for", "0.2", *options)
+        assert done.returncode == code
+        assert re.search(
+            r"^\d+ errors in nodes /worse \(\d+\), /bad \(\d+\)$", done.stderr, re.MULTILINE
+        )
+
+
+def test_run_in_the_background_gets_the_same_options(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[str] = []
+
+    def start(_: str, arguments: list[str], limit_s: float) -> str:
+        given.extend(arguments)
+        return f"started within {limit_s} s"
+
+    monkeypatch.setattr("composer.cli.support.process.run_in_background", start)
+    options = ("--fail-on-error", "--check-mutation", "--no-tracing", "--use-sim-time")
+    assert in_process("run", "pipeline", "--wait", *options).code == 0
+    assert set(options) < set(given)
 
 
 def test_an_invalid_environment_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
