@@ -29,7 +29,6 @@ from composer.runtime.executors.strand import InlineStrand, SerialStrand
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import (
-    Named,
     NodeClock,
     behavior_class,
     method,
@@ -38,7 +37,7 @@ from composer.runtime.node.behavior_loader import (
 from composer.runtime.node.entities import NodeEntities, RunningPort
 from composer.runtime.node.lifecycle import FINALIZED, Lifecycle, TransitionOutcome
 from composer.runtime.node.options import NodeOptions
-from composer.runtime.node.parameters import NodeParameters
+from composer.runtime.node.parameters import NodeParameters, ParameterValues
 from composer.runtime.node.ros_node import make_ros_node
 
 T = TypeVar("T")
@@ -277,7 +276,7 @@ class RunningNode:
         behavior.name = self.full_name
         behavior.log = self._context.log
         behavior.clock = NodeClock(self._context, self._always_on_context)
-        behavior.parameters = Named("parameter", self._context.names["parameters"])
+        behavior.parameters = ParameterValues(self._context.names["parameters"])
         behavior.publishers = named_ports("publisher", entities.senders)
         behavior.clients = named_ports("client", entities.clients)
         behavior.action_clients = named_ports("action client", entities.action_clients)

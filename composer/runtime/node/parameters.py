@@ -104,6 +104,30 @@ class NodeParameters:
             self._changed(values)
 
 
+class ParameterValues:
+    """``self.parameters`` of a behavior: the current values by name, read-only."""
+
+    def __init__(self, values: dict[str, Any]) -> None:
+        # The dict itself, which is updated in place: reading a parameter calls no Python code.
+        object.__setattr__(self, "__dict__", values)
+
+    def __getattr__(self, name: str) -> Any:
+        known = ", ".join(sorted(vars(self))) or "none"
+        raise AttributeError(f"no parameter '{name}'; available: {known}")
+
+    def __setattr__(self, name: str, _: object) -> None:
+        raise AttributeError(f"parameter '{name}' cannot be assigned: set it with 'compose param'")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"parameter '{name}' cannot be deleted")
+
+    def __getitem__(self, name: str) -> Any:
+        return vars(self)[name]
+
+    def __dir__(self) -> list[str]:
+        return sorted(vars(self))
+
+
 def _declare(node: Node, parameter: Parameter) -> Any:
     name = parameter.name.value
     if parameter.value is None:
