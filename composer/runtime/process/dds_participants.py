@@ -32,9 +32,14 @@ def count_participants(domain_id: int, table: Path = _TABLE) -> int:
     except OSError:
         return 0
     ports = {int(row.split()[1].rpartition(":")[2], 16) for row in rows if row.strip()}
-    first = _BASE_PORT + _PORTS_OF_A_DOMAIN * domain_id + _FIRST_PARTICIPANT
-    last = first - _FIRST_PARTICIPANT + _PORTS_OF_A_DOMAIN
-    return len(ports.intersection(range(first, last, _PORTS_OF_A_PARTICIPANT)))
+    unicast = ports_of_domain(domain_id)[_FIRST_PARTICIPANT::_PORTS_OF_A_PARTICIPANT]
+    return len(ports.intersection(unicast))
+
+
+def ports_of_domain(domain_id: int) -> range:
+    """Return the ports that the participants of a domain may use."""
+    first = _BASE_PORT + _PORTS_OF_A_DOMAIN * domain_id
+    return range(first, first + _PORTS_OF_A_DOMAIN)
 
 
 def enlarge_receive_buffers() -> None:

@@ -68,7 +68,7 @@ def prepare_environment() -> None:
     complete_environment(os.environ)
     use_discovery_profile(os.environ)
     check_environment(os.environ)
-    remove_incomplete_ports()
+    remove_incomplete_ports(int(os.environ.get("ROS_DOMAIN_ID") or 0))
 
 
 def _check_domain_id(environment: Mapping[str, str]) -> None:

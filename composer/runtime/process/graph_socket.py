@@ -60,7 +60,7 @@ class GraphSocket:
         self._view = view
         self._on_error = on_error
         self._path = socket_path(system)
-        self._listener = _listen(self._path)
+        self._listener = None if self._path is None else _listen(self._path)
         self._thread: threading.Thread | None = None
         if self._listener is not None:
             self._thread = threading.Thread(
@@ -70,7 +70,7 @@ class GraphSocket:
 
     def close(self, timeout_s: float) -> None:
         """Stop serving; wait for the thread, which may be sending a view."""
-        if self._listener is None or self._thread is None:
+        if self._path is None or self._listener is None or self._thread is None:
             return
         with suppress(OSError):
             self._path.unlink()
@@ -100,10 +100,13 @@ def read_graph(system: str, timeout_s: float) -> GraphView | None:
 
     None if it does not respond in time, is not certain, or may see another graph than this process.
     """
+    path = socket_path(system)
+    if path is None:
+        return None
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
             connection.settimeout(timeout_s)
-            connection.connect(str(socket_path(system)))
+            connection.connect(str(path))
             return _decoded(b"".join(iter(lambda: connection.recv(_READ_BYTES), b"")))
     except (OSError, ValueError, KeyError, TypeError):
         return None

@@ -10,6 +10,7 @@ import fcntl
 import json
 import os
 import socket
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,6 +21,7 @@ from composer.runtime.process import StartRefused
 
 _DEFAULT_DOMAIN = "0"
 _SUFFIX = ".lock"
+_WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def already_running(name: str, host: str, pid: str | int) -> StartRefused:
@@ -61,8 +63,10 @@ def local_systems() -> dict[str, str]:
     """
     pids: dict[str, str] = {}
     prefix = f"{_domain()}."
-    for path in sorted(_folder().glob(f"{prefix}*{_SUFFIX}")):
-        name = "/" + path.name.removeprefix(prefix).removesuffix(_SUFFIX).replace(".", "/")
+    for file_name in _lock_files():
+        if not (file_name.startswith(prefix) and file_name.endswith(_SUFFIX)):
+            continue
+        name = "/" + file_name.removeprefix(prefix).removesuffix(_SUFFIX).replace(".", "/")
         lock = _open(name)
         if lock is None:
             continue
@@ -74,9 +78,16 @@ def local_systems() -> dict[str, str]:
     return pids
 
 
-def socket_path(name: str) -> Path:
-    """Return the path of the Unix socket of a system, next to its lock file."""
-    return _path(name, ".sock")
+def socket_path(name: str) -> Path | None:
+    """Return the path of the Unix socket of a system, next to its lock file.
+
+    None if there is no folder that only this user can write to.
+    """
+    try:
+        with _open_folder():
+            return _folder() / _file_name(name, ".sock")
+    except (OSError, StartRefused):
+        return None
 
 
 def _domain() -> str:
@@ -85,25 +96,63 @@ def _domain() -> str:
 
 def _folder() -> Path:
     parent = os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()
-    return Path(parent, f"ros2-composer-{os.getuid()}")
+    return Path(parent, f"ros2-composer-{os.geteuid()}")
 
 
-def _path(name: str, suffix: str) -> Path:
-    return _folder() / f"{_domain()}{name.replace('/', '.')}{suffix}"
+@contextmanager
+def _open_folder() -> Iterator[int]:
+    """Open the folder of the lock files, which is created if needed. Raises OSError, StartRefused.
+
+    Every user can write to the folder of temporary files and may have created another folder, or a
+    symbolic link, of that name.
+    """
+    folder = _folder()
+    folder.mkdir(mode=0o700, exist_ok=True)
+    flags = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+    descriptor = os.open(folder, flags)
+    try:
+        status = os.fstat(descriptor)
+        if status.st_uid != os.geteuid() or status.st_mode & _WRITABLE_BY_OTHERS:
+            raise _unsafe(folder)
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def _unsafe(folder: Path) -> StartRefused:
+    return StartRefused(
+        f"other users can write to '{folder}', the folder for instance locks",
+        "remove it, or set XDG_RUNTIME_DIR to a folder that only you can write to",
+    )
+
+
+def _lock_files() -> list[str]:
+    """Return the names of the lock files, sorted; none if the folder is not safe."""
+    try:
+        with _open_folder() as folder:
+            return sorted(os.listdir(folder))
+    except (OSError, StartRefused):
+        return []
+
+
+def _file_name(name: str, suffix: str) -> str:
+    return f"{_domain()}{name.replace('/', '.')}{suffix}"
 
 
 def _open(name: str) -> TextIO | None:
-    """Open the lock file of a system; None if there cannot be one, and thus no lock."""
+    """Open the lock file of a system; None if there cannot be one, and thus no lock.
+
+    Raises StartRefused if other users can write to the folder of the lock files.
+    """
     if os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "OFF":
         return None  # no process discovers another one
-    path = _path(name, _SUFFIX)
-    folder = path.parent
+    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
     try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        if folder.stat().st_uid != os.getuid():
-            return None
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        with _open_folder() as folder:
+            descriptor = os.open(_file_name(name, _SUFFIX), flags, 0o600, dir_fd=folder)
     except OSError:
+        if _folder().is_symlink():
+            raise _unsafe(_folder()) from None
         return None
     return os.fdopen(descriptor, "r+", encoding="utf-8")
 

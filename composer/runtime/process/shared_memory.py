@@ -2,20 +2,27 @@
 
 Fast DDS opens or creates a shared memory segment for each port. If a process is killed between
 creating and filling it, every later participant that opens it waits in its constructor forever,
-without reacting to signals: see boost/interprocess/detail/managed_open_or_create_impl.hpp.
+without reacting to signals: see boost/interprocess/detail/managed_open_or_create_impl.hpp. A FIFO
+of that name has the same effect. Every local user can create such files, so owner and type of each
+are checked, and only segments of this user are removed.
 """
 
 from __future__ import annotations
 
+import os
 import re
+import stat
 import time
 from pathlib import Path
 
 from composer.runtime.process import StartRefused
+from composer.runtime.process.dds_participants import ports_of_domain
 
 #: Where Linux keeps it; shm_open(3).
 SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - nothing is written there
-_PORT = re.compile(r"fastrtps_port\d+")
+_PORT = re.compile(r"fastrtps_port(\d{1,9})", re.ASCII)
+#: As shm_open(3) opens it for a participant, and without waiting for the other end of a FIFO.
+_OPEN = os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC
 #: The first word of a segment: uninitialized, initializing. 2 means initialized.
 _UNFINISHED = (0, 1)
 _WORD_BYTES = 4
@@ -24,17 +31,34 @@ _FILLED_WITHIN_S = 1.0
 _POLL_S = 0.02
 
 
-def remove_incomplete_ports(folder: Path = SHARED_MEMORY) -> None:
-    """Remove the segments that would hang a new participant.
+def remove_incomplete_ports(domain_id: int, folder: Path = SHARED_MEMORY) -> None:
+    """Remove the segments of this user that would hang a new participant.
 
-    Wait up to a second for segments that a process may be filling. Raises StartRefused if one
-    belongs to another user.
+    Wait up to a second for segments that a process may be filling. Raises StartRefused if one in
+    the domain would hang a participant and is not a segment of this user.
     """
     if not folder.is_dir():
         return
+    ports = ports_of_domain(domain_id)
     for path in sorted(folder.iterdir()):
-        if _PORT.fullmatch(path.name) and _stays_incomplete(path):
+        port = _PORT.fullmatch(path.name)
+        if port is None:
+            continue
+        status = _status(path)
+        if status is None:
+            continue
+        removable = stat.S_ISREG(status.st_mode) and status.st_uid == os.geteuid()
+        if (removable or int(port[1]) in ports) and _stays_incomplete(path):
+            if not removable:
+                raise _refusal(path, _description(status))
             _remove(path)
+
+
+def _status(path: Path) -> os.stat_result | None:
+    try:
+        return path.lstat()
+    except OSError:  # removed in the meantime
+        return None
 
 
 def _stays_incomplete(path: Path) -> bool:
@@ -48,14 +72,18 @@ def _stays_incomplete(path: Path) -> bool:
 
 
 def _incomplete_since_s(path: Path) -> float | None:
-    """Return when the segment was last changed if it is incomplete, else None."""
+    """Return when the file was last changed if a participant would wait for it, else None."""
     try:
-        with path.open("rb") as segment:
-            word = segment.read(_WORD_BYTES)
-        if len(word) < _WORD_BYTES or int.from_bytes(word, "little") in _UNFINISHED:
-            return path.stat().st_mtime
+        descriptor = os.open(path, _OPEN)
     except OSError:
-        pass  # removed, or not readable: then a participant cannot open it either
+        return None  # removed, or a participant cannot open it either
+    with os.fdopen(descriptor, "rb", buffering=0) as segment:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            return 0.0  # it is never filled
+        word = segment.read(_WORD_BYTES)
+    if len(word) < _WORD_BYTES or int.from_bytes(word, "little") in _UNFINISHED:
+        return status.st_mtime
     return None
 
 
@@ -63,7 +91,19 @@ def _remove(path: Path) -> None:
     try:
         path.unlink(missing_ok=True)
     except OSError as problem:
-        raise StartRefused(
-            f"cannot remove incomplete shared memory of Fast DDS: {path} ({problem.strerror})",
-            f"it would hang this process; remove {path}, or set another ROS_DOMAIN_ID",
-        ) from problem
+        raise _refusal(path, f"it cannot be removed: {problem.strerror}") from problem
+
+
+def _refusal(path: Path, why: str) -> StartRefused:
+    return StartRefused(
+        f"{path} would hang this process: {why}",
+        f"remove {path}, or set another ROS_DOMAIN_ID",
+    )
+
+
+def _description(status: os.stat_result) -> str:
+    """Say what a file is that is not a segment of this user."""
+    kind = "incomplete shared memory of Fast DDS"
+    if not stat.S_ISREG(status.st_mode):
+        kind = "not shared memory, but named like a port of Fast DDS"
+    return f"it is {kind} (owner: user {status.st_uid})"

@@ -189,7 +189,7 @@ class Peer:
     """A hand-written node in a participant of its own."""
 
     def __init__(self) -> None:
-        remove_incomplete_ports()
+        remove_incomplete_ports(int(os.environ["ROS_DOMAIN_ID"]))
         self.context = Context()
         self.context.init([])
         self.node = Node(f"peer_{os.getpid()}", context=self.context)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import stat
 import threading
 import time
 from pathlib import Path
@@ -15,6 +14,10 @@ from composer.runtime.process.shared_memory import remove_incomplete_ports
 
 READY, INITIALIZING = b"\x02\0\0\0 the rest", b"\x01\0\0\0 the rest"
 LONG_AGO_S = time.time() - 3600.0
+#: Its participants use the ports from 7400 on, those of domain 1 from 7650 on.
+DOMAIN = 0
+NOBODY = 65534
+needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
 
 
 def segment(folder: Path, name: str, content: bytes, *, old: bool = True) -> Path:
@@ -41,7 +44,7 @@ def test_only_incomplete_ports_are_removed(
     tmp_path: Path, name: str, content: bytes, remains: bool
 ) -> None:
     path = segment(tmp_path, name, content)
-    remove_incomplete_ports(tmp_path)
+    remove_incomplete_ports(DOMAIN, tmp_path)
     assert path.exists() == remains
 
 
@@ -49,28 +52,61 @@ def test_a_port_that_is_being_filled_is_kept(tmp_path: Path) -> None:
     path = segment(tmp_path, "fastrtps_port7411", b"", old=False)
     writer = threading.Timer(0.1, lambda: path.write_bytes(READY))
     writer.start()
-    remove_incomplete_ports(tmp_path)
+    remove_incomplete_ports(DOMAIN, tmp_path)
     writer.join()
     assert path.read_bytes() == READY
 
 
 def test_a_new_incomplete_port_is_removed_after_a_second(tmp_path: Path) -> None:
     path = segment(tmp_path, "fastrtps_port7411", b"", old=False)
-    remove_incomplete_ports(tmp_path)
+    remove_incomplete_ports(DOMAIN, tmp_path)
     assert not path.exists()
 
 
 def test_a_missing_folder_is_ignored(tmp_path: Path) -> None:
-    remove_incomplete_ports(tmp_path / "nowhere")
+    remove_incomplete_ports(DOMAIN, tmp_path / "nowhere")
 
 
-@pytest.mark.skipif(os.getuid() == 0, reason="root may remove everything")
-def test_a_port_of_another_user_is_an_error(tmp_path: Path) -> None:
+@needs_root
+def test_an_incomplete_port_of_another_user_is_refused_and_kept(tmp_path: Path) -> None:
     path = segment(tmp_path, "fastrtps_port7411", b"")
-    tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
-    try:
-        with pytest.raises(StartRefused, match="fastrtps_port7411") as refusal:
-            remove_incomplete_ports(tmp_path)
-    finally:
-        tmp_path.chmod(stat.S_IRWXU)
+    os.chown(path, NOBODY, NOBODY)
+    with pytest.raises(StartRefused, match=r"fastrtps_port7411 .*owner: user 65534") as refusal:
+        remove_incomplete_ports(DOMAIN, tmp_path)
     assert f"remove {path}" in refusal.value.hint
+    assert path.exists()
+
+
+@needs_root
+def test_an_incomplete_port_of_another_user_affects_only_its_domain(tmp_path: Path) -> None:
+    path = segment(tmp_path, "fastrtps_port7661", b"")
+    os.chown(path, NOBODY, NOBODY)
+    remove_incomplete_ports(DOMAIN, tmp_path)
+    with pytest.raises(StartRefused):
+        remove_incomplete_ports(1, tmp_path)
+
+
+def test_incomplete_ports_of_this_user_are_removed_in_all_domains(tmp_path: Path) -> None:
+    path = segment(tmp_path, "fastrtps_port7661", b"")
+    remove_incomplete_ports(DOMAIN, tmp_path)
+    assert not path.exists()
+
+
+@pytest.mark.timeout(5)
+def test_a_fifo_named_like_a_port_is_refused_without_opening_its_other_end(tmp_path: Path) -> None:
+    path = tmp_path / "fastrtps_port7411"
+    os.mkfifo(path)
+    with pytest.raises(StartRefused, match="not shared memory"):
+        remove_incomplete_ports(DOMAIN, tmp_path)
+    assert path.is_fifo()
+    remove_incomplete_ports(DOMAIN + 1, tmp_path)
+
+
+def test_a_symbolic_link_named_like_a_port_is_not_followed(tmp_path: Path) -> None:
+    """shm_open does not follow it either, so it hangs no participant."""
+    target = segment(tmp_path, "target", b"")
+    link = tmp_path / "fastrtps_port7411"
+    link.symlink_to(target)
+    remove_incomplete_ports(DOMAIN, tmp_path)
+    assert link.is_symlink()
+    assert target.exists()
