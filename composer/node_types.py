@@ -63,6 +63,13 @@ class NodeTypes:
         return not self.project.holds(path)
 
 
+def replaced_built_in_type(path: Path) -> Path | None:
+    """Return the built-in node type in whose place the file ``path`` is used, or None."""
+    folder = nodes_folder().resolve()
+    built_in = folder / path.name
+    return None if path.parent.resolve() == folder or not built_in.is_file() else built_in
+
+
 def interface_folders(project: Project) -> tuple[Path, ...]:
     """Return the folders of interface packages: the project's, then the composer's own."""
     return tuple(dict.fromkeys((*project.interface_folders, interfaces_folder().resolve())))

@@ -11,10 +11,15 @@ from pathlib import Path
 _PACKAGE = Path(__file__).resolve().parent
 
 
-def _folder(name: str) -> Path:
+def data_folder() -> Path:
+    """Return the folder that the other ones are in."""
     share = _PACKAGE / "share"
     # The wheel first: `nodes` next to an installed package would belong to another distribution.
-    return (share if share.is_dir() else _PACKAGE.parent) / name
+    return share if share.is_dir() else _PACKAGE.parent
+
+
+def _folder(name: str) -> Path:
+    return data_folder() / name
 
 
 def schemas_folder() -> Path:

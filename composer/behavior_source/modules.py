@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from composer.project import Project
+from composer.project.ownership import TrustedUsers
 
 MAXIMUM_BYTES = 250_000
 
@@ -26,13 +27,15 @@ def module_file(module: str, folder: Path, project: Project) -> Path | None:
     """Return the file of ``module``, a dotted name, or None.
 
     Searches next to the YAML file (``folder``), in the node type folders of its project, and on
-    Python's module search path. Raises Unreadable for a symbolic link out of the project.
+    Python's module search path. Raises Unreadable for a symbolic link out of the project and for a
+    file of another user.
     """
     parts = module.split(".")
     if not all(part.isidentifier() for part in parts):
         return None
     for base in dict.fromkeys((folder, *project.node_folders)):
-        found = _below(base, parts)
+        file = base.joinpath(*parts).with_suffix(".py")  # the one that the runtime loads
+        found = file if _exists(file) else _below(base, parts)
         if found is not None:
             return _checked(found, project)
     return _installed(parts)
@@ -91,6 +94,8 @@ def _below(base: Path, parts: Sequence[str]) -> Path | None:
 def _checked(path: Path, project: Project) -> Path:
     if not project.holds(path):
         raise Unreadable("is a symbolic link out of the project")
+    if TrustedUsers.starting_at(project.folder).other_owner(path) is not None:
+        raise Unreadable("belongs to another user")
     return path
 
 

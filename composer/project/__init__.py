@@ -2,83 +2,159 @@
 
 The root of a project is the nearest folder with a ``composer.yaml``, or with a ``pyproject.toml``
 that has the table ``[tool.composer]``; without either, the folder above the nearest ``nodes``
-folder, or the folder itself. Files outside the project are never read, not even through symbolic
-links.
+folder, else above the nearest ``interfaces`` folder, or the folder itself. Files outside the
+project are never read, not even through symbolic links.
+
+The search ends where it finds something that belongs to another user: see
+:mod:`composer.project.ownership`.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import pwd
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from composer.diagnostics import Diagnostic
+from composer.diagnostics import Diagnostic, shown
+from composer.project.ownership import SAFE_FOLDERS_VARIABLE, TrustedUsers
+from composer.project.rules import FOREIGN_OWNER
 from composer.project.settings import Settings, read_settings
-from composer.project.sources import SETTINGS_FILE, find_settings
+from composer.project.sources import SETTINGS_FILE, SettingsSource, find_settings
+from composer.resources import data_folder
+from composer.source import SourceFile, Span, shown_path
 
-__all__ = ["INTERFACES", "NODES", "SETTINGS_FILE", "Project", "Settings"]
+__all__ = ["INTERFACES", "NODES", "SETTINGS_FILE", "SYSTEMS", "Project", "Settings"]
 
+SYSTEMS = "systems"
 NODES = "nodes"
 INTERFACES = "interfaces"
 
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """A project as seen from ``folder`` in it. ``diagnostics`` are about its settings."""
+    """A project as seen from ``folder`` in it.
+
+    ``node_folders`` and ``interface_folders`` are the folders of its node types and interface
+    packages. ``diagnostics`` are about its settings, and about folders of other users.
+    """
 
     root: Path
     folder: Path
     settings: Settings = field(default_factory=Settings)
+    node_folders: tuple[Path, ...] = ()
+    interface_folders: tuple[Path, ...] = ()
     diagnostics: tuple[Diagnostic, ...] = ()
 
     @classmethod
     def at(cls, folder: Path) -> Project:
         """Return the project of ``folder``."""
         start = folder.resolve()
-        found = find_settings(start)
-        if found is None:
-            nodes = _nearest(NODES, (start, *start.parents))
-            return cls(start if nodes is None else nodes.parent, start)
-        settings, diagnostics = read_settings(found)
-        return cls(found.root, start, settings, (*found.diagnostics, *diagnostics))
+        search = _Search(start, (start, *start.parents))
+        declared = None if _is_bundled(start) else search.settings()
+        if declared is None:
+            return _without_settings(search)
+        settings, diagnostics = read_settings(declared)
+        search.end_above(declared.root)
+        nodes = search.folders(NODES, settings.nodes)
+        interfaces = search.folders(INTERFACES, settings.interfaces)
+        found = (*search.diagnostics, *declared.diagnostics, *diagnostics)
+        return cls(declared.root, start, settings, nodes, interfaces, found)
 
     @property
-    def node_folders(self) -> tuple[Path, ...]:
-        """The folders of the project's node types."""
-        return self._folders(self.settings.nodes, NODES)
-
-    @property
-    def interface_folders(self) -> tuple[Path, ...]:
-        """The folders of the project's interface packages."""
-        return self._folders(self.settings.interfaces, INTERFACES)
+    def is_declared(self) -> bool:
+        """Whether settings say what the root of the project is."""
+        return self.settings.source is not None
 
     def holds(self, path: Path) -> bool:
         """Return whether ``path`` is in the project after resolving symbolic links."""
-        try:
-            # Unlike Path.resolve, it handles symbolic link loops the same way on every Python.
-            return Path(os.path.realpath(path)).is_relative_to(self.root)
-        except (OSError, ValueError):  # not a valid path
-            return False
+        return _is_inside(path, self.root)
 
-    def _folders(self, chosen: tuple[Path, ...] | None, usual: str) -> tuple[Path, ...]:
+
+@dataclass(slots=True)
+class _Search:
+    """A search through ``ancestors``, nearest first.
+
+    The last of them is the root of the project, or of the file system. ``diagnostics`` are about
+    what is not used because of its owner; the search ends below it.
+    """
+
+    start: Path
+    ancestors: tuple[Path, ...]
+    diagnostics: tuple[Diagnostic, ...] = ()
+
+    def settings(self) -> SettingsSource | None:
+        found = find_settings(self.start)
+        if found is not None and self._may_use(found.root / Path(found.source.path).name):
+            return found
+        return None
+
+    def nearest(self, name: str) -> Path | None:
+        for above in self.ancestors:
+            if _has_folder(above, name):
+                found = above / name
+                return found if self._may_use(found) else None
+        return None
+
+    def folders(self, name: str, chosen: tuple[Path, ...] | None = None) -> tuple[Path, ...]:
+        """Return the folders that the settings choose, by default the nearest of that name."""
         if chosen is not None:
             return chosen
-        nearest = _nearest(usual, self._ancestors())
-        if nearest is None or (nearest.is_symlink() and not self.holds(nearest)):
+        found = self.nearest(name)
+        if found is None or (found.is_symlink() and not _is_inside(found, self.ancestors[-1])):
             return ()
-        return (nearest,)
+        return (found,)
 
-    def _ancestors(self) -> Iterator[Path]:
-        """Yield the folders from ``folder`` up to the project root, or to the file system root."""
-        for ancestor in (self.folder, *self.folder.parents):
-            yield ancestor
-            if ancestor == self.root and self.settings.source is not None:
-                return
+    def end_above(self, root: Path) -> None:
+        self.ancestors = tuple(above for above in self.ancestors if above.is_relative_to(root))
+
+    def _may_use(self, found: Path) -> bool:
+        """Return whether a trusted user owns ``found``; end the search below it otherwise."""
+        owner = TrustedUsers.starting_at(self.start).other_owner(found)
+        if owner is None:
+            return True
+        self.diagnostics += (_foreign_owner(found, owner),)
+        depth = len(self.start.parents) - len(found.parent.parents)
+        self.ancestors = self.ancestors[:depth]
+        return False
 
 
-def _nearest(name: str, ancestors: Iterator[Path] | tuple[Path, ...]) -> Path | None:
-    return next((above / name for above in ancestors if _has_folder(above, name)), None)
+def _without_settings(search: _Search) -> Project:
+    guess = search.nearest(NODES) or search.nearest(INTERFACES)
+    root = search.start if guess is None else guess.parent
+    search.end_above(root)
+    nodes, interfaces = search.folders(NODES), search.folders(INTERFACES)
+    return Project(root, search.start, Settings(), nodes, interfaces, search.diagnostics)
+
+
+def _foreign_owner(found: Path, owner: int) -> Diagnostic:
+    return Diagnostic(
+        FOREIGN_OWNER,
+        f"'{shown(found.name)}' is not used: user {_user(owner)} controls it",
+        Span(SourceFile(shown_path(found)), 1, 1),
+        hint=f"if you trust that user, set {SAFE_FOLDERS_VARIABLE}={shown(found.parent)}",
+    )
+
+
+def _user(user_id: int) -> str:
+    try:
+        return f"'{pwd.getpwuid(user_id).pw_name}'"
+    except KeyError:  # not of this computer, or of another container
+        return str(user_id)
+
+
+def _is_bundled(folder: Path) -> bool:
+    """Return whether ``folder`` comes with the composer, so that no settings above it apply."""
+    bundled = data_folder()
+    return any(folder.is_relative_to(bundled / name) for name in (NODES, SYSTEMS))
+
+
+def _is_inside(path: Path, root: Path) -> bool:
+    try:
+        # Unlike Path.resolve, it handles symbolic link loops the same way on every Python.
+        return Path(os.path.realpath(path)).is_relative_to(root)
+    except (OSError, ValueError):  # not a valid path
+        return False
 
 
 def _has_folder(folder: Path, name: str) -> bool:

@@ -1,4 +1,4 @@
-"""The rule for settings (RC042)."""
+"""The rules for settings and folders (RC042, RC044)."""
 
 from __future__ import annotations
 
@@ -16,5 +16,26 @@ BAD_SETTING = register(
         ),
         bad="ignore: [qos-implict]  # composer.yaml",
         good="ignore: [qos-implicit]  # composer.yaml",
+    )
+)
+
+FOREIGN_OWNER = register(
+    Rule(
+        code="RC044",
+        name="foreign-owner",
+        severity=Severity.WARNING,
+        summary="Settings or node types in a parent folder belong to another user and are ignored.",
+        why=(
+            "A system runs the Python of its node types. Another user could place them in a folder "
+            "above yours that everyone can write to."
+        ),
+        bad="""\
+shared/nodes/              # of another user
+shared/mine/system.yaml
+""",
+        good="""\
+shared/mine/nodes/
+shared/mine/system.yaml
+""",
     )
 )

@@ -134,6 +134,20 @@ def test_a_removed_working_directory_is_reported(tmp_path: Path) -> None:
     assert done.stderr == "compose: the current working directory does not exist anymore\n"
 
 
+def test_python_m_composer_imports_nothing_from_the_current_folder(tmp_path: Path) -> None:
+    (tmp_path / "signal.py").write_text("import sys\nsys.exit('imported')\n")
+    done = subprocess.run(
+        [*COMPOSE, "--version"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=30,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("compose ")
+
+
 def test_ctrl_c_is_handled_while_a_command_is_imported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -34,3 +34,14 @@ def test_a_process_that_ends_early_is_reported_at_once(
     with pytest.raises(CommandError, match=re.escape("did not come up (exit code 2)")) as raised:
         run_in_background("nothing", ["nothing"], 60.0)
     assert "nothing" in raised.value.text()
+
+
+def test_the_process_imports_nothing_from_the_current_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
+    (tmp_path / "signal.py").write_text("import sys\nsys.exit('imported')\n")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(CommandError, match="did not come up") as raised:
+        run_in_background("nothing", ["nothing"], 60.0)
+    assert "there is no file 'nothing'" in raised.value.text()

@@ -53,8 +53,8 @@ def test_a_diagnostic_has_a_location_a_caret_and_a_hint(folder: Path) -> None:
 
 def test_a_folder_is_searched_for_systems_and_node_types_only(folder: Path) -> None:
     Path("nodes").mkdir()
-    Path("nodes/relay.yaml").write_text("node: relay\n")
-    Path("fine.yaml").write_text("system: fine\nnodes:\n  one: {type: relay}\n")
+    Path("nodes/camera.yaml").write_text("node: camera\n")
+    Path("fine.yaml").write_text("system: fine\nnodes:\n  one: {type: camera}\n")
     Path(".github").mkdir()
     Path(".github/workflow.yaml").write_text("on: push\n")
     Path("compose.yaml").write_text("services: {}\n")
@@ -137,7 +137,6 @@ def test_a_path_that_does_not_exist_is_a_usage_error(folder: Path) -> None:
         ("fin.yaml", "fine.yaml"),
         ("sytems", "systems"),
         ("sytems/robt.yaml", "systems/robot.yaml"),
-        ("fine", "fine.yaml"),
     ],
 )
 def test_a_mistyped_path_gets_a_suggestion(folder: Path, written: str, meant: str) -> None:
@@ -145,6 +144,10 @@ def test_a_mistyped_path_gets_a_suggestion(folder: Path, written: str, meant: st
     Path("systems/robot.yaml").write_text(FINE)
     assert f"did you mean '{meant}'?" in compose("validate", written).err
     assert f"did you mean '{meant}'?" in compose("run", "--dry-run", written).err
+
+
+def test_a_path_without_its_suffix_gets_a_suggestion(folder: Path) -> None:
+    assert "did you mean 'fine.yaml'?" in compose("validate", "fine").err
 
 
 def test_the_name_of_an_example_system_suggests_its_path(folder: Path) -> None:

@@ -35,7 +35,8 @@ def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> 
     with os.fdopen(reading, encoding="utf-8") as pipe, log.open("wb") as output:
         try:
             process = subprocess.Popen(  # noqa: S603 - this very program
-                [sys.executable, "-m", "composer", "run", *arguments],
+                # -P: do not import modules from the current folder
+                [sys.executable, "-P", "-m", "composer", "run", *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,

@@ -21,8 +21,9 @@ _SUFFIXES = ("", ".yaml", ".yml")
 
 
 def complete_system(incomplete: str) -> list[str]:
-    """Complete the names of example systems, and paths."""
-    names = [name for name in example_systems() if name.startswith(incomplete)]
+    """Complete the names of the project's systems and of example systems, and paths."""
+    known = sorted({*project_systems(), *example_systems()})
+    names = [name for name in known if name.startswith(incomplete)]
     return [*names, *_matching_paths(incomplete)]
 
 
@@ -30,7 +31,7 @@ SystemName = Annotated[
     str,
     typer.Argument(
         metavar="SYSTEM",
-        help="A system file, or the name of an example system.",
+        help="A system file, or the name of a system of the project or of an example system.",
         show_default=False,
         autocompletion=complete_system,
     ),
@@ -57,26 +58,63 @@ AnyRunningSystem = Annotated[
 
 
 def system_file(text: str) -> Path:
-    """Return the path ``text``, or the file of the example system with that name.
+    """Return the path ``text``, or the file of the system with that name.
 
-    Raises UsageError.
+    Systems of the project come before example systems. Raises UsageError.
     """
     path = Path(text)
-    if _is_folder(path):
-        raise UsageError(f"'{text}' is a folder, not a system file")
-    if path_exists(path):
+    if path_exists(path) and not _is_folder(path):
         return path  # the loader reports what is wrong with it
-    examples = example_systems()
+    own, examples = project_systems(), example_systems()
+    if text in own:
+        return _own_system(text, own[text], examples.get(text))
     if text in examples:
         return examples[text]
+    if _is_folder(path):
+        raise UsageError(f"'{text}' is a folder, not a system file")
     from composer.diagnostics import nearest
 
-    close = nearest_path(path) or nearest(text, examples)
+    close = nearest_path(path) or nearest(text, (*own, *examples))
     listed = "example systems: " + ", ".join(sorted(examples))
     raise UsageError(
         f"there is no file '{text}' and no example system of that name",
         hint=listed if close is None else f"did you mean '{close}'?\n{listed}",
     )
+
+
+def project_systems() -> dict[str, Path]:
+    """Return the systems of the current folder's project, by name.
+
+    They are the YAML files in the folder ``systems`` of the project, and in the current folder.
+    """
+    from composer.project import SETTINGS_FILE, SYSTEMS, Project
+
+    here = Path.cwd()
+    found: dict[str, Path] = {}
+    for folder in (here, Project.at(here).root / SYSTEMS):
+        for suffix in _SUFFIXES:
+            files = sorted(folder.glob(f"*{suffix}")) if suffix else ()
+            found |= {file.stem: file for file in files if file.name != SETTINGS_FILE}
+    return found
+
+
+def _own_system(name: str, path: Path, example: Path | None) -> Path:
+    """Return ``path``, a system of the project, and name the example system that it hides.
+
+    Raises UsageError if it belongs to another user, whose file must be named explicitly.
+    """
+    from composer.project.ownership import TrustedUsers
+    from composer.source import shown_path
+
+    shown = shown_path(path)
+    if TrustedUsers.own().other_owner(path) is not None:
+        raise UsageError(
+            f"'{name}' would run '{shown}', which belongs to another user",
+            hint="give the path of the file that you want to run",
+        )
+    if example is not None and not path.samefile(example):
+        say(f"compose: '{name}' is '{shown}'; the example system of that name is '{example}'")
+    return Path(shown)
 
 
 def example_systems() -> dict[str, Path]:

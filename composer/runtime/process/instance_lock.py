@@ -129,8 +129,8 @@ def _unsafe(folder: Path) -> StartRefused:
 def _lock_files() -> list[str]:
     """Return the names of the lock files, sorted; none if the folder is not safe."""
     try:
-        with _open_folder() as folder:
-            return sorted(os.listdir(folder))
+        with _open_folder() as folder, os.scandir(folder) as entries:
+            return sorted(entry.name for entry in entries)
     except (OSError, StartRefused):
         return []
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -235,3 +236,13 @@ def test_no_content_raises(tmp_path: Path, content: bytes, problem: str) -> None
 def test_a_folder_with_the_name_of_the_file_is_not_a_module(tmp_path: Path) -> None:
     (tmp_path / "robot.py").mkdir()
     assert find("robot:Robot", tmp_path).problem == "is not a regular file"
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
+def test_a_module_of_another_user_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "robot").mkdir()
+    (tmp_path / "robot" / "__init__.py").write_text("class Robot: ...\n")
+    (tmp_path / "robot.py").write_text("class Robot: ...\n")
+    os.chown(tmp_path / "robot.py", 65534, 65534)
+    source = find("robot:Robot", tmp_path)
+    assert source.problem == "belongs to another user"

@@ -279,3 +279,32 @@ def test_many_keys_take_linear_time(tmp_path: Path) -> None:
         assert table[0].entries[-1].key.span.line == count + 1
 
     assert_linear(read, 200, 1600)
+
+
+def test_interfaces_outside_the_project_are_not_used(tmp_path: Path) -> None:
+    (tmp_path / "interfaces").mkdir()
+    (tmp_path / "robot" / "nodes").mkdir(parents=True)
+    assert Project.at(tmp_path / "robot").interface_folders == ()
+    (tmp_path / "robot" / "composer.yaml").touch()
+    assert Project.at(tmp_path / "robot").interface_folders == ()
+
+
+def test_without_nodes_the_root_is_the_folder_above_interfaces(tmp_path: Path) -> None:
+    (tmp_path / "interfaces").mkdir()
+    (tmp_path / "systems").mkdir()
+    project = Project.at(tmp_path / "systems")
+    assert (project.root, project.interface_folders) == (tmp_path, (tmp_path / "interfaces",))
+
+
+def test_no_settings_apply_to_what_comes_with_the_composer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The environment of a project is often in a folder of the project."""
+    share = tmp_path / ".venv" / "share"
+    for name in ("systems", "nodes"):
+        (share / name).mkdir(parents=True)
+    (tmp_path / "composer.yaml").write_text("nodes: []\nstrict: true\n")
+    monkeypatch.setattr("composer.project.data_folder", lambda: share)
+    project = Project.at(share / "systems")
+    assert (project.root, project.settings.strict) == (share, False)
+    assert project.node_folders == (share / "nodes",)

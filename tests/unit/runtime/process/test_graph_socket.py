@@ -23,9 +23,9 @@ LIMIT_S = 10.0
 @pytest.fixture(autouse=True)
 def folder(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("run")))
-    found = socket_path("/robot").parent
-    found.mkdir()
-    return found
+    path = socket_path("/robot")
+    assert path is not None
+    return path.parent
 
 
 @pytest.fixture
@@ -103,7 +103,9 @@ def test_a_system_that_does_not_respond_costs_no_more_than_the_limit(
 def test_the_socket_of_a_killed_process_is_replaced(
     folder: Path, serve: Callable[..., list[Exception]]
 ) -> None:
-    socket_path("/robot").touch()
+    path = socket_path("/robot")
+    assert path is not None
+    path.touch()
     assert read_graph("/robot", LIMIT_S) is None
     serve(lambda: VIEW)
     assert read_graph("/robot", LIMIT_S) == VIEW

@@ -16,7 +16,7 @@ READY, INITIALIZING = b"\x02\0\0\0 the rest", b"\x01\0\0\0 the rest"
 LONG_AGO_S = time.time() - 3600.0
 #: Its participants use the ports from 7400 on, those of domain 1 from 7650 on.
 DOMAIN = 0
-NOBODY = 65534
+OTHER_USER = 65534
 needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
 
 
@@ -70,7 +70,7 @@ def test_a_missing_folder_is_ignored(tmp_path: Path) -> None:
 @needs_root
 def test_an_incomplete_port_of_another_user_is_refused_and_kept(tmp_path: Path) -> None:
     path = segment(tmp_path, "fastrtps_port7411", b"")
-    os.chown(path, NOBODY, NOBODY)
+    os.chown(path, OTHER_USER, OTHER_USER)
     with pytest.raises(StartRefused, match=r"fastrtps_port7411 .*owner: user 65534") as refusal:
         remove_incomplete_ports(DOMAIN, tmp_path)
     assert f"remove {path}" in refusal.value.hint
@@ -80,7 +80,7 @@ def test_an_incomplete_port_of_another_user_is_refused_and_kept(tmp_path: Path) 
 @needs_root
 def test_an_incomplete_port_of_another_user_affects_only_its_domain(tmp_path: Path) -> None:
     path = segment(tmp_path, "fastrtps_port7661", b"")
-    os.chown(path, NOBODY, NOBODY)
+    os.chown(path, OTHER_USER, OTHER_USER)
     remove_incomplete_ports(DOMAIN, tmp_path)
     with pytest.raises(StartRefused):
         remove_incomplete_ports(1, tmp_path)

@@ -1,0 +1,60 @@
+"""Systems by name: those of the project, and those that come with the composer."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from composer.cli.support.errors import UsageError
+from composer.cli.support.system_arguments import complete_system, example_systems, system_file
+
+OWN = "system: robot\nnodes:\n  one: {on_activate: {log: started}}\n"
+
+
+@pytest.fixture
+def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the root of a project with the system ``robot``; it is the current folder."""
+    (tmp_path / "systems").mkdir()
+    (tmp_path / "nodes").mkdir()
+    (tmp_path / "systems" / "robot.yaml").write_text(OWN)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_system_of_the_project_comes_before_an_example(
+    root: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert system_file("robot") == Path("systems/robot.yaml")
+    note = "compose: 'robot' is 'systems/robot.yaml'; the example system of that name is"
+    assert capsys.readouterr().err == f"{note} '{example_systems()['robot']}'\n"
+    assert system_file("pipeline") == example_systems()["pipeline"]
+    assert capsys.readouterr().err == ""
+
+
+def test_it_is_found_from_every_folder_of_the_project(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (root / "nodes" / "deep").mkdir()
+    (root / "systems" / "mine.yml").write_text(OWN)
+    monkeypatch.chdir(root / "nodes" / "deep")
+    assert system_file("robot") == root / "systems" / "robot.yaml"
+    assert system_file("mine") == root / "systems" / "mine.yml"
+    assert "mine" in complete_system("mi")
+
+
+def test_an_example_is_found_next_to_a_folder_of_its_name(root: Path) -> None:
+    (root / "pipeline").mkdir()
+    (root / "other").mkdir()
+    assert system_file("pipeline") == example_systems()["pipeline"]
+    with pytest.raises(UsageError, match="'other' is a folder"):
+        system_file("other")
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
+def test_a_system_of_another_user_is_not_found_by_its_name(root: Path) -> None:
+    os.chown(root / "systems" / "robot.yaml", 65534, 65534)
+    with pytest.raises(UsageError, match="belongs to another user"):
+        system_file("robot")
+    assert system_file("systems/robot.yaml") == Path("systems/robot.yaml")

@@ -1,0 +1,125 @@
+"""What other users place in parent folders is not part of a project."""
+
+from __future__ import annotations
+
+import os
+import pwd
+from pathlib import Path
+
+import pytest
+
+from composer.diagnostics import Diagnostic
+from composer.project import Project
+
+OTHER_USER, THIRD_USER = 65534, 65533
+needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> Path:
+    """Return a folder of this user, in a folder that everyone can write to."""
+    folder = tmp_path / "mine" / "systems"
+    folder.mkdir(parents=True)
+    return folder
+
+
+def give_away(path: Path, owner: int = OTHER_USER) -> Path:
+    os.chown(path, owner, owner, follow_symlinks=False)
+    return path
+
+
+def controlled(diagnostics: tuple[Diagnostic, ...]) -> list[str]:
+    return [
+        f"{item.rule.name} {Path(item.primary.file.path).name}: {item.message}"
+        for item in diagnostics
+    ]
+
+
+@needs_root
+@pytest.mark.parametrize("name", ["nodes", "interfaces", "composer.yaml"])
+def test_what_another_user_has_put_into_a_parent_folder_is_not_used(
+    tmp_path: Path, mine: Path, name: str
+) -> None:
+    found = tmp_path / name
+    if name == "composer.yaml":
+        (tmp_path / "nodes").mkdir()
+        found.write_text("strict: true\n")
+    else:
+        found.mkdir()
+    give_away(found)
+    project = Project.at(mine)
+    assert (project.root, project.settings.strict) == (mine, False)
+    assert project.node_folders == project.interface_folders == ()
+    name_of_user = f"'{pwd.getpwuid(OTHER_USER).pw_name}'"
+    assert controlled(project.diagnostics) == [
+        f"foreign-owner {name}: '{name}' is not used: user {name_of_user} controls it"
+    ]
+    assert str(project.diagnostics[0].hint).endswith(f"set COMPOSE_SAFE_FOLDERS={tmp_path}")
+
+
+@needs_root
+def test_what_is_in_a_folder_of_another_user_is_not_used(tmp_path: Path, mine: Path) -> None:
+    (tmp_path / "nodes").mkdir()
+    give_away(tmp_path)
+    project = Project.at(mine)
+    assert project.node_folders == ()
+    assert len(project.diagnostics) == 1
+
+
+@needs_root
+def test_a_link_of_another_user_is_not_used(tmp_path: Path, mine: Path) -> None:
+    (tmp_path / "drafts").mkdir()
+    (tmp_path / "nodes").symlink_to(tmp_path / "drafts")
+    give_away(tmp_path / "nodes")
+    assert Project.at(mine).node_folders == ()
+
+
+@needs_root
+def test_a_project_below_the_folder_of_another_user_is_complete(tmp_path: Path, mine: Path) -> None:
+    for folder in (mine.parent / "nodes", tmp_path / "nodes"):
+        folder.mkdir()
+    give_away(tmp_path)
+    project = Project.at(mine)
+    assert (project.root, project.node_folders) == (mine.parent, (mine.parent / "nodes",))
+    assert project.diagnostics == ()
+
+
+@needs_root
+def test_root_may_use_a_project_whose_owner_is_another_user(tmp_path: Path, mine: Path) -> None:
+    """As in a container, where a mounted project belongs to a user of the host."""
+    nodes = tmp_path / "nodes"
+    nodes.mkdir()
+    for path in (tmp_path, nodes, mine.parent, mine):
+        give_away(path)
+    assert Project.at(mine).node_folders == (nodes,)
+    give_away(nodes, THIRD_USER)
+    assert Project.at(mine).node_folders == ()
+
+
+@needs_root
+def test_the_user_who_called_sudo_is_trusted(
+    tmp_path: Path, mine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nodes = tmp_path / "nodes"
+    nodes.mkdir()
+    give_away(nodes)
+    for caller, used in (
+        (str(OTHER_USER), (nodes,)),
+        (str(THIRD_USER), ()),
+        ("65534 ", ()),
+        ("", ()),
+    ):
+        monkeypatch.setenv("SUDO_UID", caller)
+        assert Project.at(mine).node_folders == used
+
+
+@needs_root
+def test_folders_can_be_declared_safe(
+    tmp_path: Path, mine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nodes = tmp_path / "nodes"
+    nodes.mkdir()
+    give_away(nodes)
+    for safe, used in ((f"/opt:{tmp_path}", (nodes,)), ("*", (nodes,)), (f"{tmp_path}/nodes", ())):
+        monkeypatch.setenv("COMPOSE_SAFE_FOLDERS", safe)
+        assert Project.at(mine).node_folders == used
