@@ -17,7 +17,7 @@ from composer.qos import incompatibilities
 from composer.remote.graph_names import GraphNames
 from composer.remote.session import Deadline, Session
 from composer.runtime.intra_process.ignore_local_publications import unsupported_reason
-from composer.runtime.ros.endpoints import EndpointInfo, TopicInfo, topic_info
+from composer.runtime.ros.endpoints import EndpointInfo, TopicInfo
 from composer.runtime.ros.messages import MessageError, interface_class
 
 _TESTED_MIDDLEWARE = "rmw_fastrtps_cpp"
@@ -58,7 +58,9 @@ def check_discovery(session: Session, deadline: Deadline) -> CheckResult:
     started_s = time.monotonic()
     try:
         node = Node(name, context=context, use_global_arguments=False)
-        discovered = session.wait_for(lambda: name in session.node.get_node_names() or None, limit)
+        discovered = session.wait_for(
+            lambda: name in {known for known, _ in session.graph.nodes()} or None, limit
+        )
         node.destroy_node()
     finally:
         context.try_shutdown()
@@ -84,7 +86,7 @@ def check_graph(session: Session, deadline: Deadline) -> Iterator[CheckResult]:
             "start one ('compose run pipeline') in a terminal with the same ROS_DOMAIN_ID",
         )
         return
-    topics = [topic_info(session.node, *named) for named in names.names("topic")]
+    topics = [session.graph.topic(*named) for named in names.names("topic")]
     services = names.names("service")
     problems = [
         *check_node_names(nodes),

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, TypeVar
-
-from rclpy.action.graph import (
-    get_action_client_names_and_types_by_node,
-    get_action_server_names_and_types_by_node,
-)
-from rclpy.node import Node
+from typing import TypeVar
 
 from composer.names import is_hidden
 from composer.remote.name_matching import find_node, full_name, not_found_error
 from composer.remote.session import Deadline, RosError, Session
 from composer.runtime.process.graph_socket import NameAndTypes, visible
-from composer.runtime.ros.graph import names_and_types
 
 T = TypeVar("T")
 
@@ -50,14 +43,14 @@ class GraphNames:
     def __init__(self, session: Session, deadline: Deadline) -> None:
         self._session = session
         self._deadline = deadline
-        self._node: Node = session.node
+        self._graph = session.graph
 
     def names(self, kind: str, *, hidden: bool = False) -> tuple[NameAndTypes, ...]:
         """Return all nodes, topics, services or actions, sorted, with their types.
 
         Nodes have no types. A name that two nodes share is listed twice.
         """
-        found = self._settled(lambda: names_and_types(self._node, kind))
+        found = self._settled(lambda: self._graph.names(kind))
         if kind == "topic" and not self._session.others():
             return ()  # they are those of this session
         return found if hidden else visible(found)
@@ -84,7 +77,7 @@ class GraphNames:
         absolute = full_name(kind, name)
 
         def known() -> dict[str, tuple[str, ...]]:
-            return dict(names_and_types(self._node, kind))
+            return dict(self._graph.names(kind))
 
         types = self._session.search(lambda: known().get(absolute), self._deadline)
         if types is None:
@@ -107,25 +100,21 @@ class GraphNames:
         return self._session.wait_until_settled(poll, self._deadline)
 
     def _nodes(self) -> tuple[str, ...]:
-        return tuple(name for name, _ in names_and_types(self._node, "node"))
+        return tuple(name for name, _ in self._graph.names("node"))
 
     def _node_info(self, full_name: str, hidden: bool) -> NodeInfo:
         namespace, _, name = full_name.rpartition("/")
         where = (name, namespace or "/")
-
-        def names(query: Callable[..., Iterable[Any]]) -> tuple[NameAndTypes, ...]:
-            return _sorted(query(*where), hidden)
-
-        node = self._node
-        return NodeInfo(
-            full_name,
-            names(node.get_subscriber_names_and_types_by_node),
-            names(node.get_publisher_names_and_types_by_node),
-            names(node.get_service_names_and_types_by_node),
-            names(node.get_client_names_and_types_by_node),
-            names(lambda *at: get_action_server_names_and_types_by_node(node, *at)),
-            names(lambda *at: get_action_client_names_and_types_by_node(node, *at)),
+        graph = self._graph
+        queries = (
+            graph.subscriptions_of,
+            graph.publishers_of,
+            graph.services_of,
+            graph.clients_of,
+            graph.action_servers_of,
+            graph.action_clients_of,
         )
+        return NodeInfo(full_name, *(_sorted(query(where), hidden) for query in queries))
 
     def _action_info(self, name: str, types: tuple[str, ...]) -> ActionInfo:
         servers, clients = [], []
@@ -138,12 +127,10 @@ class GraphNames:
 
 def type_mismatch_hint(session: Session, kind: str, name: str, type_name: str) -> str | None:
     """Return a hint if other nodes use ``name`` with another type, else None."""
-    known = dict(names_and_types(session.node, kind)).get(name, ())
+    known = dict(session.graph.names(kind)).get(name, ())
     others = [other for other in known if other != type_name]
     return f"other nodes use type {', '.join(others)}, not {type_name}" if others else None
 
 
-def _sorted(found: Iterable[tuple[str, list[str]]], hidden: bool) -> tuple[NameAndTypes, ...]:
-    return tuple(
-        sorted((name, tuple(types)) for name, types in found if hidden or not is_hidden(name))
-    )
+def _sorted(found: Iterable[NameAndTypes], hidden: bool) -> tuple[NameAndTypes, ...]:
+    return tuple(sorted(found if hidden else visible(found)))

@@ -219,7 +219,7 @@ class LifecycleClient:
         self._proxies.discover(self._deadline)
         with_services = {
             name.removesuffix(_STATE_SERVICE)
-            for name, types in self._session.node.get_service_names_and_types()
+            for name, types in self._session.graph.services()
             if name.endswith(_STATE_SERVICE) and _STATE_TYPE in types
         }
         return tuple(sorted(with_services | self._proxies.nodes(LIFECYCLE).keys()))

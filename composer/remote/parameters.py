@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType, ParameterValue
@@ -28,6 +28,8 @@ from composer.remote.requests import (
 from composer.remote.session import Deadline, NoResponseError, RosError, Session
 from composer.runtime.ros.manager_protocol import full_parameter_name
 
+T = TypeVar("T")
+
 _NOT_SET = "not set"
 _LIST_SERVICE = "/list_parameters"
 _TYPES = {
@@ -46,6 +48,10 @@ _TYPES = {
 
 class UnknownParameterError(RosError):
     """The node has no such parameter."""
+
+
+class InvalidResponseError(RosError):
+    """The response of the node does not fit the request."""
 
 
 class ParameterRejectedError(RosError):
@@ -92,7 +98,7 @@ class ParameterClient:
         request = GetParameters.Request(names=self._qualified(requested))
         response = self._call(call_with_retries, GetParameters, "get_parameters", request)
         return {
-            name: plain_value(value) for name, value in zip(requested, response.values, strict=True)
+            name: plain_value(value) for name, value in self._by_name(requested, response.values)
         }
 
     def describe(self, names: Iterable[str]) -> tuple[ParameterDescription, ...]:
@@ -103,7 +109,7 @@ class ParameterClient:
         response = self._call(call_with_retries, DescribeParameters, "describe_parameters", request)
         return tuple(
             _description(name, found)
-            for name, found in zip(requested, response.descriptors, strict=True)
+            for name, found in self._by_name(requested, response.descriptors)
         )
 
     def set(self, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -123,7 +129,7 @@ class ParameterClient:
         response = self._call(call_once, SetParameters, "set_parameters", request)
         rejected = [
             f"{name}: {result.reason or 'no reason given'}"
-            for name, result in zip(values, response.results, strict=True)
+            for name, result in self._by_name(list(values), response.results)
             if not result.successful
         ]
         if rejected:
@@ -144,6 +150,15 @@ class ParameterClient:
                 if name not in fixed or value != present[name]
             }
         )
+
+    def _by_name(self, names: list[str], responses: Sequence[T]) -> Iterable[tuple[str, T]]:
+        """Return the names with their responses. Raises InvalidResponseError."""
+        if len(names) != len(responses):
+            raise InvalidResponseError(
+                f"{self.node} responded with {len(responses)} values for {len(names)} parameters",
+                "another node may have the same name; 'compose doctor' checks that",
+            )
+        return zip(names, responses, strict=True)
 
     def _check_known(self, names: Iterable[str]) -> None:
         known = self.names()
@@ -205,7 +220,7 @@ def _manager(session: Session, deadline: Deadline, node: str) -> str | None:
     proxies = Proxies(session)
 
     def server() -> str | None:
-        names = (name for name, _ in session.node.get_service_names_and_types())
+        names = (name for name, _ in session.graph.services())
         if f"{node}{_LIST_SERVICE}" in names:
             return ""
         proxies.discover(deadline)
@@ -217,8 +232,8 @@ def _manager(session: Session, deadline: Deadline, node: str) -> str | None:
 
 
 def plain_value(value: ParameterValue) -> Any:
-    """Return the value as plain data; byte strings become numbers."""
-    found = parameter_value_to_python(value)
+    """Return the value as plain data; byte strings become numbers, unknown types None."""
+    found = parameter_value_to_python(value) if value.type in _TYPES else None
     if isinstance(found, list):
         return [item[0] if isinstance(item, bytes) else item for item in found]
     return found
@@ -253,7 +268,7 @@ def _description(name: str, found: ParameterDescriptor) -> ParameterDescription:
     bounds = [*found.floating_point_range, *found.integer_range]
     return ParameterDescription(
         name=name,
-        type=_TYPES[found.type],
+        type=_TYPES.get(found.type, f"unknown type {found.type}"),
         description=found.description,
         constraints=found.additional_constraints,
         read_only=found.read_only,

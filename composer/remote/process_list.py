@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 from composer.remote.lifecycle import LifecycleClient
 from composer.remote.session import Deadline, Session
-from composer.remote.systems import DISCOVERY_S, SystemReport, Systems
+from composer.remote.system_reports import SystemReport
+from composer.remote.systems import DISCOVERY_S, Systems
 from composer.runtime.process.instance_lock import local_systems
 
 #: How long to wait for the responses of other nodes after discovery.

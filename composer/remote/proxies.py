@@ -13,6 +13,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.subscription import Subscription
 
 from composer.remote.session import Deadline, Session
+from composer.remote.system_reports import report_values, reported_node
+from composer.runtime.ros.graph import is_valid_name
 from composer.runtime.ros.manager_protocol import CHANGE_STATE, NAME, STATE_QOS, STATE_TOPIC
 
 LIFECYCLE, PARAMETERS = "lifecycle", "parameters"
@@ -39,7 +41,7 @@ class Proxies:
         """Subscribe to every manager discovered so far, and wait for its first report."""
         known = {
             name.removesuffix(f"/{CHANGE_STATE}")
-            for name, types in self._session.node.get_service_names_and_types()
+            for name, types in self._session.graph.services()
             if name.endswith(_SERVICE) and _SERVICE_TYPE in types
         }
         new = known - self._subscriptions.keys()  # wait for each manager only once
@@ -91,9 +93,9 @@ class Proxies:
     def _on_report(self, manager: str, message: DiagnosticArray) -> None:
         self._report_counts[manager] = self._report_counts.get(manager, 0) + 1
         self._reports[manager] = {
-            str(status.name).partition(": ")[2]: values
+            reported_node(status): values
             for status in message.status
-            if (values := {item.key: str(item.value) for item in status.values}).get(
-                "left_to_manager"
-            )
+            if {"left_to_manager", "state"} <= (values := report_values(status)).keys()
+            and values["left_to_manager"]
+            and is_valid_name(reported_node(status))
         }

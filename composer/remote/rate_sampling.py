@@ -11,12 +11,11 @@ import time
 from collections.abc import Mapping
 from typing import Any, Self
 
-from rclpy.node import Node
 from rclpy.subscription import Subscription
 
+from composer.remote.session import Session
 from composer.remote.topics import measuring_qos
 from composer.remote.values import InvalidValueError, class_of
-from composer.runtime.ros.endpoints import topic_info
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
 _DEPTH = 1000
@@ -26,8 +25,9 @@ _POLL_PERIOD_S = 0.002
 class RateMeter:
     """Subscribes to topics, given by name with their types. Use it in a ``with`` block."""
 
-    def __init__(self, node: Node, topics: Mapping[str, tuple[str, ...]]) -> None:
-        self._node = node
+    def __init__(self, session: Session, topics: Mapping[str, tuple[str, ...]]) -> None:
+        self._graph = session.graph
+        self._node = session.node
         self._sent_ns: dict[str, list[int]] = {}
         self._subscriptions: dict[str, Subscription] = {}
         for topic, types in topics.items():
@@ -57,7 +57,7 @@ class RateMeter:
         }
 
     def _subscribe(self, topic: str, types: tuple[str, ...]) -> Subscription | None:
-        publishers = topic_info(self._node, topic, types).publishers
+        publishers = self._graph.topic(topic, types).publishers
         if not publishers or len(types) != 1:
             return None
         try:

@@ -24,9 +24,8 @@ from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.ros.graph import (
     COMMAND_PREFIX,
     SETTLE_S,
-    are_nodes_known,
-    other_nodes,
-    participants,
+    NodeName,
+    RosGraph,
 )
 from composer.runtime.ros.manager_protocol import NAME
 
@@ -110,6 +109,7 @@ class Session:
             start_parameter_services=False,
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
+        self.graph = RosGraph(self.node)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._domain_id = self._context.get_domain_id()
@@ -124,9 +124,9 @@ class Session:
         self.node.destroy_node()
         self._context.try_shutdown()
 
-    def others(self) -> tuple[tuple[str, str], ...]:
+    def others(self) -> tuple[NodeName, ...]:
         """Return name and namespace of every known node except those of commands."""
-        return other_nodes(self.node)
+        return self.graph.others()
 
     def unresponsive_systems(self) -> dict[str, str]:
         """Return the systems of this computer that are not discovered, with their process ids.
@@ -181,11 +181,11 @@ class Session:
             return False
         if now_s >= self.node.joined_s + _ANNOUNCED_WITHIN_S:
             return True
-        return count >= count_participants(self._domain_id) and are_nodes_known(self.node)
+        return count >= count_participants(self._domain_id) and self.graph.are_nodes_known()
 
-    def _discovered(self) -> tuple[int, tuple[tuple[str, str], ...]]:
+    def _discovered(self) -> tuple[int, tuple[NodeName, ...]]:
         """Return the number of known participants, including this one, and the nodes."""
-        return len(participants(self.node)), self.others()
+        return len(self.graph.participants()), self.others()
 
 
 class _LastChange:

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any, Self, TypeAlias
+from collections.abc import Iterator
+from typing import Self, TypeAlias
 
 from lifecycle_msgs.srv import GetState
 from rcl_interfaces.srv import GetParameters, ListParameters
-from rclpy.action.graph import (
-    get_action_client_names_and_types_by_node,
-    get_action_server_names_and_types_by_node,
-)
-from rclpy.node import Node
 
 from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.model import PortKind
@@ -22,7 +17,7 @@ from composer.remote.proxies import LIFECYCLE, PARAMETERS, Proxies
 from composer.remote.rate_sampling import RateMeter
 from composer.remote.requests import ServiceCaller
 from composer.remote.session import Deadline, Session
-from composer.runtime.ros.endpoints import topic_info
+from composer.runtime.ros.graph import RosGraph
 from composer.runtime.ros.manager_protocol import full_parameter_name
 from composer.tree import Plain
 
@@ -32,7 +27,6 @@ _STATE_TYPE = "lifecycle_msgs/srv/GetState"
 _LIST_TYPE = "rcl_interfaces/srv/ListParameters"
 
 _Ends: TypeAlias = dict[str, list[ObservedEndpoint]]
-_Where: TypeAlias = tuple[str, str]
 
 
 class GraphObserver:
@@ -53,8 +47,9 @@ class GraphObserver:
     def snapshot(self, deadline: Deadline) -> Snapshot:
         """Return the graph once discovery is complete, or at the deadline."""
         session = self._session
-        ends = dict(session.wait_until_settled(lambda: _endpoints(session.node), deadline))
-        counts = Counter(_names(session.node))
+        graph = session.graph
+        ends = dict(session.wait_until_settled(lambda: _endpoints(graph), deadline))
+        counts = Counter(_names(graph))
         services = {
             node: {end.name: end.type for end in found if end.kind is PortKind.SERVICE}
             for node, found in ends.items()
@@ -84,8 +79,7 @@ class GraphObserver:
         """
         if measure_s <= 0.0:
             return {}
-        node = self._session.node
-        with RateMeter(node, _topics(node)) as meter:
+        with RateMeter(self._session, _topics(self._session.graph)) as meter:
             return meter.measure(min(measure_s, deadline.left_s))
 
     def _states(
@@ -165,16 +159,16 @@ def _offering(services: dict[str, dict[str, str]], last: str, type_name: str) ->
     }
 
 
-def _endpoints(node: Node) -> tuple[tuple[str, tuple[ObservedEndpoint, ...]], ...]:
+def _endpoints(graph: RosGraph) -> tuple[tuple[str, tuple[ObservedEndpoint, ...]], ...]:
     """Return the endpoints of all nodes as a hashable value."""
-    ends = _endpoints_by_node(node)
+    ends = _endpoints_by_node(graph)
     return tuple((name, tuple(ends[name])) for name in sorted(ends))
 
 
-def _endpoints_by_node(node: Node) -> _Ends:
-    ends: _Ends = {name: [] for name in _names(node)}
-    for topic, types in _topics(node).items():
-        info = topic_info(node, topic, types)
+def _endpoints_by_node(graph: RosGraph) -> _Ends:
+    ends: _Ends = {name: [] for name in _names(graph)}
+    for topic, types in _topics(graph).items():
+        info = graph.topic(topic, types)
         for kind, found in (
             (PortKind.PUBLISHER, info.publishers),
             (PortKind.SUBSCRIPTION, info.subscriptions),
@@ -183,44 +177,28 @@ def _endpoints_by_node(node: Node) -> _Ends:
                 if end.node in ends:
                     ends[end.node].append(ObservedEndpoint(kind, topic, end.type, end.qos))
     for name, of_node in ends.items():
-        of_node.extend(_services_and_actions(node, name))
+        of_node.extend(_services_and_actions(graph, name))
         of_node.sort(key=lambda end: (list(PortKind).index(end.kind), end.name, end.type))
     return ends
 
 
-def _services_and_actions(node: Node, full_name: str) -> Iterator[ObservedEndpoint]:
+def _services_and_actions(graph: RosGraph, full_name: str) -> Iterator[ObservedEndpoint]:
     namespace, _, name = full_name.rpartition("/")
-    where = (name, namespace or "/")
-    readers: tuple[tuple[PortKind, Callable[[_Where], Iterable[Any]]], ...] = (
-        (PortKind.SERVICE, lambda at: node.get_service_names_and_types_by_node(*at)),
-        (PortKind.CLIENT, lambda at: node.get_client_names_and_types_by_node(*at)),
-        (PortKind.ACTION_SERVER, lambda at: get_action_server_names_and_types_by_node(node, *at)),
-        (PortKind.ACTION_CLIENT, lambda at: get_action_client_names_and_types_by_node(node, *at)),
-    )
-    for kind, read in readers:
-        for found, types in _read(read, where):
+    node = (name, namespace or "/")
+    for kind, query in (
+        (PortKind.SERVICE, graph.services_of),
+        (PortKind.CLIENT, graph.clients_of),
+        (PortKind.ACTION_SERVER, graph.action_servers_of),
+        (PortKind.ACTION_CLIENT, graph.action_clients_of),
+    ):
+        for found, types in query(node):
             if not is_hidden(found):
                 yield from (ObservedEndpoint(kind, found, type_name) for type_name in types)
 
 
-def _read(read: Callable[[_Where], Iterable[Any]], where: _Where) -> Iterable[Any]:
-    """Return the result of a query; nothing if the node has left in the meantime."""
-    try:
-        return read(where)
-    except RuntimeError:  # NodeNameNonExistentError is one
-        return ()
+def _names(graph: RosGraph) -> list[str]:
+    return [f"{namespace.rstrip('/')}/{name}" for name, namespace in graph.nodes()]
 
 
-def _names(node: Node) -> list[str]:
-    return [
-        f"{namespace.rstrip('/')}/{name}"
-        for name, namespace in node.get_node_names_and_namespaces()
-    ]
-
-
-def _topics(node: Node) -> dict[str, tuple[str, ...]]:
-    return {
-        name: tuple(types)
-        for name, types in sorted(node.get_topic_names_and_types())
-        if not is_hidden(name)
-    }
+def _topics(graph: RosGraph) -> dict[str, tuple[str, ...]]:
+    return {name: types for name, types in sorted(graph.topics()) if not is_hidden(name)}

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import replace
+from functools import partial
+from typing import TypeVar
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
@@ -13,8 +15,13 @@ from std_srvs.srv import Trigger
 from composer.remote.name_matching import NotFoundError, not_found_error
 from composer.remote.requests import call_once
 from composer.remote.session import Deadline, NoResponseError, Session
-from composer.runtime.metrics.diagnostics import from_message
-from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
+from composer.remote.system_reports import (
+    CallbackReport,
+    InvalidReportError,
+    SystemReport,
+    parse_callbacks,
+    parse_state,
+)
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.ros.manager_protocol import (
     CALLBACKS_QOS,
@@ -25,51 +32,14 @@ from composer.runtime.ros.manager_protocol import (
     STATE_TOPIC,
 )
 
+T = TypeVar("T")
+
 _TRIGGER_TYPE = "std_srvs/srv/Trigger"
 _SERVICE = f"/{NAME}/{IS_ACTIVE}"
 #: Fast DDS discovers a participant at once or within 3 s; managers report every second.
 DISCOVERY_S = 3.5
 #: How long to wait for the last messages of a process that has ended.
 _LAST_MESSAGES_S = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class NodeReport:
-    """A node as its manager reports it. ``since_s`` is in seconds since 1970."""
-
-    node: str
-    state: str
-    desired: str
-    since_s: float
-    restarts: int
-    errors: int
-    last_error: str
-    held_down: str
-    sent_hz: float
-    received_hz: float
-    busy: float
-    slowest: str
-    overruns: int
-    queue_drops: int
-    qos_events: Mapping[str, int]
-
-
-@dataclass(frozen=True, slots=True)
-class SystemReport:
-    """A system as its manager reports it. ``name`` is the namespace of the manager.
-
-    ``callbacks`` and ``chains`` are included on request, with their time ``callbacks_at_s``.
-    """
-
-    name: str
-    activity: str
-    message: str
-    host: str
-    pid: str
-    nodes: tuple[NodeReport, ...]
-    callbacks: tuple[CallbackFigures, ...] = ()
-    chains: tuple[ChainFigures, ...] = ()
-    callbacks_at_s: float = 0.0
 
 
 class Systems:
@@ -82,8 +52,8 @@ class Systems:
         self._session = session
         self._deadline = deadline
         self._with_callbacks = callbacks
-        self._states: dict[str, DiagnosticArray] = {}
-        self._callbacks: dict[str, DiagnosticArray] = {}
+        self._states: dict[str, SystemReport] = {}
+        self._callbacks: dict[str, CallbackReport] = {}
         self._subscriptions: dict[str, list[Subscription]] = {}
 
     def discover(self) -> tuple[str, ...]:
@@ -94,8 +64,8 @@ class Systems:
         found = tuple(
             sorted(
                 name.removesuffix(_SERVICE)
-                for name, types in self._session.node.get_service_names_and_types()
-                if name.endswith(_SERVICE) and _TRIGGER_TYPE in types
+                for name, types in self._session.graph.services()
+                if name.endswith(_SERVICE) and name != _SERVICE and _TRIGGER_TYPE in types
             )
         )
         self.subscribe(found)
@@ -151,7 +121,7 @@ class Systems:
 
     def newer(self, name: str, than_s: float) -> SystemReport | None:
         """Return the report of a system if its callbacks are newer than ``than_s``, else None."""
-        if _time_s(self._callbacks[name]) <= than_s:
+        if self._callbacks[name].at_s <= than_s:
             return None
         return self._report(name)
 
@@ -206,32 +176,43 @@ class Systems:
         return name in self._states and (not self._with_callbacks or name in self._callbacks)
 
     def _report(self, name: str) -> SystemReport:
-        report = _system_report(name, self._states[name])
-        callbacks = self._callbacks.get(name)
-        if callbacks is None:
+        report = self._states[name]
+        found = self._callbacks.get(name)
+        if found is None:
             return report
-        found, chains = from_message(callbacks)
-        at_s = _time_s(callbacks)
-        return replace(report, callbacks=found, chains=chains, callbacks_at_s=at_s)
+        return replace(
+            report, callbacks=found.callbacks, chains=found.chains, callbacks_at_s=found.at_s
+        )
 
     def _subscribe(self, name: str) -> list[Subscription]:
-        subscriptions = [self._stored_in(self._states, name, STATE_TOPIC, STATE_QOS)]
+        parse = partial(parse_state, name)
+        subscriptions = [self._stored_in(self._states, name, STATE_TOPIC, STATE_QOS, parse)]
         if self._with_callbacks:
             subscriptions.append(
-                self._stored_in(self._callbacks, name, CALLBACKS_TOPIC, CALLBACKS_QOS)
+                self._stored_in(
+                    self._callbacks, name, CALLBACKS_TOPIC, CALLBACKS_QOS, parse_callbacks
+                )
             )
         return subscriptions
 
     def _stored_in(
-        self, messages: dict[str, DiagnosticArray], name: str, topic: str, qos: QoSProfile
+        self,
+        reports: dict[str, T],
+        name: str,
+        topic: str,
+        qos: QoSProfile,
+        parse: Callable[[DiagnosticArray], T],
     ) -> Subscription:
-        """Return a subscription that keeps the last message of a system in ``messages``."""
-        return self._session.node.create_subscription(
-            DiagnosticArray,
-            f"{name}/{NAME}/{topic}",
-            lambda message: messages.__setitem__(name, message),
-            qos,
-        )
+        """Return a subscription that keeps the last valid report of a system in ``reports``."""
+        full_topic = f"{name}/{NAME}/{topic}"
+
+        def on_message(message: DiagnosticArray) -> None:
+            try:
+                reports[name] = parse(message)
+            except InvalidReportError as error:
+                self._session.graph.skipped.add(str(error), f"a message on {full_topic}")
+
+        return self._session.node.create_subscription(DiagnosticArray, full_topic, on_message, qos)
 
 
 class _ProcessDeadline(Deadline):
@@ -256,55 +237,6 @@ class _ProcessDeadline(Deadline):
         return self._is_local and self._system not in local_systems()
 
 
-def _time_s(message: DiagnosticArray) -> float:
-    stamp = message.header.stamp
-    return float(stamp.sec + stamp.nanosec * 1e-9)
-
-
 def _matches(name: str, systems: Iterable[str]) -> list[str]:
     """Return the systems with that full name or last part."""
     return [system for system in systems if system == name or system.endswith(f"/{name}")]
-
-
-def _system_report(name: str, message: DiagnosticArray) -> SystemReport:
-    system, *nodes = message.status
-    values = _values(system)
-    return SystemReport(
-        name=name,
-        activity=values["activity"],
-        message=str(system.message),
-        host=values["host"],
-        pid=values["pid"],
-        nodes=tuple(map(_node_report, nodes)),
-    )
-
-
-def _node_report(status: DiagnosticStatus) -> NodeReport:
-    values = _values(status)
-    return NodeReport(
-        node=str(status.name).partition(": ")[2],
-        state=values["state"],
-        desired=values["desired"],
-        since_s=float(values["since"]),
-        restarts=int(values["restarts"]),
-        errors=int(values["errors"]),
-        last_error=values["last_error"],
-        held_down=values["held_down"],
-        sent_hz=float(values["sent_hz"]),
-        received_hz=float(values["received_hz"]),
-        busy=float(values["busy"]),
-        slowest=values["slowest"],
-        overruns=int(values["overruns"]),
-        queue_drops=int(values["queue_drops"]),
-        qos_events=_counts(values["qos_events"]),
-    )
-
-
-def _counts(text: str) -> dict[str, int]:
-    """Parse counts by name, such as ``incompatible=1``."""
-    pairs = (item.partition("=") for item in text.split())
-    return {name: int(count) for name, _, count in pairs}
-
-
-def _values(status: DiagnosticStatus) -> dict[str, str]:
-    return {item.key: item.value for item in status.values}

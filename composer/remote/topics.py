@@ -15,7 +15,7 @@ from composer.remote.graph_names import GraphNames, type_mismatch_hint
 from composer.remote.name_matching import full_name
 from composer.remote.session import Deadline, NoResponseError, RosError, Session
 from composer.remote.values import Build, class_of
-from composer.runtime.ros.endpoints import TopicInfo, topic_info
+from composer.runtime.ros.endpoints import TopicInfo
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
 _SUBSCRIPTION_DEPTH = 1000
@@ -63,7 +63,7 @@ class Topics:
         types = self._names.types("topic", name)
         absolute = full_name("topic", name)
         return self._session.wait_until_settled(
-            lambda: topic_info(self._session.node, absolute, types), self._deadline
+            lambda: self._session.graph.topic(absolute, types), self._deadline
         )
 
     def type_of(self, name: str) -> str:
@@ -79,7 +79,7 @@ class Topics:
         return measuring_qos(self._offers(name), _SUBSCRIPTION_DEPTH)
 
     def _offers(self, name: str) -> list[QosProfile]:
-        publishers = topic_info(self._session.node, name, ()).publishers
+        publishers = self._session.graph.topic(name, ()).publishers
         return [publisher.qos for publisher in publishers]
 
 

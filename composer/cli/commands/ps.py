@@ -14,7 +14,7 @@ from composer.cli.support.terminal import columns, write
 
 if TYPE_CHECKING:
     from composer.remote.process_list import ProcessList
-    from composer.remote.systems import NodeReport, SystemReport
+    from composer.remote.system_reports import NodeReport, SystemReport
 
 EPILOGS = {
     "ps": examples(

@@ -18,7 +18,8 @@ from composer.cli.support.terminal import write
 if TYPE_CHECKING:
     from composer.cli.support.callback_tables import SortKey
     from composer.remote.session import Session
-    from composer.remote.systems import SystemReport, Systems
+    from composer.remote.system_reports import SystemReport
+    from composer.remote.systems import Systems
 
 EPILOGS = {
     "top": examples(

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from composer.cli.support.errors import CommandError
-from composer.cli.support.terminal import keep_stdout_for_data
+from composer.cli.support.terminal import keep_stdout_for_data, say
 
 if TYPE_CHECKING:
     from composer.model import Node, System
@@ -59,6 +59,8 @@ def ros_session(
 ) -> Iterator[tuple[Session, Deadline]]:
     """Join the ROS graph for the length of a ``with`` block; a RosError becomes a CommandError.
 
+    What is not valid in the graph is skipped, and a warning is printed at the end.
+
     Set ``carries_messages`` if the command publishes or subscribes to topics: messages may be
     large.
     """
@@ -70,7 +72,10 @@ def ros_session(
     deadline = Deadline(timeout_s)
     try:
         with Session() as session:
-            yield session, deadline
+            try:
+                yield session, deadline
+            finally:
+                _warn_of_skipped(session)
     except RosError as error:
         raise CommandError(str(error), hint=error.hint) from error
 
@@ -107,3 +112,10 @@ def types_of(command: str, kind: str, name: str, timeout_s: float) -> tuple[str,
         from composer.remote.graph_names import GraphNames
 
         return GraphNames(session, deadline).types(kind, name)
+
+
+def _warn_of_skipped(session: Session) -> None:
+    from composer.report.display import visible
+
+    for warning in session.graph.skipped.warnings():
+        say(f"warning: {visible(warning)}")

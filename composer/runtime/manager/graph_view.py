@@ -8,13 +8,7 @@ from rclpy.node import Node
 
 from composer.runtime.process.dds_participants import count_participants
 from composer.runtime.process.graph_socket import KINDS, GraphView
-from composer.runtime.ros.graph import (
-    SETTLE_S,
-    are_nodes_known,
-    names_and_types,
-    participant,
-    participants,
-)
+from composer.runtime.ros.graph import SETTLE_S, RosGraph, participant
 
 #: How long to wait for a process that has just started; commands wait longer than that.
 _COMPLETE_WITHIN_S = 0.4
@@ -41,7 +35,7 @@ class GraphObserver:
 
     def note_participants(self) -> None:
         """Note which participants are known. Call it every second."""
-        self._settled, self._recent = self._recent, participants(self._node)
+        self._settled, self._recent = self._recent, RosGraph(self._node).participants()
 
     def view(self) -> GraphView | None:
         """Return the graph, None if it may be incomplete. Any thread may call."""
@@ -49,23 +43,26 @@ class GraphObserver:
         last: GraphView | None = None
         changed_s = 0.0
         while True:
-            known = participants(self._node)
-            view = {kind: names_and_types(self._node, kind) for kind in KINDS}
+            graph = RosGraph(self._node)
+            known = graph.participants()
+            view = {kind: graph.names(kind) for kind in KINDS}
+            if graph.skipped:
+                return None  # the command warns of it
             now_s = time.monotonic()
             if view != last:
                 last, changed_s = view, now_s
             is_settled = known <= self._settled or now_s >= changed_s + SETTLE_S
-            if is_settled and self._are_all_known(known):
+            if is_settled and self._are_all_known(graph, known):
                 return view
             if now_s > end_s:
                 return None
             time.sleep(_POLL_S)
 
-    def _are_all_known(self, known: frozenset[bytes]) -> bool:
+    def _are_all_known(self, graph: RosGraph, known: frozenset[bytes]) -> bool:
         """Say whether every process on this computer is known, and no ended one is."""
         host = self._own_host()
         local = sum(prefix[_HOST] == host for prefix in known)
-        return local == count_participants(self._domain_id) and are_nodes_known(self._node)
+        return local == count_participants(self._domain_id) and graph.are_nodes_known()
 
     def _own_host(self) -> bytes | None:
         name = self._node.get_name()

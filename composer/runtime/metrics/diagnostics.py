@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import fields
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 
 Figures = CallbackFigures | ChainFigures
-#: The type of each field, to convert it back from text.
-_TYPES = {
-    field.name: {"int": int, "float": float}.get(str(field.type), str)
-    for kind in (CallbackFigures, ChainFigures)
-    for field in fields(kind)
-}
 
 
 def to_message(system: str, figures: Iterable[Figures]) -> DiagnosticArray:
@@ -26,7 +22,10 @@ def to_message(system: str, figures: Iterable[Figures]) -> DiagnosticArray:
 def from_message(
     message: DiagnosticArray,
 ) -> tuple[tuple[CallbackFigures, ...], tuple[ChainFigures, ...]]:
-    """Return the callbacks and chains of a message of :func:`to_message`."""
+    """Return the callbacks and chains of a message of :func:`to_message`.
+
+    Raises ValueError, KeyError or TypeError for any other message.
+    """
     values = [
         {item.key: _TYPES[item.key](item.value) for item in status.values}
         for status in message.status
@@ -35,6 +34,23 @@ def from_message(
         tuple(CallbackFigures(**item) for item in values if "chain" not in item),
         tuple(ChainFigures(**item) for item in values if "chain" in item),
     )
+
+
+def finite(text: str) -> float:
+    """Return a number. Raises ValueError, also for infinity and NaN."""
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"'{text}' is not a number")
+    return number
+
+
+_PARSERS: dict[str, Callable[[str], Any]] = {"int": int, "float": finite, "str": str}
+#: Converts each field back from text.
+_TYPES = {
+    field.name: _PARSERS[str(field.type)]
+    for kind in (CallbackFigures, ChainFigures)
+    for field in fields(kind)
+}
 
 
 def _status(system: str, figures: Figures) -> DiagnosticStatus:

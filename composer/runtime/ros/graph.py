@@ -1,15 +1,34 @@
-"""The ROS graph as a node has discovered it: participants, and the names of everything in it."""
+"""The ROS graph as a node has discovered it: participants, and the names of everything in it.
+
+Names that are not valid in ROS are left out. ROS checks names where they are created, but other DDS
+software may announce anything: a topic ``/``, a node without a name. rcl then refuses whole
+queries, and a single participant would keep every command from working.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import lru_cache
+from typing import TypeAlias
 
-from rclpy.action.graph import get_action_names_and_types
+from rclpy.action.graph import (
+    get_action_client_names_and_types_by_node,
+    get_action_names_and_types,
+    get_action_server_names_and_types_by_node,
+)
+from rclpy.exceptions import NameValidationException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rclpy.validate_full_topic_name import validate_full_topic_name
+from rclpy.validate_namespace import validate_namespace
+from rclpy.validate_node_name import validate_node_name
 
 from composer.runtime.process.graph_socket import NameAndTypes
-from composer.runtime.ros.endpoints import UNKNOWN_NODE
+from composer.runtime.ros.endpoints import UNKNOWN_NODE, TopicInfo, topic_info
+
+#: The name and the namespace of a node.
+NodeName: TypeAlias = tuple[str, str]
 
 #: The nodes of commands, which are left out of listings.
 COMMAND_PREFIX = "_compose_"
@@ -20,16 +39,183 @@ SETTLE_S = 0.15
 _PARTICIPANTS_TOPIC = "ros_discovery_info"
 #: The length of the participant's prefix in the id of an endpoint (DDSI-RTPS, 9.3.1).
 _PARTICIPANT_BYTES = 12
+_KNOWN_NAMES = 50_000  # of the largest systems, several times
+_MAX_LISTED = 3
+_INVALID = "not a valid name in ROS"
+#: Queries that raise one of these concern a node that has left, or that announces odd names.
+_REFUSED = (RuntimeError, ValueError, NameValidationException)
 
 
-def participants(node: Node) -> frozenset[bytes]:
-    """Return the prefixes of all discovered participants, including that of ``node``.
+class Skipped:
+    """What was left out because it is not valid, for one warning at the end of a command."""
 
-    Publishers and subscriptions are announced separately; a participant counts with both.
-    """
-    publishers = node.get_publishers_info_by_topic(_PARTICIPANTS_TOPIC, no_mangle=True)
-    subscriptions = node.get_subscriptions_info_by_topic(_PARTICIPANTS_TOPIC, no_mangle=True)
-    return frozenset(map(participant, publishers)) & frozenset(map(participant, subscriptions))
+    def __init__(self) -> None:
+        self._found: dict[str, dict[str, None]] = {}
+
+    def add(self, reason: str, what: str) -> None:
+        """Add ``what``, which was skipped because of ``reason``."""
+        self._found.setdefault(reason, {})[what] = None
+
+    def __bool__(self) -> bool:
+        return bool(self._found)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return a warning for each reason."""
+        return tuple(f"skipped {_listed(list(found))}: {why}" for why, found in self._found.items())
+
+
+class RosGraph:
+    """Queries of the ROS graph as ``node`` has discovered it so far; ``skipped`` was left out."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.skipped = Skipped()
+
+    def names(self, kind: str) -> tuple[NameAndTypes, ...]:
+        """Return the names of all nodes, topics, services or actions, sorted, with their types.
+
+        The nodes of commands are left out. A name that two nodes share is listed twice.
+        """
+        found: list[NameAndTypes]
+        match kind:
+            case "node":
+                found = [(_full_name(namespace, name), ()) for name, namespace in self.others()]
+            case "topic":
+                found = self.topics()
+            case "service":
+                found = self.services()
+            case _:
+                found = self.actions()
+        return tuple(sorted(found))
+
+    def others(self) -> tuple[NodeName, ...]:
+        """Return name and namespace of every known node except those of commands."""
+        return tuple(
+            sorted(node for node in self.nodes() if not node[0].startswith(COMMAND_PREFIX))
+        )
+
+    def participants(self) -> frozenset[bytes]:
+        """Return the prefixes of all discovered participants, including that of the node.
+
+        Publishers and subscriptions are announced separately; a participant counts with both.
+        """
+        node, topic = self._node, _PARTICIPANTS_TOPIC
+        publishers = node.get_publishers_info_by_topic(topic, no_mangle=True)
+        subscriptions = node.get_subscriptions_info_by_topic(topic, no_mangle=True)
+        return frozenset(map(participant, publishers)) & frozenset(map(participant, subscriptions))
+
+    def are_nodes_known(self) -> bool:
+        """Say whether each participant has announced its nodes, which it does last."""
+        node = self._node
+        known = node.get_publishers_info_by_topic(_PARTICIPANTS_TOPIC, no_mangle=True)
+        publishers = [
+            endpoint
+            for topic, _ in self.topics()
+            for endpoint in node.get_publishers_info_by_topic(topic)
+        ]
+        named = [endpoint for endpoint in publishers if endpoint.node_name != UNKNOWN_NODE]
+        announced = {participant(endpoint) for endpoint in named}
+        return len(named) == len(publishers) and announced.issuperset(map(participant, known))
+
+    def nodes(self) -> list[NodeName]:
+        """Return all nodes; a name that two nodes share is listed twice."""
+        try:
+            found = self._node.get_node_names_and_namespaces()
+        except rclpy_implementation.RCLError:  # a node without a name, so rcl returns none at all
+            self.skipped.add(_INVALID, "node ''")
+            found = self._nodes_with_endpoints()
+        return [
+            (name, namespace)
+            for name, namespace in found
+            if self._is_valid(f"node '{_full_name(namespace, name)}'", _is_node, name, namespace)
+        ]
+
+    def topics(self) -> list[NameAndTypes]:
+        """Return all topics."""
+        return self._valid("topic", self._node.get_topic_names_and_types())
+
+    def services(self) -> list[NameAndTypes]:
+        """Return all services."""
+        return self._valid("service", self._node.get_service_names_and_types())
+
+    def actions(self) -> list[NameAndTypes]:
+        """Return all actions."""
+        return self._valid("action", get_action_names_and_types(self._node))
+
+    def publishers_of(self, node: NodeName) -> list[NameAndTypes]:
+        """Return the topics that a node publishes."""
+        return self._of("topic", self._node.get_publisher_names_and_types_by_node, node)
+
+    def subscriptions_of(self, node: NodeName) -> list[NameAndTypes]:
+        """Return the topics that a node subscribes to."""
+        return self._of("topic", self._node.get_subscriber_names_and_types_by_node, node)
+
+    def services_of(self, node: NodeName) -> list[NameAndTypes]:
+        """Return the services that a node provides."""
+        return self._of("service", self._node.get_service_names_and_types_by_node, node)
+
+    def clients_of(self, node: NodeName) -> list[NameAndTypes]:
+        """Return the services that a node calls."""
+        return self._of("service", self._node.get_client_names_and_types_by_node, node)
+
+    def action_servers_of(self, node: NodeName) -> list[NameAndTypes]:
+        """Return the actions that a node provides."""
+        return self._of(
+            "action",
+            lambda *at: get_action_server_names_and_types_by_node(self._node, *at),
+            node,
+        )
+
+    def action_clients_of(self, node: NodeName) -> list[NameAndTypes]:
+        """Return the actions that a node sends goals to."""
+        return self._of(
+            "action",
+            lambda *at: get_action_client_names_and_types_by_node(self._node, *at),
+            node,
+        )
+
+    def topic(self, name: str, types: tuple[str, ...]) -> TopicInfo:
+        """Return the endpoints of a topic by its full, valid name."""
+        return topic_info(self._node, name, types)
+
+    def _of(
+        self, kind: str, query: Callable[..., Iterable[tuple[str, list[str]]]], node: NodeName
+    ) -> list[NameAndTypes]:
+        try:
+            return self._valid(kind, query(*node))
+        except _REFUSED:
+            return []
+
+    def _valid(self, kind: str, found: Iterable[tuple[str, list[str]]]) -> list[NameAndTypes]:
+        return [
+            (name, tuple(types))
+            for name, types in found
+            if self._is_valid(f"{kind} '{name}'", is_valid_name, name)
+        ]
+
+    def _is_valid(self, what: str, check: Callable[..., bool], *names: str) -> bool:
+        is_valid = check(*names)
+        if not is_valid:
+            self.skipped.add(_INVALID, what)
+        return is_valid
+
+    def _nodes_with_endpoints(self) -> list[NodeName]:
+        """Return the nodes with a publisher or a subscription, as nearly all nodes have."""
+        infos = (info for name, _ in self.topics() for info in self._endpoints(name))
+        return sorted(
+            {
+                (info.node_name, info.node_namespace)
+                for info in infos
+                if UNKNOWN_NODE not in (info.node_name, info.node_namespace)
+            }
+        )
+
+    def _endpoints(self, topic: str) -> list[TopicEndpointInfo]:
+        node = self._node
+        return [
+            *node.get_publishers_info_by_topic(topic),
+            *node.get_subscriptions_info_by_topic(topic),
+        ]
 
 
 def participant(endpoint: TopicEndpointInfo) -> bytes:
@@ -37,43 +223,27 @@ def participant(endpoint: TopicEndpointInfo) -> bytes:
     return bytes(endpoint.endpoint_gid[:_PARTICIPANT_BYTES])
 
 
-def are_nodes_known(node: Node) -> bool:
-    """Say whether each participant has announced its nodes, which it does last."""
-    known = node.get_publishers_info_by_topic(_PARTICIPANTS_TOPIC, no_mangle=True)
-    publishers = [
-        endpoint
-        for topic, _ in node.get_topic_names_and_types()
-        for endpoint in node.get_publishers_info_by_topic(topic)
-    ]
-    named = [endpoint for endpoint in publishers if endpoint.node_name != UNKNOWN_NODE]
-    announced = {participant(endpoint) for endpoint in named}
-    return len(named) == len(publishers) and announced.issuperset(map(participant, known))
+@lru_cache(_KNOWN_NAMES)
+def is_valid_name(name: str) -> bool:
+    """Return whether ``name`` is a valid full name in ROS."""
+    try:
+        return validate_full_topic_name(name)
+    except (NameValidationException, ValueError):  # the latter for a null character
+        return False
 
 
-def other_nodes(node: Node) -> tuple[tuple[str, str], ...]:
-    """Return name and namespace of every known node except those of commands."""
-    return tuple(
-        sorted(
-            (name, namespace)
-            for name, namespace in node.get_node_names_and_namespaces()
-            if not name.startswith(COMMAND_PREFIX)
-        )
-    )
+@lru_cache(_KNOWN_NAMES)
+def _is_node(name: str, namespace: str) -> bool:
+    try:
+        return validate_node_name(name) and validate_namespace(namespace)
+    except (NameValidationException, ValueError):
+        return False
 
 
-def names_and_types(node: Node, kind: str) -> tuple[NameAndTypes, ...]:
-    """Return the names of all nodes, topics, services or actions, sorted, with their types.
+def _full_name(namespace: str, name: str) -> str:
+    return f"{namespace.rstrip('/')}/{name}"
 
-    A name that two nodes share is listed twice.
-    """
-    found: Iterable[tuple[str, Iterable[str]]]
-    match kind:
-        case "node":
-            found = ((f"{space.rstrip('/')}/{name}", ()) for name, space in other_nodes(node))
-        case "topic":
-            found = node.get_topic_names_and_types()
-        case "service":
-            found = node.get_service_names_and_types()
-        case _:
-            found = get_action_names_and_types(node)
-    return tuple(sorted((name, tuple(types)) for name, types in found))
+
+def _listed(found: list[str]) -> str:
+    more = len(found) - _MAX_LISTED
+    return ", ".join(found[:_MAX_LISTED]) + (f" and {more} more" if more > 0 else "")

@@ -1,0 +1,151 @@
+"""What manager nodes report about their systems, read from diagnostic_msgs/msg/DiagnosticArray.
+
+The messages may be those of another version, or of any node that publishes on the same topic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+from composer.report.display import visible
+from composer.runtime.metrics.diagnostics import finite, from_message
+from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
+
+F = TypeVar("F", CallbackFigures, ChainFigures)
+
+
+class InvalidReportError(Exception):
+    """A message is not a report of this version of the manager node."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeReport:
+    """A node as its manager reports it. ``since_s`` is in seconds since 1970."""
+
+    node: str
+    state: str
+    desired: str
+    since_s: float
+    restarts: int
+    errors: int
+    last_error: str
+    held_down: str
+    sent_hz: float
+    received_hz: float
+    busy: float
+    slowest: str
+    overruns: int
+    queue_drops: int
+    qos_events: Mapping[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class SystemReport:
+    """A system as its manager reports it. ``name`` is the namespace of the manager.
+
+    ``callbacks`` and ``chains`` are included on request, with their time ``callbacks_at_s``.
+    """
+
+    name: str
+    activity: str
+    message: str
+    host: str
+    pid: str
+    nodes: tuple[NodeReport, ...]
+    callbacks: tuple[CallbackFigures, ...] = ()
+    chains: tuple[ChainFigures, ...] = ()
+    callbacks_at_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class CallbackReport:
+    """The timings of callbacks and chains at ``at_s``, in seconds since 1970."""
+
+    callbacks: tuple[CallbackFigures, ...]
+    chains: tuple[ChainFigures, ...]
+    at_s: float
+
+
+def parse_state(name: str, message: DiagnosticArray) -> SystemReport:
+    """Return the report of the system ``name``. Raises InvalidReportError."""
+    try:
+        system, *nodes = message.status
+        values = report_values(system)
+        return SystemReport(
+            name=name,
+            activity=values["activity"],
+            message=visible(system.message),
+            host=values["host"],
+            pid=values["pid"],
+            nodes=tuple(map(_node_report, nodes)),
+        )
+    except (ValueError, KeyError) as error:
+        raise _invalid(error) from error
+
+
+def parse_callbacks(message: DiagnosticArray) -> CallbackReport:
+    """Return the timings in a message of a manager. Raises InvalidReportError."""
+    try:
+        callbacks, chains = from_message(message)
+    except (ValueError, KeyError, TypeError) as error:
+        raise _invalid(error) from error
+    stamp = message.header.stamp
+    at_s = float(stamp.sec + stamp.nanosec * 1e-9)
+    return CallbackReport(tuple(map(_visible, callbacks)), tuple(map(_visible, chains)), at_s)
+
+
+def report_values(status: DiagnosticStatus) -> Mapping[str, str]:
+    """Return the values of a status by their keys, without control characters."""
+    return {item.key: visible(item.value) for item in status.values}
+
+
+def reported_node(status: DiagnosticStatus) -> str:
+    """Return the full name of the node that a status describes."""
+    return visible(status.name).partition(": ")[2]
+
+
+def _invalid(error: Exception) -> InvalidReportError:
+    problem = "missing" if isinstance(error, KeyError) else "invalid"
+    return InvalidReportError(
+        f"not a report of this version of ros2-composer ({problem}: {error!s:.80})"
+    )
+
+
+def _node_report(status: DiagnosticStatus) -> NodeReport:
+    values = report_values(status)
+    return NodeReport(
+        node=reported_node(status),
+        state=values["state"],
+        desired=values["desired"],
+        since_s=finite(values["since"]),
+        restarts=int(values["restarts"]),
+        errors=int(values["errors"]),
+        last_error=values["last_error"],
+        held_down=values["held_down"],
+        sent_hz=finite(values["sent_hz"]),
+        received_hz=finite(values["received_hz"]),
+        busy=finite(values["busy"]),
+        slowest=values["slowest"],
+        overruns=int(values["overruns"]),
+        queue_drops=int(values["queue_drops"]),
+        qos_events=_counts(values["qos_events"]),
+    )
+
+
+def _counts(text: str) -> dict[str, int]:
+    """Parse counts by name, such as ``incompatible=1``. Raises ValueError."""
+    pairs = (item.partition("=") for item in text.split())
+    return {name: int(count) for name, _, count in pairs}
+
+
+def _visible(figures: F) -> F:
+    texts = {
+        field: visible(value)
+        for field in figures.__dataclass_fields__
+        if isinstance(value := getattr(figures, field), str)
+    }
+    return replace(figures, **texts)  # type: ignore[arg-type]  # all of them are strings

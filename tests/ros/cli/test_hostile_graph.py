@@ -1,0 +1,124 @@
+"""What other participants announce in the ROS graph is input: odd names and forged messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import deepcopy
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
+from std_srvs.srv import Trigger
+
+from composer.remote.system_reports import InvalidReportError, parse_callbacks, parse_state
+from composer.runtime.metrics.diagnostics import to_message
+from composer.runtime.metrics.figures import CallbackFigures
+from composer.runtime.ros.manager_protocol import CALLBACKS_QOS, STATE_QOS
+from tests.ros.support.commands import PATIENCE_S, error, hand_written, start
+from tests.ros.support.in_process import Peer
+
+#: With a part of their output. Discovery of the odd participant never ends, so its time is limited.
+COMMANDS = {
+    "node list --timeout 2": "/lab/talker",
+    "topic list --timeout 2": "/lab/text",
+    "lifecycle nodes --timeout 2": "",
+    "graph --live --timeout 2": "talker",
+    "ps --timeout 3": "/forged: no response",
+}
+
+
+@pytest.fixture(scope="module")
+def hostile(talker: None, shared_domain_id: int) -> Iterator[Peer]:
+    """A participant with odd names, and the forged manager node of a system."""
+    peer = Peer()
+    peer.node.create_service(Trigger, "/forged/manager/is_active", lambda _, response: response)
+    for topic, qos in (("state", STATE_QOS), ("callbacks", CALLBACKS_QOS)):
+        publisher = peer.node.create_publisher(DiagnosticArray, f"/forged/manager/{topic}", qos)
+        message = DiagnosticArray(status=[DiagnosticStatus(values=[KeyValue(key="activity")])])
+        peer.node.create_timer(0.1, lambda to=publisher, message=message: to.publish(message))
+    with hand_written("hand_written_odd_names.py"):
+        yield peer
+    peer.close()
+
+
+def test_invalid_names_and_messages_are_skipped(hostile: Peer) -> None:
+    processes = [start(*command.split()) for command in COMMANDS]
+    for (command, part), process in zip(COMMANDS.items(), processes, strict=True):
+        output, text = process.communicate(timeout=PATIENCE_S)
+        assert process.returncode == 0, (command, text)
+        assert part in output, (command, output, text)
+        assert "\x1b" not in output + text
+        warnings = text.splitlines()
+        assert sum("not a valid name in ROS" in line for line in warnings) == 1, (command, text)
+    assert "skipped a message on /forged/manager/state: not a report of this version" in text
+
+
+def test_parameter_responses_that_do_not_fit_are_errors(hostile: Peer) -> None:
+    odd = hostile.join("odd")
+
+    def list_all(_: object, response: ListParameters.Response) -> ListParameters.Response:
+        response.result.names = ["speed"]
+        return response
+
+    name = odd.get_fully_qualified_name()
+    for kind, last, callback in (
+        (ListParameters, "list_parameters", list_all),
+        (GetParameters, "get_parameters", lambda _, response: response),
+        (DescribeParameters, "describe_parameters", lambda _, response: response),
+    ):
+        service = next(item for item in odd.services if item.srv_name.endswith(last))
+        assert service.srv_type is kind
+        service.callback = callback
+    for command in ("get", "describe"):
+        text = error("param", command, name, "speed")
+        assert f"{name} responded with 0 values for 1 parameters" in text
+
+
+STATE = {
+    "state": "active", "desired": "active", "since": "1.0", "restarts": "0", "errors": "0",
+    "last_error": "", "held_down": "", "sent_hz": "1.0", "received_hz": "1.0", "busy": "0.1",
+    "slowest": "", "overruns": "0", "queue_drops": "0", "qos_events": "lost=1",
+}  # fmt: skip
+
+
+def report(**changes: str) -> DiagnosticArray:
+    system = {"activity": "running", "host": "here", "pid": "1"}
+    return DiagnosticArray(
+        status=[
+            DiagnosticStatus(values=[KeyValue(key=key, value=system[key]) for key in system]),
+            DiagnosticStatus(
+                name="lab: /lab/node",
+                values=[
+                    KeyValue(key=key, value=value) for key, value in {**STATE, **changes}.items()
+                ],
+            ),
+        ]
+    )
+
+
+def test_a_report_has_no_control_characters() -> None:
+    (node,) = parse_state("/lab", report(last_error="red\x1b[31m")).nodes
+    assert (node.node, node.state, node.qos_events) == ("/lab/node", "active", {"lost": 1})
+    assert node.last_error == "red\\x1b[31m"
+
+
+@pytest.mark.parametrize(
+    "changes", [{"since": "nan"}, {"busy": "1e999"}, {"errors": "many"}, {"qos_events": "lost"}]
+)
+def test_values_of_another_kind_are_not_a_report(changes: dict[str, str]) -> None:
+    with pytest.raises(InvalidReportError, match="not a report of this version"):
+        parse_state("/lab", report(**changes))
+
+
+def test_messages_of_another_shape_are_not_a_report() -> None:
+    with pytest.raises(InvalidReportError, match="invalid"):
+        parse_state("/lab", DiagnosticArray())
+    with pytest.raises(InvalidReportError, match="missing: 'activity'"):
+        parse_state("/lab", DiagnosticArray(status=[DiagnosticStatus()]))
+    callbacks = to_message("lab", [CallbackFigures("/lab/node", "timer", "tick", count=3)])
+    assert parse_callbacks(callbacks).callbacks[0].count == 3
+    for key, value in (("count", "3.5"), ("total_ms", "inf"), ("other", "1")):
+        changed = deepcopy(callbacks)
+        changed.status[0].values.append(KeyValue(key=key, value=value))
+        with pytest.raises(InvalidReportError):
+            parse_callbacks(changed)
