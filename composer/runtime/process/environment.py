@@ -19,6 +19,7 @@ from composer.runtime.process.shared_memory import remove_incomplete_ports
 #: See rcl's domain_id.c; above 101 the ports of a participant may meet the ephemeral ones of Linux.
 HIGHEST_DOMAIN_ID = 232
 DISCOVERY_RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
+_DISABLED = ("", "0", "false", "no", "off")
 #: Tokens: https://docs.ros.org/en/jazzy/Tutorials/Demos/Logging-and-logger-configuration.html
 CONSOLE_FORMAT = "[{severity}] [{name}] {message}"
 
@@ -96,11 +97,18 @@ def _check_discovery_range(environment: Mapping[str, str]) -> None:
 def _check_security(environment: Mapping[str, str]) -> None:
     """Refuse to run unsecured if security is enabled.
 
-    For rcl, it is if ROS_SECURITY_ENABLE is exactly ``true``; with the strategy Permissive, rcl
-    continues without security if the middleware does not have it.
+    For rcl, it is if ROS_SECURITY_ENABLE is exactly ``true``: with ``True`` or ``1``, rcl continues
+    without security. So it does with the strategy Permissive if the middleware has no security.
     """
-    if environment.get("ROS_SECURITY_ENABLE") != "true":
+    text = environment.get("ROS_SECURITY_ENABLE", "")
+    if text.lower() in _DISABLED:
         return
+    if text != "true":
+        raise StartRefused(
+            f"ROS_SECURITY_ENABLE is '{text}', but ROS enables security only for 'true':"
+            " nodes would run unsecured",
+            "set ROS_SECURITY_ENABLE=true, or unset it",
+        )
     if not environment.get("ROS_SECURITY_KEYSTORE"):
         raise StartRefused(
             "ROS_SECURITY_ENABLE is true, but ROS_SECURITY_KEYSTORE is not set",

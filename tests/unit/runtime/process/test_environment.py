@@ -24,7 +24,8 @@ SECURE = {
         {"ROS_DOMAIN_ID": "0"},
         {"ROS_DOMAIN_ID": "232", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
         {"ROS_SECURITY_ENABLE": "false"},
-        {"ROS_SECURITY_ENABLE": "TRUE"},  # rcl requires exactly 'true'
+        {"ROS_SECURITY_ENABLE": "False"},
+        {"ROS_SECURITY_ENABLE": "0"},
         SECURE,
         {"RMW_IMPLEMENTATION": "rmw_anything"},  # without a prefix, it cannot be checked
     ],
@@ -51,6 +52,14 @@ def test_a_valid_environment_is_accepted(environment: dict[str, str]) -> None:
             "valid values: SUBNET",
         ),
         ({"ROS_SECURITY_ENABLE": "true"}, "ROS_SECURITY_KEYSTORE is not set", "create_keystore"),
+        *(
+            (
+                {**SECURE, "ROS_SECURITY_ENABLE": text},
+                f"is '{text}', but",
+                "set ROS_SECURITY_ENABLE=",
+            )
+            for text in ("True", "TRUE", "1", "yes", "true ")
+        ),
         (
             {**SECURE, "ROS_SECURITY_STRATEGY": "Permissive"},
             "would run unsecured",
