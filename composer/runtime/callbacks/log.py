@@ -20,6 +20,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from composer.model import LogLevel
 from composer.runtime.executors.exceptions import describe, printable, report_of
 from composer.runtime.executors.tasks import Cancellable, SupportsCallLater
+from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import Statistics
 
 _SEVERITIES = {
@@ -158,8 +159,7 @@ class ErrorLog:
         self._statistics = statistics
         self._report = report
         self._limit = limit
-        self._quiet_until_s: dict[str, float] = {}
-        self._omitted: dict[str, int] = {}
+        self._repeats = RepeatLimit(_ERROR_PERIOD_S)
 
     def exception(self, callback: str, error: BaseException) -> None:
         """Log an exception of ``callback``."""
@@ -172,18 +172,13 @@ class ErrorLog:
     def _add(self, callback: str, line: Callable[[], str], details: Callable[[], str]) -> None:
         """Count an error, and log it unless there was one just before; details the first time."""
         self._statistics.errors += 1
-        now_s = time.monotonic()
         if self._limit is not None:
-            self._limit.count(now_s)
-        quiet_until_s = self._quiet_until_s.get(callback)
-        if quiet_until_s is not None and now_s < quiet_until_s:
-            self._omitted[callback] = self._omitted.get(callback, 0) + 1
+            self._limit.count(time.monotonic())
+        admission = self._repeats.admit(callback)
+        if admission is None:
             return
-        self._quiet_until_s[callback] = now_s + _ERROR_PERIOD_S
-        omitted = self._omitted.pop(callback, 0)
-        times = f" ({omitted} more since the last message)" if omitted else ""
-        text = details() if quiet_until_s is None else line()
-        self._log.error(f"{callback}: {text}{times}")
+        text = details() if admission.is_first else line()
+        self._log.error(f"{callback}: {text}{admission.suffix}")
         self._report(callback, text.partition("\n")[0])
 
 

@@ -21,6 +21,7 @@ from composer.runtime.callbacks.log import Log
 from composer.runtime.callbacks.mutation_check import MutationCheck
 from composer.runtime.executors.strand import Work, in_steps
 from composer.runtime.metrics.histogram import BATCH_SIZE
+from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import CallbackStatistics
 from composer.source import Located
 
@@ -40,16 +41,14 @@ class CallbackBudget:
         self._log = log
         self._callback = callback
         self._budget_s = budget_s
-        self._quiet_until_s = 0.0
+        self._repeats = RepeatLimit(WARNING_PERIOD_S)
 
     def on_overrun(self, duration_s: float) -> None:
         """Count a call that took too long, and warn unless there was a warning just before."""
         callback = self._callback
         callback.overruns += 1
-        now_s = monotonic()
-        if now_s < self._quiet_until_s:
+        if self._repeats.admit(str(callback)) is None:
             return
-        self._quiet_until_s = now_s + WARNING_PERIOD_S
         self._log.warn(
             f"{callback} took {duration_s * 1e3:.1f} ms, over its budget of "
             f"{self._budget_s * 1e3:g} ms ({callback.overruns} times so far, at most "

@@ -19,9 +19,11 @@ from rclpy.time_source import CLOCK_TOPIC
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from composer.runtime.executors.loop import Loop, Taken
+from composer.runtime.metrics.repeat_limit import RepeatLimit
 
 #: As rclpy and rclcpp subscribe: only the latest time matters.
 _QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+_WARNING_PERIOD_S = 10.0
 #: In ROS, zero means that no time was received yet.
 UNKNOWN = Time(clock_type=ClockType.ROS_TIME)
 
@@ -32,9 +34,11 @@ Follower: TypeAlias = Callable[[Time], None]
 class SimTimeSource:
     """Passes the time of /clock to its followers. It subscribes only while there are any."""
 
-    def __init__(self, node: Node, loop: Loop) -> None:
-        """Subscribe with ``node``, on ``loop``."""
+    def __init__(self, node: Node, loop: Loop, warn: Callable[[str], None]) -> None:
+        """Subscribe with ``node``, on ``loop``; call ``warn`` for times that are not valid."""
         self._node = node
+        self._warn = warn
+        self._repeats = RepeatLimit(_WARNING_PERIOD_S)
         self._loop = loop
         self._changing = threading.Lock()  # a follower that has left is not called
         self._followers: set[Follower] = set()
@@ -71,7 +75,13 @@ class SimTimeSource:
 
     def _on_clock(self, taken: Taken) -> None:
         message: ClockMessage = taken[0]
-        now = Time.from_msg(message.clock)
+        try:
+            now = Time.from_msg(message.clock)
+        except (ValueError, OverflowError) as error:
+            admission = self._repeats.admit(CLOCK_TOPIC)
+            if admission is not None:
+                self._warn(f"ignored a time of {CLOCK_TOPIC}: {error}{admission.suffix}")
+            return
         with self._changing:
             self._now = now
             for follower in self._followers:

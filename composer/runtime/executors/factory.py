@@ -9,10 +9,12 @@ from rclpy.logging import get_logger
 
 from composer.model import Executor, ExecutorKind
 from composer.runtime.executors.event_loop import EventLoop
-from composer.runtime.executors.exceptions import internal_report_of
+from composer.runtime.executors.exceptions import describe, internal_report_of
 from composer.runtime.executors.loop import ExceptionHandler, Loop
 from composer.runtime.executors.wait_set.loop import WaitSetLoop
+from composer.runtime.metrics.repeat_limit import RepeatLimit
 
+_EXCEPTIONS = RepeatLimit()
 _PRIORITY_HINT = (
     "it is allowed to root, with CAP_SYS_NICE, or up to the 'rtprio' of the user in"
     " /etc/security/limits.conf"
@@ -37,8 +39,11 @@ def make_loop(executor: Executor, on_exception: ExceptionHandler | None = None) 
 
 
 def log_exception(what: str, error: BaseException) -> None:
-    """Log an exception that left a callback."""
-    get_logger("composer").error(f"{what}: {internal_report_of(error)}")
+    """Log an exception that left a callback, at most once a second for each ``what``."""
+    admission = _EXCEPTIONS.admit(what)
+    if admission is not None:
+        text = internal_report_of(error) if admission.is_first else describe(error)
+        get_logger("composer").error(f"{what}: {text}{admission.suffix}")
 
 
 def place_threads(executor: Executor, native_thread_ids: Iterable[int]) -> tuple[str, ...]:

@@ -112,7 +112,7 @@ class ManagerNode:
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
         self._log = Log(self._node, LogLevel.INFO, host.write_log)
-        simulated_time = SimTimeSource(self._node, self._loop)
+        simulated_time = SimTimeSource(self._node, self._loop, self._log.warn)
         self.process_context = ProcessContext(simulated_time, EventCounts(self._loop))
         self._clock = NodeTime(self._node, self._loop, simulated_time)
         self._node.set_parameters([Parameter(USE_SIM_TIME_NAME, value=use_sim_time)])

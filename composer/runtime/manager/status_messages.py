@@ -9,6 +9,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from composer.runtime.metrics.figures import ChainFigures
 from composer.runtime.supervision.status import NodeStatus, SystemStatus
 
+_MAX_LENGTH = 500
+
 
 def status_message(
     status: SystemStatus, uptime_s: float, chains: Iterable[ChainFigures]
@@ -72,7 +74,12 @@ def _status(
     return DiagnosticStatus(
         level=level,
         name=name,
-        message=message,
+        message=_cut(message),
         hardware_id=system,
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+        values=[KeyValue(key=key, value=_cut(value)) for key, value in values.items()],
     )
+
+
+def _cut(text: str) -> str:
+    """Return the beginning of a text that user code or another node may have made long."""
+    return text if len(text) <= _MAX_LENGTH else f"{text[:_MAX_LENGTH]}..."

@@ -35,6 +35,7 @@ from composer.runtime.executors.exceptions import (
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Reply, unused_callback
 from composer.runtime.executors.tasks import within
+from composer.runtime.metrics.repeat_limit import RepeatLimit
 
 _NAMES = {
     Transition.TRANSITION_CONFIGURE: "configure",
@@ -48,6 +49,7 @@ _NAMES = {
 #: The label of the state that a node cannot leave.
 FINALIZED = "finalized"
 _Work: TypeAlias = Callable[[], Coroutine[Any, Any, None]]
+_LABEL_LENGTH = 80
 _SUCCESS, _FAILURE, _ERROR = "transition_success", "transition_failure", "transition_error"
 
 
@@ -104,6 +106,7 @@ class Lifecycle:
         self._lock = threading.Lock()
         self._current: Future[None] | None = None  # the transition that runs now
         self._last_state = ""
+        self._repeats = RepeatLimit()
         self._pending_reply: list[Reply] = []  # of the change_state request for it, if any
         with node.handle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, services)
@@ -222,7 +225,8 @@ class Lifecycle:
         try:
             await self._in_time(work)
         except TransitionFailed as failure:
-            self._log.warn(f"on_{transition} refused the transition: {text_of(failure)}")
+            handler = f"on_{transition}"
+            self._warn(handler, f"{handler} refused the transition: {text_of(failure)}")
             return failure
         except BaseException as error:
             if is_closing(error):
@@ -273,9 +277,17 @@ class Lifecycle:
 
     def _refuse(self, transition: str, why: str) -> TransitionOutcome:
         available = ", ".join(self.available) or "none"
-        reason = f"refused '{transition}': {why}; available transitions: {available}"
-        self._log.warn(reason)
+        name = transition[:_LABEL_LENGTH]  # the label of a request may be any text
+        name = name if name.isprintable() else ascii(name)
+        reason = f"refused '{name}': {why}; available transitions: {available}"
+        self._warn(transition if transition in _NAMES.values() else "", reason)
         return TransitionOutcome(transition, self.state, success=False, reason=reason)
+
+    def _warn(self, subject: str, text: str) -> None:
+        """Log a warning, at most once a second: another node may repeat its request."""
+        admission = self._repeats.admit(subject)
+        if admission is not None:
+            self._log.warn(f"{text}{admission.suffix}")
 
     # --- the services
 

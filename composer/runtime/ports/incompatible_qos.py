@@ -11,6 +11,7 @@ from composer.runtime.ros.endpoints import EndpointInfo, topic_info
 
 _CHECK_PERIOD_S = 0.1
 _CHECKS = 20
+_MAX_REPORTED = 100  # other nodes can be started without end
 
 
 class IncompatibleQos:
@@ -44,7 +45,7 @@ class IncompatibleQos:
             return
         self._checks_left = 0
         for text in (text for other in others for text in self._reasons(other)):
-            if text not in self._reported:
+            if text not in self._reported and len(self._reported) < _MAX_REPORTED:
                 self._reported.add(text)
                 self._context.log.warn(f"{self._port.kind} '{self._port.name}' {text}")
 

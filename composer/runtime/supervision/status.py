@@ -14,6 +14,8 @@ from composer.model import PrimaryState, System
 from composer.plan import start_goals
 from composer.runtime.metrics.statistics import Statistics
 
+_MAX_LISTED = 5
+
 
 @dataclass(frozen=True, slots=True)
 class NodeStatus:
@@ -79,7 +81,10 @@ class SystemStatus:
         """The system in one line: ``2 of 3 nodes active, /planner is down: silent for 1 s``."""
         active = sum(node.state == "active" for node in self.nodes)
         parts = [f"{active} of {len(self.nodes)} nodes active"]
-        parts += [f"{node.node} is down: {node.held_down}" for node in self.failed]
+        failed = self.failed
+        parts += [f"{node.node} is down: {node.held_down}" for node in failed[:_MAX_LISTED]]
+        if len(failed) > _MAX_LISTED:
+            parts.append(f"{len(failed) - _MAX_LISTED} more are down")
         return ", ".join(parts)
 
 

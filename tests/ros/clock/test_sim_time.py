@@ -299,6 +299,19 @@ def test_a_parameter_file_sets_it_for_all_nodes(tmp_path: Path, peer: Peer) -> N
         simulator.set_time(6.0, node="b")
 
 
+def test_times_that_are_not_valid_are_ignored_with_one_warning(tmp_path: Path, peer: Peer) -> None:
+    with running(SYSTEM.format(kind="events"), tmp_path) as system:
+        simulator = Simulator(peer, system)
+        simulator.set_time(10.0)
+        for _ in range(20):
+            simulator.set_invalid_time()
+            let_real_time_pass(system)
+        simulator.set_time(11.0)
+        assert system.node("a").now_s() == 11.0
+        (warning,) = [line for line in system.log() if "/clock" in line]
+        assert warning == "ignored a time of /clock: Seconds value must not be negative"
+
+
 WATCHED = """
 system: watched
 nodes:

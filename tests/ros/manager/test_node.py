@@ -12,9 +12,11 @@ from std_srvs.srv import Trigger
 
 from composer.model import PrimaryState
 from composer.runtime.host import Host, HostOptions
+from composer.runtime.manager.status_messages import status_message
 from composer.runtime.process import StartRefused
 from composer.runtime.ros.manager_protocol import STATE_QOS
 from composer.runtime.supervision.events import RolledBack, RollingBack, StateChanged
+from composer.runtime.supervision.status import NodeStatus, SystemStatus
 from tests.ros.support.in_process import Peer, RunningSystem, running, system_of, wait_until
 
 ROBOT = """
@@ -266,3 +268,11 @@ def test_a_second_instance_of_a_system_is_refused(tmp_path: Path, peer: Peer) ->
         assert peer.state("/fleet/planner") == "active"
     again = RunningSystem(system_of(ROBOT, tmp_path), HostOptions(run_for_s=0.1), None)
     assert again.end().exit_code == 0
+
+
+def test_the_length_of_reported_texts_is_limited() -> None:
+    node = NodeStatus("/planner", "active", last_error=10_000 * "x", held_down=10_000 * "y")
+    status = SystemStatus("robot", "running", (node,), "host", 1, 0.0)
+    for part in status_message(status, 0.0, ()).status:
+        assert len(part.message) < 600
+        assert all(len(item.value) < 600 for item in part.values)

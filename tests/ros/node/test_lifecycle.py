@@ -245,6 +245,21 @@ def test_requests_during_a_transition_are_refused(tmp_path: Path, peer: Peer) ->
     )
 
 
+def test_repeated_requests_that_are_refused_do_not_fill_the_log(tmp_path: Path, peer: Peer) -> None:
+    with running("{system: calm, nodes: {subject: {}}}", tmp_path) as system:
+        client = peer.client(ChangeState, "/subject/change_state")
+        for number in range(100):
+            label = f"\x1b[2J{number}" + 10_000 * "x"
+            request = ChangeState.Request(transition=Transition(label=label))
+            assert not finished(client.call_async(request)).success
+        assert not peer.change("/subject", "activate")
+        refused = [line for line in system.log() if line.startswith("refused")]
+        assert 2 <= len(refused) < 20
+        assert "refused 'activate': the node is active" in refused[-1]
+        assert max(map(len, refused)) < 500
+        assert all(map(str.isprintable, refused))
+
+
 def test_a_handler_that_never_ends_is_an_error(tmp_path: Path, peer: Peer) -> None:
     module = """
     from composer.behavior import Behavior

@@ -34,6 +34,10 @@ class Simulator:
             self._publisher.publish(message_of(time_s))
             wait_until(lambda time_s=time_s: self._is(node, time_s), f"{time_s} at {node}")
 
+    def set_invalid_time(self) -> None:
+        """Publish a time before 1970."""
+        self._publisher.publish(Clock(clock=Time(sec=-1)))
+
     def _is(self, node: str, time_s: float) -> bool:
         if self._system.node(node).now_s() == time_s:
             return True

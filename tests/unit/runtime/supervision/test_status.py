@@ -30,3 +30,10 @@ def test_a_system_is_active_if_all_nodes_that_start_active_are(
 ) -> None:
     status = SystemStatus("robot", "running", nodes, "host", 1, 0.0)
     assert status.is_active is is_active
+
+
+def test_the_summary_lists_only_some_failed_nodes() -> None:
+    failed = tuple(NodeStatus(f"/node_{n}", "active", held_down="silent") for n in range(100))
+    summary = SystemStatus("robot", "running", failed, "host", 1, 0.0).summary
+    assert summary.startswith("0 of 100 nodes active, /node_0 is down: silent, /node_1 is")
+    assert summary.endswith("/node_4 is down: silent, 95 more are down")
