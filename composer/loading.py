@@ -209,7 +209,7 @@ def _run_pipeline(
             is_partial=merged.is_partial,
         )
         diagnostics += run_checks(context)
-        diagnostics = deduplicate(diagnostics, (node.name for node in system.nodes))
+        diagnostics = deduplicate(diagnostics, system.nodes)
 
     # Selection: comments in the files and settings of the project silence diagnostics.
     diagnostics = add_include_labels(diagnostics, merged.included)

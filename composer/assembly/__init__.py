@@ -61,7 +61,8 @@ def assemble(tree: Mapping, source: SourceFile, folder: Path, project: Project) 
         or any(item.rule in _PARTIAL_RULES for item in diagnostics)
         or _has_unexpanded_names(merged)
     )
-    return AssembledSystem(merged, diagnostics, is_partial, resolver.folders, resolver.included)
+    included = {path: tuple(places.values()) for path, places in resolver.included.items()}
+    return AssembledSystem(merged, diagnostics, is_partial, resolver.folders, included)
 
 
 def _has_unexpanded_names(tree: Mapping) -> bool:

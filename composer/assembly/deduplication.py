@@ -8,10 +8,12 @@ from collections.abc import Mapping as Map
 from dataclasses import dataclass, replace
 
 from composer.diagnostics import Diagnostic, Label
+from composer.model import Node
 from composer.source import Located, Span
 
 _QUOTED = re.compile(r"'([^']*)'")
 _BETWEEN_NAMES = re.compile(r"[./\s]+")
+_WORD = re.compile(r"\w+")
 _MAX_PLACES = 3  # for a file that is included many times
 
 
@@ -34,19 +36,16 @@ def _includes(path: str, included: Map[str, tuple[Span, ...]]) -> Iterator[Label
     while path in included and path not in visited:
         visited.add(path)
         spans = included[path]
-        places = {str(span): span for span in spans}
-        yield from (Label(span, "included here") for span in [*places.values()][:_MAX_PLACES])
+        yield from (Label(span, "included here") for span in spans[:_MAX_PLACES])
         path = spans[0].file.path
 
 
-def deduplicate(
-    diagnostics: Iterable[Diagnostic], names: Iterable[Located[str]]
-) -> list[Diagnostic]:
+def deduplicate(diagnostics: Iterable[Diagnostic], nodes: Iterable[Node]) -> list[Diagnostic]:
     """Return the diagnostics without repetitions for copies of a node.
 
-    ``names`` are those of all nodes; copies are nodes that were made from the same entry.
+    ``nodes`` are all nodes of the system; copies are nodes that were made from the same entry.
     """
-    copies = _Copies.among(names)
+    copies = _Copies.among(nodes)
     unique: dict[tuple[str, str, str], Diagnostic] = {}
     for diagnostic in diagnostics:
         message = copies.without_names(diagnostic)
@@ -56,21 +55,22 @@ def deduplicate(
 
 @dataclass(frozen=True, slots=True)
 class _Copies:
-    """The names of copies, and the prefixes that includes added to names."""
+    """The names of copies, and the prefixes and namespaces that includes added to names."""
 
     names: frozenset[str]
     prefixes: tuple[str, ...]
 
     @classmethod
-    def among(cls, names: Iterable[Located[str]]) -> _Copies:
-        by_place: dict[str, list[Located[str]]] = {}
-        for name in names:
-            by_place.setdefault(str(name.span), []).append(name)
-        copies = [name for found in by_place.values() if len(found) > 1 for name in found]
-        prefixes = dict.fromkeys(map(_prefix, copies))
+    def among(cls, nodes: Iterable[Node]) -> _Copies:
+        by_place: dict[str, list[Node]] = {}
+        for node in nodes:
+            by_place.setdefault(str(node.name.span), []).append(node)
+        copies = [node for found in by_place.values() if len(found) > 1 for node in found]
+        prefixes = dict.fromkeys(_prefix(node.name) for node in copies)
+        namespaces = dict.fromkeys(f"{node.namespace.value.strip('/')}/" for node in copies)
         return cls(
-            frozenset(name.value for name in copies),
-            tuple(prefix for prefix in prefixes if prefix),
+            frozenset(node.name.value for node in copies),
+            (*filter(None, prefixes), *(name for name in namespaces if name != "/")),
         )
 
     def without_names(self, diagnostic: Diagnostic) -> str:
@@ -79,7 +79,8 @@ class _Copies:
             return diagnostic.message
         if "${" in _written(diagnostic.primary):
             return _QUOTED.sub("''", diagnostic.message)
-        return _QUOTED.sub(self._without_name, diagnostic.message)
+        message = _QUOTED.sub(self._without_name, diagnostic.message)
+        return _WORD.sub(lambda word: "" if word[0] in self.names else word[0], message)
 
     def _without_name(self, quoted: re.Match[str]) -> str:
         text = quoted[1]

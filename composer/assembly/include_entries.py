@@ -18,7 +18,7 @@ from composer.names import namespace_problem
 from composer.project import Project
 from composer.schema.kinds import SYSTEM, check_kind
 from composer.source import Located, SourceFile
-from composer.tree import Mapping, Scalar, Tree
+from composer.tree import Entry, Mapping, Scalar, Tree
 
 _PREFIX = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _NAMES_FOR_HINT = 1000
@@ -30,7 +30,7 @@ class Include:
 
     file: Located[str]
     placement: Placement
-    arguments: dict[str, Tree]
+    arguments: dict[str, Entry]
     overrides: Mapping | None
 
 
@@ -55,7 +55,7 @@ def read_include(tree: Tree, diagnostics: list[Diagnostic]) -> Include | None:
     return Include(
         file,
         Placement(_prefix(entry, diagnostics), _namespace(entry, diagnostics)),
-        {item.name: item.value for item in variables} if isinstance(variables, Mapping) else {},
+        {item.name: item for item in variables} if isinstance(variables, Mapping) else {},
         overrides if isinstance(overrides, Mapping) else None,
     )
 

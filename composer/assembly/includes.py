@@ -18,6 +18,7 @@ from composer.expand import expand
 from composer.expand.scope import measure
 from composer.schema import check_schema
 from composer.schema.kinds import SYSTEM
+from composer.schema.sections import with_intended_sections
 from composer.source import SourceFile, Span
 from composer.tree import Entry, Mapping, Sequence, Tree
 
@@ -35,7 +36,7 @@ class IncludeResolver:
     """Merges systems with the files that they include.
 
     ``is_partial`` is true if an included file is unavailable. ``folders`` are the folders of all
-    files and ``included`` the places that include them, by file name.
+    files and ``included`` the places that include them, each once, by file name.
     """
 
     reader: IncludeReader
@@ -43,16 +44,18 @@ class IncludeResolver:
     diagnostics: list[Diagnostic]
     is_partial: bool = False
     folders: dict[str, Path] = field(default_factory=dict)
-    included: dict[str, tuple[Span, ...]] = field(default_factory=dict)
+    included: dict[str, dict[str, Span]] = field(default_factory=dict)
     _stack: list[_Frame] = field(default_factory=list)
 
-    def merge(self, file: SystemFile, arguments: dict[str, Tree]) -> Mapping:
+    def merge(self, file: SystemFile, arguments: dict[str, Entry]) -> Mapping:
         """Return ``file`` with ``arguments`` for its variables, merged with its includes.
 
         Raises LimitExceeded.
         """
         self.folders[file.source.path] = file.path.parent
-        expanded, found = expand(file.tree, arguments)
+        tree, misspelled = with_intended_sections(file.tree, SYSTEM)
+        self.diagnostics += misspelled
+        expanded, found = expand(tree, arguments)
         if self._stack:
             self.limits.add(measure(expanded).values, self._stack[-1].span)
         self.diagnostics += found
@@ -86,8 +89,7 @@ class IncludeResolver:
         if len(self._stack) > MAX_INCLUDE_DEPTH:
             message = f"files include each other more than {MAX_INCLUDE_DEPTH} deep"
             raise LimitExceeded(message, span, "include the file directly")
-        known = self.included.get(file.source.path, ())
-        self.included[file.source.path] = (*known, span)
+        self.included.setdefault(file.source.path, {}).setdefault(str(span), span)
         tree = self.merge(file, include.arguments)
         if include.overrides is not None:
             # In a partial tree, an unknown name is not known to be an error.
@@ -137,6 +139,9 @@ def _cycle(frames: list[_Frame]) -> Diagnostic:
     cycle = " -> ".join(map(shown, [*paths, paths[0]]))
     spans = [frame.span for frame in frames]
     labels = tuple(Label(span, "through this") for span in spans[1:])
+    if len(frames) == 1:
+        message = f"'{shown(paths[0])}' includes itself"
+        return Diagnostic(INCLUDE_CYCLE, message, spans[0], hint="remove the include")
     return Diagnostic(INCLUDE_CYCLE, f"this includes itself: {cycle}", spans[0], labels)
 
 

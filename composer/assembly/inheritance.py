@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Map
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from composer.assembly.limits import IncludeLimits, LimitExceeded
@@ -16,6 +16,7 @@ from composer.expand.scope import measure
 from composer.node_types import NodeTypes
 from composer.project import Project
 from composer.schema.kinds import NODE, check_kind
+from composer.schema.sections import with_intended_sections
 from composer.source import Located, SourceFile, shown_path
 from composer.tree import Mapping, Scalar
 
@@ -61,21 +62,27 @@ def inherit(file: NodeTypeFile) -> Inherited:
 
     Variables are not expanded yet: a type may override the variables of its base.
     """
-    files = [file]
     diagnostics: list[Diagnostic] = []
+    files = [_with_intended_sections(file, diagnostics)]
     limits = IncludeLimits()
     try:
         while (name := files[-1].base) is not None:
             base = _base(name, files, limits, diagnostics)
             if base is None:
                 return Inherited(None, diagnostics, tuple(files))
-            files.append(base)
+            files.append(_with_intended_sections(base, diagnostics))
     except LimitExceeded as stopped:
         return Inherited(None, [stopped.diagnostic], tuple(files))
     tree = files[-1].tree
     for child in reversed(files[:-1]):
         tree = merge_maps(tree, _without_extends(child.tree))
     return Inherited(tree, diagnostics, tuple(files))
+
+
+def _with_intended_sections(file: NodeTypeFile, diagnostics: list[Diagnostic]) -> NodeTypeFile:
+    tree, found = with_intended_sections(file.tree, NODE)
+    diagnostics += found
+    return replace(file, tree=tree)
 
 
 def _base(
@@ -121,7 +128,8 @@ def _cycle(files: list[NodeTypeFile]) -> Diagnostic:
     cycle = " -> ".join([*names, names[0]])
     spans = [file.base.span for file in files if file.base is not None]
     labels = tuple(Label(span, "through this") for span in spans[1:])
-    message = f"node type '{names[0]}' extends itself: {cycle}"
+    through = f": {cycle}" if len(files) > 1 else ""
+    message = f"node type '{names[0]}' extends itself{through}"
     return Diagnostic(EXTENDS_CYCLE, message, spans[0], labels)
 
 

@@ -7,7 +7,7 @@ written.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from collections.abc import Mapping as Map
 
 from composer.diagnostics import Diagnostic, Label, shown
@@ -18,7 +18,7 @@ from composer.expand.references import references
 from composer.expand.scope import Scope, measure, read_scope
 from composer.expand.substitution import Substitution, TooLarge
 from composer.schema import kind_of
-from composer.tree import Entry, Mapping, Scalar, Tree
+from composer.tree import Entry, Mapping, Scalar
 
 __all__ = ["expand", "missing_variables"]
 
@@ -26,14 +26,14 @@ _SECTION = "variables"
 _MAX_CYCLE_NAMES = 8  # maximum number of names in a message
 
 
-def expand(tree: Mapping, given: Map[str, Tree]) -> tuple[Mapping, list[Diagnostic]]:
+def expand(tree: Mapping, given: Map[str, Entry]) -> tuple[Mapping, list[Diagnostic]]:
     """Return ``tree`` with variables and copies expanded, and the diagnostics.
 
-    ``given`` are the arguments of a node type or an included system; they override the file's own
-    values. A value in place of a whole ``${name}`` keeps the location where it was written, so that
-    a diagnostic points at the argument; a text with inserted values keeps its own location. The
-    section ``variables`` stays as it is. The time is linear in the size of the result, which is
-    limited.
+    ``given`` are the arguments of a node type or an included system, by name; they override the
+    file's own values. A value in place of a whole ``${name}`` keeps the location where it was
+    written, so that a diagnostic points at the argument; a text with inserted values keeps its own
+    location. The section ``variables`` stays as it is. The time is linear in the size of the
+    result, which is limited.
     """
     scope = read_scope(tree, is_node_type=kind_of(tree) == "node")
     substitution = Substitution(scope)
@@ -46,7 +46,7 @@ def expand(tree: Mapping, given: Map[str, Tree]) -> tuple[Mapping, list[Diagnost
     return expanded, [*diagnostics, *substitution.diagnostics, *_unused(scope)]
 
 
-def missing_variables(tree: Mapping, given: Map[str, Tree]) -> tuple[str, ...]:
+def missing_variables(tree: Mapping, given: Collection[str]) -> tuple[str, ...]:
     """Return the variables of a node type that have no default and are not ``given``.
 
     A variable that was given under a misspelled name is left out: ``expand`` reports it.
@@ -62,10 +62,10 @@ def missing_variables(tree: Mapping, given: Map[str, Tree]) -> tuple[str, ...]:
     )
 
 
-def _evaluate(substitution: Substitution, given: Map[str, Tree]) -> list[Diagnostic]:
+def _evaluate(substitution: Substitution, given: Map[str, Entry]) -> list[Diagnostic]:
     """Evaluate every variable after those it uses. Return diagnostics for cycles."""
     scope = substitution.scope
-    scope.values.update((name, measure(value)) for name, value in given.items())
+    scope.values.update((name, measure(entry.value)) for name, entry in given.items())
     own = {
         name: variable.value
         for name, variable in scope.declared.items()
@@ -94,23 +94,25 @@ def _expand_sections(substitution: Substitution, tree: Mapping) -> Mapping:
     return Mapping(tuple(expanded_entry(entry) for entry in tree), tree.span)
 
 
-def _unknown_arguments(tree: Mapping, scope: Scope, given: Map[str, Tree]) -> Iterator[Diagnostic]:
+def _unknown_arguments(tree: Mapping, scope: Scope, given: Map[str, Entry]) -> Iterator[Diagnostic]:
     if not scope.is_known:
         return
     name = tree.get(kind_of(tree) or "")
-    for argument, value in given.items():
+    for argument, entry in given.items():
         if argument not in scope.declared:
             owner = f"'{shown(name.value)}'" if isinstance(name, Scalar) else "this file"
             message = f"{owner} has no variable '{shown(argument)}'"
             hint = scope.hint(argument) or "remove it"
-            yield Diagnostic(rules.UNKNOWN_VARIABLE, message, value.span, hint=hint)
+            yield Diagnostic(rules.UNKNOWN_VARIABLE, message, entry.key.span, hint=hint)
 
 
 def _cycle(names: list[str], scope: Scope) -> Diagnostic:
     first, *others = names[:_MAX_CYCLE_NAMES]
     rest = ["..."] if len(names) > _MAX_CYCLE_NAMES else []
     written = " -> ".join([*map(shown, (first, *others)), *rest, shown(first)])
-    message = f"variable '{shown(first)}' is defined by itself: {written}"
+    message = f"variable '{shown(first)}' is defined by itself"
+    if others:
+        message += f": {written}"
     labels = tuple(Label(scope.declared[name].key.span, "through this") for name in others)
     span = scope.declared[first].key.span
     return Diagnostic(rules.CYCLIC_VARIABLES, message, span, labels)

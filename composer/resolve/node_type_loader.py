@@ -17,7 +17,7 @@ from composer.resolve.tree_values import entries
 from composer.schema import check_schema
 from composer.schema.kinds import NODE, check_kind
 from composer.source import Located, Span, shown_path
-from composer.tree import Mapping, Plain, Tree, plain
+from composer.tree import Entry, Mapping, Plain, Tree, plain
 
 RULE = register(
     Rule(
@@ -89,7 +89,7 @@ class NodeTypeLoader:
         written = self._document(path)
         if written is None or written.tree is None:
             return None
-        given = {entry.name: entry.value for entry in entries(variables)}
+        given = {entry.name: entry for entry in entries(variables)}
         if variables is None or isinstance(variables, Mapping):
             self.diagnostics.extend(_missing(written.tree, given, span))
         if given:
@@ -100,7 +100,7 @@ class NodeTypeLoader:
         return self._without_variables[path]
 
     def _instantiate(
-        self, path: Path, written: Inherited, tree: Mapping, given: dict[str, Tree]
+        self, path: Path, written: Inherited, tree: Mapping, given: dict[str, Entry]
     ) -> InstantiatedNodeType:
         expanded, found = expand(tree, given)
         found = [*found, *self._schema_diagnostics(path, expanded, given)]
@@ -111,10 +111,10 @@ class NodeTypeLoader:
         return InstantiatedNodeType(expanded, folders, declaration, not has_errors(found), files)
 
     def _schema_diagnostics(
-        self, path: Path, expanded: Mapping, given: dict[str, Tree]
+        self, path: Path, expanded: Mapping, given: dict[str, Entry]
     ) -> list[Diagnostic]:
         """Check a type against the schema, unless it passed with the same values before."""
-        values: dict[str, Plain] = {name: plain(value) for name, value in given.items()}
+        values: dict[str, Plain] = {name: plain(entry.value) for name, entry in given.items()}
         shape = (path, repr(values))
         if shape in self._shapes:
             return []
@@ -142,7 +142,7 @@ class NodeTypeLoader:
         return inherited
 
 
-def _missing(tree: Mapping, given: dict[str, Tree], span: Span) -> Iterator[Diagnostic]:
+def _missing(tree: Mapping, given: dict[str, Entry], span: Span) -> Iterator[Diagnostic]:
     declared = {entry.name: entry for entry in entries(tree.get("variables"))}
     owner = tree.get("node")
     name = shown(str(plain(owner))) if owner is not None else ""

@@ -51,7 +51,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 Label(dependency.node.span, f"'{name}' depends on '{other}'")
                 for dependency, name, other in steps[1:]
             ),
-            "remove one of the dependencies",
+            "remove the dependency" if len(cycle) == 1 else "remove one of the dependencies",
         )
 
 

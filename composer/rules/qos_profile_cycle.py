@@ -66,6 +66,5 @@ def _diagnostic(cycle: list[NamedQos]) -> Diagnostic:
         Label(place.span, f"'{name}' extends '{place}'")
         for place, name in zip(places[1:], names[1:], strict=True)
     )
-    return Diagnostic(
-        RULE, message, places[0].span, tuple(labels), "extend a preset in one of them"
-    )
+    hint = "extend a preset" if len(cycle) == 1 else "extend a preset in one of them"
+    return Diagnostic(RULE, message, places[0].span, tuple(labels), hint)

@@ -216,8 +216,13 @@ def _out_of_range(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnosti
 
 def _nothing_there(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     name = error.path[-1] if error.path else "this"
-    message = f"'{shown(name)}' is empty"
-    yield Diagnostic(rules.NOTHING_THERE, message, error.owner_span, hint="add at least one")
+    least, found = error.required, len(error.instance)
+    message, hint = f"'{shown(name)}' is empty", "add at least one"
+    if least > 1:
+        entries = "is empty" if not found else f"has only {found}"
+        message = f"'{shown(name)}' needs at least {least} entries, and {entries}"
+        hint = f"add {least - found} or more"
+    yield Diagnostic(rules.NOTHING_THERE, message, error.owner_span, hint=hint)
 
 
 def _any_of(names: Iterable[str]) -> str:

@@ -124,8 +124,8 @@ NOTHING_THERE = register(
     _error(
         code="RC107",
         name="nothing-there",
-        summary="A map or list is empty where at least one entry is required.",
-        why="A system without nodes and a connection without ports do nothing.",
+        summary="A map or list is empty, or has fewer entries than required.",
+        why="A system without nodes, a connection without ports and a chain of one do nothing.",
         bad="""\
 system: demo
 nodes: {}

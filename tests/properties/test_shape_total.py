@@ -66,7 +66,7 @@ def size(tree: Tree) -> int:
 @example(tree_of({"node": "a", "timers": {"t": {"rate_hz": 1, "period_ms": 1}}}), {})
 @example(tree_of({"system": "a", "nodes": {"a": {"typ": {}}}, "connections": [{"topc": 1}]}), {})
 def test_any_tree(tree: Mapping, arguments: dict[str, Plain]) -> None:
-    trees = {entry.name: entry.value for entry in tree_of(arguments)} if arguments else {}
+    trees = {entry.name: entry for entry in tree_of(arguments)} if arguments else {}
     missing_variables(tree, trees)
     expanded, diagnostics = expand(tree, trees)
     assert size(expanded) <= 2 * MAX_VALUES

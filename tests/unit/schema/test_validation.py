@@ -57,6 +57,11 @@ def profile(text: str) -> str:
         # the file
         ("system: demo", "missing-key", "system", "a system needs 'nodes' or 'in", "nodes: {"),
         ("system: demo\nnodes: {}", "nothing-there", "nodes", "'nodes' is empty", "at least one"),
+        (
+            "system: demo\nnodes: {a: {}}\nchains: {c: {through: [a.p], latency_ms: 5}}",
+            "nothing-there", "through", "'through' needs at least 2 entries, and has only 1",
+            "add 1",
+        ),
         ("system: demo\ninclude: []", "nothing-there", "include", "'include' is empty", "at least"),
         (
             "system: 5\nnodes: {robot: {}}",
