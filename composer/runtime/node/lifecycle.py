@@ -225,8 +225,8 @@ class Lifecycle:
         try:
             await self._in_time(work)
         except TransitionFailed as failure:
-            handler = f"on_{transition}"
-            self._warn(handler, f"{handler} refused the transition: {text_of(failure)}")
+            text = f"on_{transition} refused the transition: {text_of(failure)}"
+            self._warn(text, text)
             return failure
         except BaseException as error:
             if is_closing(error):
