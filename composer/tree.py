@@ -57,7 +57,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Mapping:
-    """A map with unique text keys, in the order of the file."""
+    """A map with text keys, in the order of the file. They are unique but in parameter files."""
 
     entries: tuple[Entry, ...]
     span: Span = field(compare=False)

@@ -151,6 +151,9 @@ def _is_number(value: Plain) -> bool:
 def _range_problem(parameter: Parameter, value: float) -> RangeProblem | None:
     low, high, step = parameter.minimum, parameter.maximum, parameter.step
     unit = f" {parameter.unit}" if parameter.unit else ""
+    limit = low or high
+    if math.isnan(value) and limit is not None:
+        return RangeProblem("the value is not a number, but there are limits", limit)
     if low is not None and value < low.value:
         return RangeProblem(f"{value}{unit} is less than the minimum of {low}{unit}", low)
     if high is not None and value > high.value:

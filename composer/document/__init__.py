@@ -18,6 +18,7 @@ from composer.document.characters import check_text
 from composer.document.events import first_excess_value, parse_events
 from composer.document.files import decode, read_bytes, too_large
 from composer.document.limits import MAX_BYTES
+from composer.document.parameter_files import ParameterFileBuilder
 from composer.document.rules import KEY_WITHOUT_VALUE, NOT_A_MAP
 from composer.source import SourceFile, Span
 from composer.tree import Mapping, Scalar, Tree, describe
@@ -26,7 +27,7 @@ from composer.tree import Mapping, Scalar, Tree, describe
 _MAX_CACHED_BYTES = 32_768
 _FIRST_KEY_HINT = "begin with 'system: <name>' or 'node: <name>'"
 
-__all__ = ["parse_bytes", "parse_document", "read_document"]
+__all__ = ["parse_bytes", "parse_document", "read_document", "read_parameter_document"]
 
 
 def read_document(
@@ -66,26 +67,54 @@ _parse_cached = lru_cache(maxsize=64)(_parse)
 
 def parse_document(source: SourceFile) -> tuple[Mapping | None, list[Diagnostic]]:
     """Return the tree of a text and the diagnostics of its YAML."""
-    if len(source.text) > MAX_BYTES:
-        return None, [too_large(source)]
-    diagnostics = check_text(source)
+    builder = TreeBuilder(source)
+    diagnostics = _build(builder, source)
+    if diagnostics is not None:
+        return None, diagnostics
+    return _root(builder.root, builder.diagnostics, source, _FIRST_KEY_HINT)
+
+
+def read_parameter_document(path: Path, shown: str) -> tuple[Mapping | None, list[Diagnostic]]:
+    """Read the ROS parameter file at ``path``, with the values that rcl reads from it.
+
+    A key may occur more than once in a map. A file without content is an empty map.
+    """
+    data, diagnostics = read_bytes(path, SourceFile(shown))
     if diagnostics:
         return None, diagnostics
-    builder = TreeBuilder(source)
+    source, diagnostics = decode(data, shown)
+    if diagnostics:
+        return None, diagnostics
+    builder = ParameterFileBuilder(source)
+    stopped = _build(builder, source)
+    if stopped is not None:
+        return None, stopped
+    if builder.root is None:
+        return Mapping((), Span(source, 1, 1)), builder.diagnostics
+    return _root(builder.root, builder.diagnostics, source, "begin with the name of a node")
+
+
+def _build(builder: TreeBuilder, source: SourceFile) -> list[Diagnostic] | None:
+    """Let ``builder`` handle the events of a text; return the diagnostics if it has no tree."""
+    if len(source.text) > MAX_BYTES:
+        return [too_large(source)]
+    diagnostics = check_text(source)
+    if diagnostics:
+        return diagnostics
     try:
         surplus = first_excess_value(source.text)
         if surplus is not None:
-            return None, [too_many_values(source, surplus)]
+            return [too_many_values(source, surplus)]
         with closing(parse_events(source.text)) as stream:
             for event in stream:
                 builder.handle(event)
     except Stopped as stopped:
-        return None, [*builder.diagnostics, stopped.diagnostic]
+        return [*builder.diagnostics, stopped.diagnostic]
     except (yaml.YAMLError, ValueError) as error:
         from composer.document.syntax_errors import explain  # noqa: PLC0415 - only for invalid files
 
-        return None, _with_syntax(builder.diagnostics, explain(error, source, builder.open_bracket))
-    return _root(builder.root, builder.diagnostics, source)
+        return _with_syntax(builder.diagnostics, explain(error, source, builder.open_bracket))
+    return None
 
 
 def _with_syntax(diagnostics: list[Diagnostic], syntax: Diagnostic) -> list[Diagnostic]:
@@ -98,14 +127,14 @@ def _with_syntax(diagnostics: list[Diagnostic], syntax: Diagnostic) -> list[Diag
 
 
 def _root(
-    tree: Tree | None, diagnostics: list[Diagnostic], source: SourceFile
+    tree: Tree | None, diagnostics: list[Diagnostic], source: SourceFile, first_key_hint: str
 ) -> tuple[Mapping | None, list[Diagnostic]]:
     if isinstance(tree, Mapping):
         return tree, diagnostics
     if tree is None or (isinstance(tree, Scalar) and tree.value is None):
-        message, span, hint = "this file is empty", Span(source, 1, 1), _FIRST_KEY_HINT
+        message, span, hint = "this file is empty", Span(source, 1, 1), first_key_hint
     else:
         message, span, hint = f"expected keys and values, found {describe(tree)}", tree.span, None
         if isinstance(tree, Scalar) and ":" in str(tree.value):
             hint = "put a space after the colon"
-    return None, [*diagnostics, Diagnostic(NOT_A_MAP, message, span, hint=hint or _FIRST_KEY_HINT)]
+    return None, [*diagnostics, Diagnostic(NOT_A_MAP, message, span, hint=hint or first_key_hint)]

@@ -89,10 +89,13 @@ class TreeBuilder:
             case yaml.AliasEvent():
                 self._on_alias(event)
             case yaml.DocumentStartEvent() if self.root is not None:
-                span = span_at(self._source, event.start_mark, 3)
-                message = "a second document starts here"
-                hint = "put each system or node type into its own file"
-                raise Stopped(Diagnostic(rules.SEVERAL_DOCUMENTS, message, span, hint=hint))
+                self._on_second_document(event)
+
+    def _on_second_document(self, event: yaml.DocumentStartEvent) -> None:
+        span = span_at(self._source, event.start_mark, 3)
+        message = "a second document starts here"
+        hint = "put each system or node type into its own file"
+        raise Stopped(Diagnostic(rules.SEVERAL_DOCUMENTS, message, span, hint=hint))
 
     def _on_scalar(self, event: yaml.ScalarEvent) -> None:
         self._count(1, event.start_mark)
@@ -153,7 +156,7 @@ class TreeBuilder:
     def _add(self, tree: Tree, values: int, height: int) -> None:
         """Add a complete value to its parent."""
         if not self._open:
-            self.root = tree
+            self._finish(tree)
             return
         parent = self._open[-1]
         parent.values += values
@@ -174,6 +177,9 @@ class TreeBuilder:
             )
             parent.awaits_value, parent.key = True, None
 
+    def _finish(self, tree: Tree) -> None:
+        self.root = tree
+
     def _scalar(self, event: yaml.ScalarEvent) -> Scalar:
         if event.tag is not None:
             self._report_tag(event.tag, event.start_mark)
@@ -187,9 +193,12 @@ class TreeBuilder:
             self.diagnostics += diagnostics
         return Scalar(value, span, verbatim, offset)
 
+    def _resolve(self, text: str) -> ScalarValue:
+        return resolve_plain(text)
+
     def _plain(self, text: str, span: Span) -> ScalarValue:
         try:
-            return resolve_plain(text)
+            return self._resolve(text)
         except NumberRefused as refusal:
             hint = "leave the key out for no limit; quote the value if it is a string"
             self._report(rules.BAD_NUMBER, f"'{shown(text)}' {refusal}", span, hint)

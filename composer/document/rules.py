@@ -246,8 +246,11 @@ BAD_ALIAS = register(
     _error(
         code="RC015",
         name="bad-alias",
-        summary="An alias (*name) has no anchor, or is part of its own anchor.",
-        why="An alias repeats the value that an anchor (&name) before it marks.",
+        summary="An alias (*name) has no anchor, is part of its own, or is in a parameter file.",
+        why=(
+            "An alias repeats the value that an anchor (&name) before it marks. ROS refuses "
+            "parameter files with aliases."
+        ),
         bad="""\
 system: demo
 nodes:

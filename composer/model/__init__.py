@@ -49,6 +49,7 @@ from composer.model.system import (
     Remapping,
     System,
     UnknownKey,
+    UnmatchedParameters,
     channels,
 )
 
@@ -95,6 +96,7 @@ __all__ = [
     "Timer",
     "TimerClock",
     "UnknownKey",
+    "UnmatchedParameters",
     "Watch",
     "channels",
 ]

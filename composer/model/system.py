@@ -96,6 +96,21 @@ class UnknownKey:
 
 
 @dataclass(frozen=True, slots=True)
+class UnmatchedParameters:
+    """Values of a parameter file that no node gets.
+
+    Without a ``parameter``, they are for a node that is not there; ``renamed`` is the node that
+    they are for if an include gave it a prefix. With a ``parameter``, ``section`` has wildcards,
+    and no matching node has that parameter.
+    """
+
+    section: Located[str]
+    parameter: Located[str] | None
+    known: tuple[str, ...]  # full names of nodes, or parameters
+    renamed: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Node:
     """One node of a system, merged from its type (where it has one) and its own entry."""
 
@@ -276,7 +291,7 @@ class System:
     delivery: Delivery = Delivery.AUTO
     use_sim_time: bool = False  # for the manager node, and the default for nodes
     node_type: bool = False
-    unmatched_parameters: tuple[Located[str], ...] = ()  # unknown nodes in parameter files
+    unmatched_parameters: tuple[UnmatchedParameters, ...] = ()
     unknown: tuple[UnknownKey, ...] = ()  # unknown names from the command line
     _nodes: dict[str, Node] = field(init=False, repr=False, compare=False)
 

@@ -92,7 +92,7 @@ def resolve_system(
         use_sim_time=any(flag(entry.value, default=False) for entry in clock),
         implied_dependencies=flag(lifecycle.get("implied_dependencies"), default=True),
         unknown=_unknown_nodes(nodes, overrides),
-        unmatched_parameters=files.unmatched(frozenset(node.full_name for node in nodes)),
+        unmatched_parameters=files.unmatched(nodes),
     )
     return system, diagnostics
 

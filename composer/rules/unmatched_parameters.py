@@ -1,21 +1,23 @@
-"""Parameters for a node that does not exist."""
+"""Values of parameter files that no node gets."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, Rule, Severity, register, shown, suggestion
+from composer.model import UnmatchedParameters
 
 RULE = register(
     Rule(
         code="RC246",
         name="unmatched-parameters",
         severity=Severity.WARNING,
-        summary="A parameter file sets values for a node that the system does not have.",
+        summary="A parameter file sets values for a node or parameter that does not exist.",
         why=(
-            "Parameter files use the full ROS names of nodes, including the namespace. Values "
-            "under any other name are ignored, and the node keeps its defaults."
+            "Parameter files use the full ROS names of nodes, with the namespace and the prefixes "
+            "of includes. Values under any other name are ignored, and the node keeps its "
+            "defaults."
         ),
         bad="""\
 # file: system.yaml
@@ -40,12 +42,38 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Check the node names in parameter files."""
-    names = [node.full_name for node in context.system.nodes]
-    for name in context.system.unmatched_parameters if not context.is_partial else ():
-        yield Diagnostic(
-            RULE,
-            f"no node of this system is named '{name}'",
-            name.span,
-            hint=suggestion(name.value, names),
-        )
+    """Check the names of nodes, and the parameters below names with wildcards."""
+    for unmatched in context.system.unmatched_parameters if not context.is_partial else ():
+        if unmatched.parameter is None:
+            yield Diagnostic(
+                RULE, _message(unmatched), unmatched.section.span, hint=_hint(unmatched)
+            )
+        else:
+            name = unmatched.parameter.value
+            yield Diagnostic(
+                RULE,
+                f"no node that '{unmatched.section}' matches has a parameter '{shown(name)}'",
+                unmatched.parameter.span,
+                hint=suggestion(name, unmatched.known),
+            )
+
+
+def _message(unmatched: UnmatchedParameters) -> str:
+    name = shown(unmatched.section.value)
+    if unmatched.renamed is not None:
+        return f"'{name}' does not match '{unmatched.renamed}', named with the prefix of an include"
+    if "*" in name:
+        return f"no node of this system matches '{name}'"
+    return f"no node of this system is named '{name}'"
+
+
+def _hint(unmatched: UnmatchedParameters) -> str | None:
+    name = unmatched.section.value
+    if unmatched.renamed is not None:
+        own_name = unmatched.renamed.rpartition("/")[2]
+        return f"write '{name.rpartition('/')[0]}/{own_name}'"
+    if "*" in name:
+        nodes = suggestion(name, unmatched.known, limit=3)
+        meaning = "'*' stands for one part of a name, '**' for any number"
+        return f"{meaning}; {nodes}" if nodes is not None else meaning
+    return suggestion(name, unmatched.known)

@@ -200,6 +200,7 @@ def _yaml(text: str) -> Any:
 
 
 def _read(file: Path) -> ParameterFiles:
+    from composer.diagnostics import has_errors
     from composer.report.text import render
     from composer.resolve.parameter_files import ParameterFiles, read_parameter_file
 
@@ -207,6 +208,7 @@ def _read(file: Path) -> ParameterFiles:
     diagnostics = read_parameter_file(file, sections)
     if diagnostics:
         say(render(diagnostics, color=use_color(sys.stderr)))
+    if has_errors(diagnostics):
         raise CommandError(f"'{file}' is not a ROS parameter file")
     return sections
 

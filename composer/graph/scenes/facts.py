@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from composer.graph.diagram import Details
@@ -44,7 +45,7 @@ def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
             for timer in node.timers
         ],
         "parameters": {
-            parameter.name.value: None if parameter.value is None else parameter.value.value
+            parameter.name.value: None if parameter.value is None else _json(parameter.value.value)
             for parameter in node.parameters
         },
     }
@@ -87,3 +88,14 @@ def _end(endpoint: SceneEndpoint) -> str:
 
 def _non_empty(facts: dict[str, Plain]) -> Details:
     return tuple((name, value) for name, value in facts.items() if value not in (None, [], {}))
+
+
+def _json(value: Plain) -> Plain:
+    """Return ``value`` with YAML text for numbers that JSON does not have: ``.nan``, ``.inf``."""
+    match value:
+        case float() if not math.isfinite(value):
+            return str(value).replace("nan", ".nan").replace("inf", ".inf")
+        case list():
+            return [_json(item) for item in value]
+        case _:
+            return value

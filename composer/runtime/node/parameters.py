@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -222,8 +223,8 @@ def _out_of_bounds(parameter: Parameter, value: Any) -> str | None:
     for item in value if isinstance(value, list) else [value]:
         if isinstance(item, bool) or not isinstance(item, (int, float)):
             continue
-        if item != item:  # noqa: PLR0124 - only NaN differs from itself
-            return f"parameter '{name}' must be a number"
+        if math.isnan(item) and not (low is None and high is None):
+            return f"parameter '{name}' has limits and must be a number"
         if low is not None and item < low.value:
             return f"parameter '{name}' must be at least {low.value}, not {item}"
         if high is not None and item > high.value:

@@ -157,7 +157,7 @@ def test_a_dump_can_be_loaded(tmp_path: Path) -> None:
 def test_parameter_files_can_nest_names_and_use_wildcards(tmp_path: Path) -> None:
     file = tmp_path / "robot.yaml"
     file.write_text(
-        "/**: {ros__parameters: {speed: 1, for_others: 5}}\n"
+        "/**: {ros__parameters: {speed: 2, speed: 1, for_others: off}}\n"
         "lab: {talker: {ros__parameters: {limits: {reach: 2}}}}\n"
     )
     assert output_of("param", "load", "talker", str(file)) == (

@@ -83,6 +83,7 @@ nodes:
       mode: {type: string, default: slow, choices: [slow, fast]}
       serial: {type: string, default: abc, read_only: true}
       gains: {type: double_array, default: [1, 2.5], maximum: 10.0}
+      offsets: {type: double_array, default: [0.0]}
       mask: {type: byte_array, default: [1, 255]}
     subscriptions:
       ask: {type: std_msgs/msg/Int64, external: true, log: "{parameters.speed} {parameters.mode}"}
@@ -135,6 +136,7 @@ def test_parameters_are_declared_with_their_descriptors(tmp_path: Path, peer: Pe
         ("mode", "other", "parameter 'mode' must be one of: slow, fast; not other"),
         ("serial", "xyz", "read-only"),
         ("gains", [1.0, 11.0], "parameter 'gains' must be at most 10.0, not 11.0"),
+        ("gains", [float("nan")], "parameter 'gains' has limits and must be a number"),
         ("unknown", 1, "undeclared parameter"),
     ],
 )
@@ -150,6 +152,7 @@ def test_a_change_reaches_the_behavior_and_the_expressions(tmp_path: Path, peer:
     with running(PARAMETERS, tmp_path, tuned=TUNED) as system:
         assert peer.set_parameter("/tuned", "speed", 2) == ""  # an integer is accepted for a double
         assert peer.set_parameter("/tuned", "mode", "fast") == ""
+        assert peer.set_parameter("/tuned", "offsets", [float("nan"), float("inf")]) == ""
         assert peer.set_parameter("/tuned", "speed", 2.5) == ""
         peer.publisher(Int64, "/ask").publish(Int64())
         system.wait_for_log("2.5 fast")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.graph import View, build_graph, live_scene_of, scene_of
 from composer.graph.diagram import Graph
+from composer.loading import load
 from composer.model import PortKind
 from composer.qos import QosProfile, Reliability
 from tests.unit.support.resolving import system_of
@@ -120,3 +123,16 @@ def test_states_of_a_running_graph() -> None:
     lines = {vertex.key: vertex.lines for vertex in graph.vertices}
     assert lines["state:active"] == ("active", "/a/one")
     assert lines["state:state unknown"] == ("state unknown", "/a/two")
+
+
+def test_parameters_that_are_not_finite_are_yaml_text(tmp_path: Path) -> None:
+    parameters = "{a: {type: double, default: 1.0}, b: {type: double_array, default: [1.0]}}"
+    text = f"system: s\nparameter_files: [p.yaml]\nnodes: {{n: {{parameters: {parameters}}}}}"
+    (tmp_path / "s.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "p.yaml").write_text(
+        "n: {ros__parameters: {a: -.inf, b: [.nan, .inf, 2.0]}}", encoding="utf-8"
+    )
+    system = load(tmp_path / "s.yaml").system
+    assert system is not None
+    (vertex,) = build_graph(scene_of([system]), View.NODES).vertices
+    assert dict(vertex.details)["parameters"] == {"a": "-.inf", "b": [".nan", ".inf", 2.0]}

@@ -1,0 +1,40 @@
+"""ROS parameter files: parameter values by the full names of nodes.
+
+The format is that of ``rcl_yaml_param_parser``: a map of node names, each with ``ros__parameters``.
+``*`` is one part of a name, ``**`` any number of parts. Namespaces and parameters with dots in
+their names may be nested maps.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from composer.diagnostics import Diagnostic, shown
+from composer.project import Project
+from composer.resolve.parameter_files.reader import read_parameter_file
+from composer.resolve.parameter_files.rules import PARAMETER_FILE
+from composer.resolve.parameter_files.sections import ParameterFiles
+from composer.resolve.tree_values import is_opaque, texts
+from composer.tree import Tree
+
+__all__ = ["ParameterFiles", "read_parameter_file", "read_parameter_files"]
+
+
+def read_parameter_files(
+    tree: Tree | None, folder: Path, project: Project, diagnostics: list[Diagnostic]
+) -> ParameterFiles:
+    """Read the files that ``parameter_files`` names, relative to the system's folder."""
+    files = ParameterFiles()
+    for name in texts(tree):
+        if is_opaque(name.value):
+            continue
+        path = folder / name.value
+        if not project.holds(path):
+            message = f"parameter file '{shown(name.value)}' is outside the project"
+            diagnostics.append(Diagnostic(PARAMETER_FILE, message, name.span))
+        elif not path.exists():
+            message = f"there is no parameter file '{shown(name.value)}'"
+            diagnostics.append(Diagnostic(PARAMETER_FILE, message, name.span))
+        else:
+            diagnostics.extend(read_parameter_file(path, files, name.span.file))
+    return files
