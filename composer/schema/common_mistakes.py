@@ -83,3 +83,11 @@ def advice(name: str, owner: str, valid: Iterable[str]) -> str | None:
         return _ADVICE[owner, name]
     key = intended_key(name, keys)
     return f"did you mean '{key}'?" if key is not None else suggestion(name, keys, limit=12)
+
+
+def value_advice(key: str | int | None, value: object) -> str | None:
+    """Return the hint for a ``value`` of the wrong type that another key is for, or None."""
+    items = value if isinstance(value, list) else [value]
+    if key == "parameters" and any(isinstance(item, str) for item in items):
+        return "list parameter files under 'parameter_files' of the system"
+    return None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Label, nearest, shown
 from composer.schema import rules
-from composer.schema.common_mistakes import advice, intended_key
+from composer.schema.common_mistakes import advice, intended_key, value_advice
 from composer.schema.expectations import expected, type_hint
 from composer.schema.locations import TreeIndex, TreeValue
 from composer.source import Span
@@ -193,7 +193,8 @@ def _wrong_type(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]
     required = expected(error.schema)
     found = describe(error.place.tree)
     message = f"expected {required}{error.subject}, found {found}"
-    hint = type_hint(error.schema, error.instance)
+    key = error.path[-1] if error.path else None
+    hint = value_advice(key, error.instance) or type_hint(error.schema, error.instance)
     yield Diagnostic(rules.WRONG_TYPE, message, error.place.value_span, hint=hint)
 
 

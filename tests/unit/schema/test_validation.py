@@ -81,6 +81,14 @@ def profile(text: str) -> str:
             "wrong-type", "1", "expected a map for 'a', found the number 1", "",
         ),
         # nodes
+        (
+            node("{parameters: [robot.yaml]}"),
+            "wrong-type", "[", "expected a map for 'parameters'", "'parameter_files'",
+        ),
+        (
+            node("{type: relay, parameters: robot.yaml}"),
+            "wrong-type", "robot.yaml", "expected a map for 'parameters'", "'parameter_files'",
+        ),
         (node(""), "wrong-type", "robot", "expected a map for 'robot', found nothing", "'{}'"),
         (
             node("{typ: relay, variables: {a: 1}, publishers: {a: {}}}"),
