@@ -117,7 +117,7 @@ class ParameterValues:
         raise AttributeError(f"no parameter '{name}'; available: {known}")
 
     def __setattr__(self, name: str, _: object) -> None:
-        raise AttributeError(f"parameter '{name}' cannot be assigned: set it with 'compose param'")
+        raise AttributeError(f"parameter '{name}' cannot be assigned: use 'compose param set'")
 
     def __delattr__(self, name: str) -> None:
         raise AttributeError(f"parameter '{name}' cannot be deleted")
