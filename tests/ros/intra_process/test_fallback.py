@@ -24,8 +24,8 @@ MIDDLEWARES = Path(__file__).with_name("middlewares")
 PER_WRITER, WRITERS, LATCHED = 400, 3, 3
 #: Each middleware, and why it is not relied on.
 REASONS = {
-    "returns_all": "a local publication was received despite the flag",
-    "unheard_of": "rmw_unheard_of_cpp is not supported",
+    "returns_local": "a local publication was received despite the flag",
+    "unknown": "rmw_unknown_cpp is not supported",
 }
 SYSTEM = """
 system: fallback
@@ -111,7 +111,7 @@ def compiled(source: str, target: Path, *options: str) -> Path:
 
 
 @contextmanager
-def in_front_of_rmw(middleware: str | None, folder: Path) -> Iterator[None]:
+def preloaded(middleware: str | None, folder: Path) -> Iterator[None]:
     """Make processes that start in the block use it."""
     with pytest.MonkeyPatch.context() as environment:
         if middleware is not None:
@@ -136,7 +136,7 @@ def test_every_message_arrives_once_with_any_middleware(
     path.write_text(SYSTEM, encoding="utf-8")
     path.with_name("counting.py").write_text(BEHAVIORS, encoding="utf-8")
     outside = Sequences()
-    with in_front_of_rmw(middleware, tmp_path):
+    with preloaded(middleware, tmp_path):
         running = RunningSystem(str(path), "--log-level", "debug", program=COMPOSE)
     with running as system:
         system.wait_for("2 of 3 nodes active")
@@ -172,7 +172,7 @@ def test_every_message_arrives_once_with_any_middleware(
 
 @pytest.mark.parametrize("middleware", [None, *REASONS])
 def test_the_doctor_reports_it(middleware: str | None, tmp_path: Path) -> None:
-    with in_front_of_rmw(middleware, tmp_path):
+    with preloaded(middleware, tmp_path):
         command = [*COMPOSE, "doctor", "--json"]
         done = subprocess.run(command, capture_output=True, check=False, text=True, timeout=30.0)
     (found,) = [item for item in json.loads(done.stdout) if item["area"] == "delivery"]

@@ -1,4 +1,4 @@
-/** Light, dark, or as the system says. */
+/** Switches between the light theme, the dark theme and the theme of the operating system. */
 const APPEARANCES = ["auto", "light", "dark"];
 
 function createAppearance() {

@@ -1,8 +1,8 @@
 /**
- * Which kinds and which namespaces are shown, in all pictures.
+ * Filters all pictures by kind and namespace.
  *
- * A node is shown when its namespace is; a topic, service or action when a node at one of its ends
- * is, or when it has none; a line when both its ends are.
+ * A node is visible if its namespace is selected. A topic, service or action is visible if a node
+ * connected to it is, or if it has no connection. A line is visible if both of its ends are.
  */
 function createFilter(pictures) {
   const menu = document.querySelector(".filter");
@@ -19,8 +19,8 @@ function createFilter(pictures) {
     for (const picture of pictures) applyTo(picture, hidden);
   }
 
-  /** A namespace stands for all that are in it, too. */
-  function spread(changed) {
+  /** Apply a change of a namespace to all namespaces in it. */
+  function applyToNested(changed) {
     if (changed.name !== "namespace") return;
     for (const choice of choices) {
       const inside = choice.name === "namespace" && isWithin(choice.value, changed.value);
@@ -30,7 +30,7 @@ function createFilter(pictures) {
 
   for (const choice of choices) {
     choice.addEventListener("change", () => {
-      spread(choice);
+      applyToNested(choice);
       apply();
     });
   }
@@ -54,35 +54,35 @@ function applyTo(picture, hidden) {
   const reached = new Map();
   for (const line of picture.lines) {
     for (const [channel, other] of [[line.source, line.target], [line.target, line.source]]) {
-      const node = picture.things.get(other);
+      const node = picture.items.get(other);
       const wanted = isNode(node) && !hidden.namespaces.has(node.namespace);
       reached.set(channel, Boolean(reached.get(channel)) || wanted);
     }
   }
-  for (const thing of picture.things.values()) {
-    const kind = isNode(thing) ? "node" : thing.kind;
-    const placed = isNode(thing)
-      ? !hidden.namespaces.has(thing.namespace)
-      : reached.get(thing.key) ?? true;
+  for (const item of picture.items.values()) {
+    const kind = isNode(item) ? "node" : item.kind;
+    const placed = isNode(item)
+      ? !hidden.namespaces.has(item.namespace)
+      : reached.get(item.key) ?? true;
     const isShown = placed && !hidden.kinds.has(kind);
-    if (isShown) shown.add(thing.key);
-    thing.element.classList.toggle("out", !isShown);
+    if (isShown) shown.add(item.key);
+    item.element.classList.toggle("out", !isShown);
   }
   for (const line of picture.lines) {
     const isShown =
       shown.has(line.source) && shown.has(line.target) && !hidden.kinds.has(line.kind);
     for (const part of line.parts) part.classList.toggle("out", !isShown);
   }
-  const names = [...picture.things.values()].filter((thing) => shown.has(thing.key));
+  const names = [...picture.items.values()].filter((item) => shown.has(item.key));
   for (const frame of picture.frames) {
     if (!frame.namespace.startsWith("/")) continue;
-    const used = names.some((thing) => isWithin(thing.namespace, frame.namespace));
+    const used = names.some((item) => isWithin(item.namespace, frame.namespace));
     frame.element.classList.toggle("out", !used);
   }
 }
 
-function isNode(thing) {
-  return thing.kind === "node" || thing.kind === "port";
+function isNode(item) {
+  return item.kind === "node" || item.kind === "port";
 }
 
 function isWithin(namespace, around) {

@@ -1,4 +1,4 @@
-/** Puts the parts together. */
+/** Connects the parts of the page. */
 const ZOOM_STEP = 1.25;
 
 function main() {
@@ -8,7 +8,7 @@ function main() {
   const currentPicture = () => tabs.current();
   const viewportOf = (picture) => viewports.get(picture);
 
-  /** A picture that is not shown has no size yet: place it when it first is. */
+  /** Fit a picture when it is first shown: a hidden picture has no size. */
   function placeOnce() {
     const picture = currentPicture();
     if (placed.has(picture)) return;
@@ -28,7 +28,7 @@ function main() {
   const search = createSearch(currentPicture, selection.goTo);
   createFilter(pictures);
   createAppearance();
-  for (const picture of pictures) listenToThings(picture, selection, viewportOf(picture));
+  for (const picture of pictures) listenToItems(picture, selection, viewportOf(picture));
 
   const commands = {
     in: () => viewportOf(currentPicture()).zoom(ZOOM_STEP),
@@ -42,7 +42,7 @@ function main() {
   placeOnce();
 }
 
-/** Keys that work wherever nothing is typed: + - 0 / and Escape. */
+/** Handle + - 0 / and Escape, except while the user types in the search field. */
 function listenToKeys(commands, { search, selection }) {
   const actions = {
     "+": commands.in,

@@ -1,16 +1,16 @@
 /**
- * What one picture shows, read from its SVG.
+ * Reads the content of a picture from its SVG.
  *
- * A thing is a vertex, a block or a port: {key, kind, namespace, name, element}.
- * A line joins two things: {key, kind, source, target, parts}, parts being its path and its label.
+ * An item is a vertex, a block or a port: {key, kind, namespace, name, words, element}.
+ * A line connects two items: {key, kind, source, target, parts}; the parts are its path and label.
  */
 function readPicture(view) {
   const svg = view.querySelector(".picture");
-  const things = new Map();
+  const items = new Map();
   for (const element of svg.querySelectorAll("[data-key]")) {
     const { key, kind, namespace } = element.dataset;
     const words = [...element.querySelectorAll("text")].map((text) => text.textContent);
-    things.set(key, { key, kind, namespace, name: words[0] ?? key, words, element });
+    items.set(key, { key, kind, namespace, name: words[0] ?? key, words, element });
   }
   const labels = new Map();
   for (const element of svg.querySelectorAll("[data-label]")) {
@@ -25,10 +25,10 @@ function readPicture(view) {
     namespace: element.dataset.cluster,
     element,
   }));
-  return { view, svg, world: svg.querySelector(".world"), things, lines, frames };
+  return { view, svg, world: svg.querySelector(".world"), items, lines, frames };
 }
 
-/** The place of a thing in the picture's own units, however far it is zoomed. */
-function boxOf(thing) {
-  return thing.element.querySelector(".shape").getBBox();
+/** Return the bounding box of an item in SVG units, which do not depend on the zoom. */
+function boxOf(item) {
+  return item.element.querySelector(".shape").getBBox();
 }

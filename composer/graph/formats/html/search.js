@@ -1,20 +1,20 @@
 /**
- * Search in the picture that is shown: what does not match is dimmed; Enter goes to the next match.
+ * Searches the visible picture. Items that do not match are dimmed; Enter goes to the next match.
  *
- * A thing matches when every word is in what stands in the picture or in what is known about it.
+ * An item matches if its text in the picture or its details contain every word.
  */
 function createSearch(currentPicture, goTo) {
   const input = document.getElementById("search");
   const output = document.getElementById("matches");
-  const knowledge = new Map();
+  const details = new Map();
   for (const article of document.querySelectorAll(".listing [data-about]")) {
-    knowledge.set(article.dataset.about, article.textContent.toLowerCase());
+    details.set(article.dataset.about, article.textContent.toLowerCase());
   }
   let matches = [];
   let position = -1;
 
-  function textOf(thing) {
-    return `${thing.words.join(" ")} ${knowledge.get(thing.key) ?? ""}`.toLowerCase();
+  function textOf(item) {
+    return `${item.words.join(" ")} ${details.get(item.key) ?? ""}`.toLowerCase();
   }
 
   function update() {
@@ -22,12 +22,12 @@ function createSearch(currentPicture, goTo) {
     const words = input.value.toLowerCase().split(/\s+/).filter(Boolean);
     matches = [];
     position = -1;
-    for (const thing of picture.things.values()) {
-      const visible = !thing.element.classList.contains("out");
-      const found = words.length > 0 && visible && matchesAll(textOf(thing), words);
-      thing.element.classList.toggle("found", found);
-      thing.element.classList.remove("current");
-      if (found) matches.push(thing);
+    for (const item of picture.items.values()) {
+      const visible = !item.element.classList.contains("out");
+      const found = words.length > 0 && visible && matchesAll(textOf(item), words);
+      item.element.classList.toggle("found", found);
+      item.element.classList.remove("current");
+      if (found) matches.push(item);
     }
     // Matches in names rank above matches in details.
     matches.sort((one, other) => rank(one, words) - rank(other, words));
@@ -69,6 +69,6 @@ function matchesAll(text, words) {
   return words.every((word) => text.includes(word));
 }
 
-function rank(thing, words) {
-  return matchesAll(thing.words.join(" ").toLowerCase(), words) ? 0 : 1;
+function rank(item, words) {
+  return matchesAll(item.words.join(" ").toLowerCase(), words) ? 0 : 1;
 }

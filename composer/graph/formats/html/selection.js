@@ -1,8 +1,8 @@
 /**
- * The selection: its details in the panel, its connections highlighted, the rest dimmed.
+ * The selection: the panel shows its details, its connections are highlighted, the rest is dimmed.
  *
- * In a picture one thing can be reached with Tab; the arrow keys go to what lies in that direction,
- * Enter chooses.
+ * Tab moves the focus to one item of the picture, the arrow keys move it to the next item in that
+ * direction, and Enter selects the item.
  */
 const DIRECTIONS = {
   ArrowLeft: { x: -1, y: 0 },
@@ -29,8 +29,8 @@ function createSelection(currentPicture, viewportOf) {
     panel.hidden = false;
     panel.scrollTop = 0;
     mark();
-    const thing = currentPicture().things.get(key);
-    if (thing) viewportOf(currentPicture()).uncover(thing.element, panel);
+    const item = currentPicture().items.get(key);
+    if (item) viewportOf(currentPicture()).uncover(item.element, panel);
   }
 
   function clear() {
@@ -39,20 +39,20 @@ function createSelection(currentPicture, viewportOf) {
     panel.hidden = true;
   }
 
-  /** Show what is chosen in the picture that is shown now, if it is there. */
+  /** Highlight the selected item in the visible picture, if that contains it. */
   function mark() {
     const picture = currentPicture();
-    const thing = picture.things.get(chosen);
+    const item = picture.items.get(chosen);
     const line = picture.lines.find((one) => one.key === chosen);
     neighbors.replaceChildren();
-    if (!thing && !line) return;
+    if (!item && !line) return;
     picture.svg.classList.add("choosing");
-    const near = thing ? around(picture, thing) : { lines: [line], own: [], others: ends(line) };
+    const near = item ? around(picture, item) : { lines: [line], own: [], others: ends(line) };
     for (const part of near.lines.flatMap((one) => one.parts)) part.classList.add("near");
     for (const key of [...near.own, ...near.others]) {
-      picture.things.get(key)?.element.classList.add("near");
+      picture.items.get(key)?.element.classList.add("near");
     }
-    for (const element of thing ? [thing.element] : line.parts) element.classList.add("chosen");
+    for (const element of item ? [item.element] : line.parts) element.classList.add("chosen");
     list(picture, near.others);
   }
 
@@ -65,33 +65,33 @@ function createSelection(currentPicture, viewportOf) {
   }
 
   function list(picture, keys) {
-    const things = keys.map((key) => picture.things.get(key)).filter(Boolean);
-    if (things.length === 0) return;
+    const items = keys.map((key) => picture.items.get(key)).filter(Boolean);
+    if (items.length === 0) return;
     const title = document.createElement("h3");
     title.textContent = "Connected to";
-    neighbors.append(title, ...things.map((thing) => {
+    neighbors.append(title, ...items.map((item) => {
       const button = document.createElement("button");
       button.type = "button";
-      button.textContent = thing.kind === "port" ? `${thing.words[1]} ${nameIn(thing.key)}` : labelOf(thing);
-      button.addEventListener("click", () => goTo(thing));
+      button.textContent = item.kind === "port" ? `${item.words[1]} ${nameIn(item.key)}` : labelOf(item);
+      button.addEventListener("click", () => goTo(item));
       return button;
     }));
   }
 
-  function goTo(thing) {
-    viewportOf(currentPicture()).center(boxOf(thing));
-    choose(thing.key);
+  function goTo(item) {
+    viewportOf(currentPicture()).center(boxOf(item));
+    choose(item.key);
   }
 
   document.getElementById("close").addEventListener("click", clear);
   return { choose, clear, goTo, mark, unmark, isOpen: () => !panel.hidden };
 }
 
-/** The lines at a thing (of a block: at its ports too), and what is at their other ends. */
-function around(picture, thing) {
-  const own = new Set([thing.key]);
-  const prefix = `${nameIn(thing.key)}.`;
-  for (const other of picture.things.values()) {
+/** Return the lines of an item and of its ports, and the items at their other ends. */
+function around(picture, item) {
+  const own = new Set([item.key]);
+  const prefix = `${nameIn(item.key)}.`;
+  for (const other of picture.items.values()) {
     if (other.kind === "port" && nameIn(other.key).startsWith(prefix)) own.add(other.key);
   }
   const lines = picture.lines.filter((line) => own.has(line.source) || own.has(line.target));
@@ -99,7 +99,7 @@ function around(picture, thing) {
   return { lines, own: [...own], others };
 }
 
-/** Keys are `kind:name`. */
+/** Return the name in a key, which is `kind:name`. */
 function nameIn(key) {
   return key.slice(key.indexOf(":") + 1);
 }
@@ -108,19 +108,19 @@ function ends(line) {
   return [line.source, line.target];
 }
 
-function labelOf(thing) {
-  return `${thing.kind === "port" ? thing.words[1] ?? "port" : thing.kind} ${thing.name}`;
+function labelOf(item) {
+  return `${item.kind === "port" ? item.words[1] ?? "port" : item.kind} ${item.name}`;
 }
 
-/** Make the things of a picture reachable and choosable, by pointer and by keyboard. */
-function listenToThings(picture, selection, viewport) {
-  const things = [...picture.things.values()];
-  for (const thing of things) {
-    thing.element.setAttribute("role", "button");
-    thing.element.setAttribute("aria-label", [labelOf(thing), ...thing.words.slice(1)].join(", "));
-    thing.element.setAttribute("tabindex", "-1");
+/** Let the user select the items of a picture with the pointer and the keyboard. */
+function listenToItems(picture, selection, viewport) {
+  const items = [...picture.items.values()];
+  for (const item of items) {
+    item.element.setAttribute("role", "button");
+    item.element.setAttribute("aria-label", [labelOf(item), ...item.words.slice(1)].join(", "));
+    item.element.setAttribute("tabindex", "-1");
   }
-  things[0]?.element.setAttribute("tabindex", "0");
+  items[0]?.element.setAttribute("tabindex", "0");
 
   picture.svg.addEventListener("click", (event) => {
     const key = keyAt(event.target);
@@ -129,24 +129,24 @@ function listenToThings(picture, selection, viewport) {
   });
 
   picture.svg.addEventListener("keydown", (event) => {
-    const thing = picture.things.get(event.target.dataset?.key);
-    if (!thing) return;
-    if (event.key === "Enter" || event.key === " ") selection.choose(thing.key);
-    else if (DIRECTIONS[event.key]) moveFrom(thing, DIRECTIONS[event.key]);
+    const item = picture.items.get(event.target.dataset?.key);
+    if (!item) return;
+    if (event.key === "Enter" || event.key === " ") selection.choose(item.key);
+    else if (DIRECTIONS[event.key]) moveFrom(item, DIRECTIONS[event.key]);
     else return;
     event.preventDefault();
   });
 
-  // Not on the SVG itself: Chromium makes that focusable, then.
+  // Not on the SVG itself: Chromium would make it focusable.
   picture.view.addEventListener("focusin", (event) => {
-    const thing = picture.things.get(event.target.dataset?.key);
-    if (thing && thing.element.matches(":focus-visible")) viewport.reveal(thing.element, boxOf(thing));
+    const item = picture.items.get(event.target.dataset?.key);
+    if (item && item.element.matches(":focus-visible")) viewport.reveal(item.element, boxOf(item));
   });
 
-  function moveFrom(thing, direction) {
-    const next = nearest(things, thing, direction);
+  function moveFrom(item, direction) {
+    const next = nearest(items, item, direction);
     if (!next) return;
-    thing.element.setAttribute("tabindex", "-1");
+    item.element.setAttribute("tabindex", "-1");
     next.element.setAttribute("tabindex", "0");
     next.element.focus();
   }
@@ -157,22 +157,22 @@ function keyAt(target) {
   return part?.dataset.key ?? part?.dataset.edge ?? part?.dataset.label;
 }
 
-/** The next thing in a direction: the way there counts once, the way to the side twice. */
-function nearest(things, from, direction) {
+/** Return the nearest item in a direction. Sideways distance counts twice. */
+function nearest(items, from, direction) {
   const start = middle(boxOf(from));
   let best = null;
-  for (const thing of things) {
-    if (thing === from || thing.element.classList.contains("out")) continue;
-    const there = middle(boxOf(thing));
+  for (const item of items) {
+    if (item === from || item.element.classList.contains("out")) continue;
+    const there = middle(boxOf(item));
     const x = there.x - start.x;
     const y = there.y - start.y;
     const ahead = x * direction.x + y * direction.y;
     const aside = Math.abs(x * direction.y) + Math.abs(y * direction.x);
     if (ahead <= 1 || aside > ahead * 3) continue;
     const distance = ahead + 2 * aside;
-    if (!best || distance < best.distance) best = { thing, distance };
+    if (!best || distance < best.distance) best = { item, distance };
   }
-  return best?.thing ?? null;
+  return best?.item ?? null;
 }
 
 function middle(box) {

@@ -1,4 +1,4 @@
-/** The views as tabs (the pattern of the ARIA Authoring Practices): arrow keys go from one to the next. */
+/** Shows the views as tabs, following the tabs pattern of the ARIA Authoring Practices Guide. */
 function createTabs(pictures, onChange) {
   const tabs = [...document.querySelectorAll("[role=tab]")];
   let current = pictures.find((picture) => !picture.view.hidden);

@@ -1,16 +1,16 @@
 /**
- * Pan and zoom of one picture.
+ * Pans and zooms a picture.
  *
- * The SVG's viewBox holds all of it, so the browser shows everything when nothing is moved (and in
- * print); what is here is the movement from there: a scale and a shift, in the picture's units.
+ * The viewBox of the SVG contains the whole picture, so it is complete initially and in print. Pan
+ * and zoom are a scale and a shift relative to that, in SVG units.
  */
-const LEAST_SCALE = 0.2;
-const MOST_PIXELS_A_UNIT = 4;
-/** A small picture is not blown up beyond this when all of it is shown. */
-const COMFORTABLE_PIXELS_A_UNIT = 1.6;
-/** What is gone to is shown at least this big. */
-const READABLE_PIXELS_A_UNIT = 1.1;
-const DRAG_BEGINS_PIXELS = 4;
+const MIN_SCALE = 0.2;
+const MAX_PIXELS_PER_UNIT = 4;
+/** A small picture is not enlarged beyond this scale to fill the window. */
+const MAX_FIT_PIXELS_PER_UNIT = 1.6;
+/** The minimum scale for an item that is centered. */
+const MIN_READABLE_PIXELS_PER_UNIT = 1.1;
+const MIN_DRAG_PIXELS = 4;
 const CLEARANCE_PIXELS = 24;
 
 function createViewport(picture) {
@@ -29,21 +29,21 @@ function createViewport(picture) {
     svg.dataset.scale = scale.toFixed(3);
   }
 
-  /** Show all of it. */
+  /** Show the whole picture. */
   function fit() {
-    scale = Math.min(1, COMFORTABLE_PIXELS_A_UNIT / pixelsPerUnit());
+    scale = Math.min(1, MAX_FIT_PIXELS_PER_UNIT / pixelsPerUnit());
     shift = { x: (size.width * (1 - scale)) / 2, y: (size.height * (1 - scale)) / 2 };
     show();
   }
 
-  /** Where a point of the screen is in the SVG's units. */
+  /** Return a point of the screen in SVG units. */
   function pointAt(clientX, clientY) {
     return new DOMPoint(clientX, clientY).matrixTransform(svg.getScreenCTM().inverse());
   }
 
   function zoomAt(factor, point) {
-    const most = Math.max(MOST_PIXELS_A_UNIT / pixelsPerUnit(), 1);
-    const wanted = Math.min(Math.max(scale * factor, LEAST_SCALE), most);
+    const most = Math.max(MAX_PIXELS_PER_UNIT / pixelsPerUnit(), 1);
+    const wanted = Math.min(Math.max(scale * factor, MIN_SCALE), most);
     shift.x = point.x - ((point.x - shift.x) * wanted) / scale;
     shift.y = point.y - ((point.y - shift.y) * wanted) / scale;
     scale = wanted;
@@ -60,15 +60,15 @@ function createViewport(picture) {
     show();
   }
 
-  /** Bring a box, in the picture's units, to the middle; near enough to be read. */
+  /** Center a box, given in SVG units, and make it large enough to read. */
   function center(box) {
-    scale = Math.max(scale, READABLE_PIXELS_A_UNIT / pixelsPerUnit());
+    scale = Math.max(scale, MIN_READABLE_PIXELS_PER_UNIT / pixelsPerUnit());
     shift.x = size.width / 2 - (box.x + box.width / 2) * scale;
     shift.y = size.height / 2 - (box.y + box.height / 2) * scale;
     show();
   }
 
-  /** Bring a box into sight, if it is not there. */
+  /** Center an element unless it is visible. */
   function reveal(element, box) {
     const frame = svg.getBoundingClientRect();
     const place = element.getBoundingClientRect();
@@ -78,7 +78,7 @@ function createViewport(picture) {
     if (!seen) center(box);
   }
 
-  /** Move the picture so that an element is not behind a panel on the right, or at the bottom. */
+  /** Pan so that an element is not covered by the panel on the right or at the bottom. */
   function uncover(element, panel) {
     const place = element.getBoundingClientRect();
     const cover = panel.getBoundingClientRect();
@@ -106,7 +106,7 @@ function listenToWheel(svg, zoomAt, pointAt) {
   );
 }
 
-/** One pointer drags, two pinch. A press that does not move stays a click. */
+/** Drag with one pointer, pinch with two. A press without movement is a click. */
 function listenToPointers(svg, viewport) {
   const pointers = new Map();
   let dragging = false;
@@ -123,7 +123,7 @@ function listenToPointers(svg, viewport) {
     const before = pointers.get(event.pointerId);
     if (!before) return;
     const far = Math.hypot(event.clientX - pressedAt.x, event.clientY - pressedAt.y);
-    if (!dragging && far < DRAG_BEGINS_PIXELS) return;
+    if (!dragging && far < MIN_DRAG_PIXELS) return;
     if (!dragging) {
       dragging = true;
       svg.setPointerCapture(event.pointerId);
@@ -142,7 +142,7 @@ function listenToPointers(svg, viewport) {
     });
   }
 
-  // The end of a drag is not a click on the element below it.
+  // The end of a drag must not be a click on the element below the pointer.
   svg.addEventListener("click", (event) => { if (dragging) event.stopPropagation(); }, true);
 
   function drag(before, event) {

@@ -1,4 +1,4 @@
-/* Prints where the fields lie that are set from Python. */
+/* Prints the offsets of the fields that Python sets. */
 #include <stddef.h>
 #include <stdio.h>
 

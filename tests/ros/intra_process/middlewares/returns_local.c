@@ -1,4 +1,4 @@
-/* In front of rmw: a middleware that hands a process its own messages, whatever it was asked for. */
+/* Preloaded: a middleware that ignores ignore_local_publications. */
 #include <dlfcn.h>
 
 #include "rmw/rmw.h"
@@ -10,7 +10,7 @@ rmw_ret_t rmw_take_with_info(
   const rmw_subscription_t * subscription, void * message, bool * taken, rmw_message_info_t * info,
   rmw_subscription_allocation_t * allocation)
 {
-  /* The one chooses the middleware where ROS is sourced; wheels have the other alone. */
+  /* rmw_implementation loads the middleware in an installation of ROS; the wheels do without it. */
   void * rmw = dlopen("librmw_implementation.so", RTLD_LAZY | RTLD_NOLOAD);
   if (rmw == NULL) {
     rmw = dlopen("librmw_fastrtps_cpp.so", RTLD_LAZY | RTLD_NOLOAD);

@@ -1,7 +1,0 @@
-/* In front of rmw: a middleware with an unknown name. */
-#include "rmw/rmw.h"
-
-const char * rmw_get_implementation_identifier(void)
-{
-  return "rmw_unheard_of_cpp";
-}
