@@ -19,6 +19,7 @@ class ChainDelay:
     what: str
     milliseconds: float
     span: Span
+    is_period: bool = False
 
 
 def input_ports(node: Node, topic: str) -> Iterator[Port]:
@@ -58,7 +59,7 @@ def _timer_delay(node: Node, timers: list[Timer]) -> Iterator[ChainDelay]:
         return
     period_s, timer = min(periods, key=lambda item: item[0])
     name = f"{node.name}.{timer.name}"
-    yield ChainDelay(f"{name} fires every", period_s * 1000.0, timer.period.span)
+    yield ChainDelay(f"{name} fires every", period_s * 1000.0, timer.period.span, is_period=True)
     yield from _budget_delay(name, timer)
 
 

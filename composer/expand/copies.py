@@ -18,7 +18,7 @@ from math import prod
 from composer.diagnostics import Diagnostic, Label, shown
 from composer.document.limits import MAX_COPIES
 from composer.expand import rules
-from composer.expand.references import has_reference
+from composer.expand.references import has_reference, references
 from composer.expand.scope import Declared
 from composer.expand.substitution import Substitution
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, describe
@@ -135,8 +135,11 @@ def _duplicate_name(entry: Entry, earlier: Entry, name: str) -> Diagnostic:
     span = entry.key.span
     loops = entry.value.get(FOR_EACH) if isinstance(entry.value, Mapping) else None
     if entry is earlier and isinstance(loops, Mapping):
-        suffix = "_".join(f"${{{shown(loop.name)}}}" for loop in loops)
-        hint = f"make the names unique: '{shown(entry.name)}_{suffix}'"
+        used = set(references(entry.key))
+        unused = [f"${{{shown(loop.name)}}}" for loop in loops if loop.name not in used]
+        hint = "give 'for_each' values that make the names different"
+        if unused:
+            hint = f"make the names unique: '{'_'.join((shown(entry.name), *unused))}'"
         message = f"copies of this node have the same name, '{shown(name)}'"
         return Diagnostic(rules.DUPLICATE_NODE_NAME, message, span, hint=hint)
     label = Label(earlier.key.span, "the other one")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import port_name
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
-from composer.model import ChannelKind
+from composer.model import Channel, ChannelKind, PortOfNode
 
 RULE = register(
     Rule(
@@ -50,5 +50,13 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 f"and '{port_name(first)}'",
                 other.port.name.span,
                 (Label(first.port.name.span, "the other server"),),
-                f"rename one of them, for example to '~/{other.port.name}'",
+                _hint(channel, other),
             )
+
+
+def _hint(channel: Channel, other: PortOfNode) -> str:
+    """Suggest a name below the node, unless the server has that name already."""
+    node, port = other.node, other.port
+    if f"{node.full_name}/{port.name}" == channel.name:
+        return "rename one of them"
+    return f"rename one of them, for example to '~/{port.name}'"

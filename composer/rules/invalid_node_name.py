@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.analysis.formatting import safe_name
+from composer.analysis.formatting import free_name, safe_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.names import node_name_problem
 
@@ -35,6 +35,7 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the name of every node."""
+    names = {node.name.value for node in context.system.nodes}
     for node in context.system.nodes:
         name = node.name
         problem = node_name_problem(name.value)
@@ -43,5 +44,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 RULE,
                 f"node name '{name}' {problem}",
                 name.span,
-                hint=f"rename it to '{safe_name(name.value)}'",
+                hint=f"rename it to '{free_name(safe_name(name.value), names)}'",
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.analysis.formatting import safe_name
+from composer.analysis.formatting import free_name, safe_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.names import parameter_name_problem
 
@@ -38,6 +38,7 @@ nodes:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the name of every declared parameter."""
     for node in context.system.nodes:
+        names = {parameter.name.value for parameter in node.parameters}
         for parameter in node.parameters:
             name = parameter.name
             problem = parameter_name_problem(name.value)
@@ -47,5 +48,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     RULE,
                     f"parameter name '{name}' {problem}",
                     name.span,
-                    hint=f"rename it to '{better}'",
+                    hint=f"rename it to '{free_name(better, names)}'",
                 )

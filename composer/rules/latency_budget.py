@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
-from composer.analysis.chains import chain_delays
+from composer.analysis.chains import ChainDelay, chain_delays
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
@@ -64,5 +64,15 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     Label(delay.span, f"{delay.what} {number(delay.milliseconds)} ms")
                     for delay in found
                 ),
-                "publish from the subscription, or use shorter timer periods",
+                _hint(found),
             )
+
+
+def _hint(delays: Iterable[ChainDelay]) -> str:
+    """Return a hint about what the delays are: periods of timers, budgets, or both."""
+    kinds = {delay.is_period for delay in delays}
+    if kinds == {True}:
+        return "publish from the subscription, or use shorter timer periods"
+    if kinds == {False}:
+        return "use shorter budgets, or allow a higher latency"
+    return "publish from the subscription, or use shorter timer periods or budgets"

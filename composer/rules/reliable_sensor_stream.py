@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.formatting import number
+from composer.analysis.formatting import number, port_name
 from composer.analysis.rates import rates
-from composer.diagnostics import Diagnostic, Rule, Severity, register
-from composer.model import PortKind, PortOfNode
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import ChannelKind, Port, PortOfNode
 from composer.qos import Reliability
 
 RULE = register(
@@ -45,17 +45,33 @@ _PACKAGE = "sensor_msgs/msg/"
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check publishers of sensor messages with a known rate."""
     known = context.once(rates)
-    for node in context.system.nodes:
-        for port in node.ports_of(PortKind.PUBLISHER):
-            if not port.interface.value.startswith(_PACKAGE) or not port.qos.known:
-                continue
-            rate_hz = known.publisher_hz(PortOfNode(node, port))
-            if rate_hz is None or rate_hz < FAST_HZ:
-                continue
-            if port.qos.profile.reliability is Reliability.RELIABLE:
-                yield Diagnostic(
-                    RULE,
-                    f"sensor data on '{port.full_name}' at {number(rate_hz)} Hz uses reliable QoS",
-                    port.qos.policy_span("reliability"),
-                    hint="use 'qos: sensor_data'",
-                )
+    for channel in context.channels:
+        if channel.kind is not ChannelKind.TOPIC:
+            continue
+        sinks = tuple(end for end in channel.sinks if _is_reliable(end.port))
+        for source in channel.sources:
+            rate_hz = known.publisher_hz(source) if _is_reliable(source.port) else None
+            if source.port.interface.value.startswith(_PACKAGE) and (rate_hz or 0.0) >= FAST_HZ:
+                yield _diagnostic(source.port, rate_hz or 0.0, sinks)
+
+
+def _is_reliable(port: Port) -> bool:
+    return port.qos.known and port.qos.profile.reliability is Reliability.RELIABLE
+
+
+def _diagnostic(port: Port, rate_hz: float, sinks: tuple[PortOfNode, ...]) -> Diagnostic:
+    """Report a publisher; if it were best effort, it would not match the reliable ``sinks``."""
+    if sinks:
+        hint = "use 'qos: sensor_data' for it and for the subscriptions that request reliable QoS"
+    else:
+        hint = "use 'qos: sensor_data', unless an external node requests reliable QoS"
+    return Diagnostic(
+        RULE,
+        f"sensor data on '{port.full_name}' at {number(rate_hz)} Hz uses reliable QoS",
+        port.qos.policy_span("reliability"),
+        tuple(
+            Label(sink.port.qos.policy_span("reliability"), f"'{port_name(sink)}' requests it")
+            for sink in sinks
+        ),
+        hint,
+    )

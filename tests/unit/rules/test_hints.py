@@ -1,0 +1,95 @@
+"""Hints: following them must fix the problem and not cause another one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.unit.support.checking import diagnostics_in
+
+SCAN = "type: sensor_msgs/msg/LaserScan"
+SERVER = "type: std_srvs/srv/Trigger, respond: {success: true}"
+LIDAR = f"""\
+system: demo
+nodes:
+  lidar:
+    publishers: {{scan: {{{SCAN}, topic: /scan, qos: command, external: true}}}}
+    timers: {{tick: {{rate_hz: 30, publish: {{scan: {{}}}}}}}}
+"""
+CHAIN = """\
+system: demo
+nodes:
+  camera: {publishers: {image: {type: std_msgs/msg/String, topic: /image, qos: sensor_data}}}
+  viewer:
+    subscriptions:
+      image: {type: std_msgs/msg/String, topic: /image, qos: sensor_data%s}
+    publishers: {out: {type: std_msgs/msg/String, qos: command, external: true}}%s
+chains: {all: {through: [camera.image, viewer.out], latency_ms: 5}}
+"""
+HINTS: dict[str, tuple[str, str, list[str | None]]] = {
+    "node names that would become equal": (
+        "system: demo\nnodes: {a-b: {}, a b: {}, a_b: {}}\n",
+        "invalid-node-name",
+        ["rename it to 'a_b_2'", "rename it to 'a_b_3'"],
+    ),
+    "parameter names that would become equal": (
+        "system: demo\nnodes: {n: {parameters: {a-b: {type: bool}, a_b: {type: bool}}}}\n",
+        "invalid-parameter-name",
+        ["rename it to 'a_b_2'"],
+    ),
+    "copies whose names have all variables": (
+        "system: demo\nnodes: {'n_${i}': {for_each: {i: [1, 1]}, on_activate: {log: hello}}}\n",
+        "duplicate-node-name",
+        ["give 'for_each' values that make the names different"],
+    ),
+    "copies whose names have some variables": (
+        "system: demo\n"
+        "nodes: {'n_${i}': {for_each: {i: [1, 2], j: [1, 2]}, on_activate: {log: '${j}'}}}\n",
+        "duplicate-node-name",
+        ["make the names unique: 'n_${i}_${j}'"],
+    ),
+    "a server with the private name already": (
+        f"system: demo\nnodes: {{a: {{services: {{b: {{{SERVER}, service: ~/ask}}, "
+        f"ask: {{{SERVER}, service: ~/ask}}}}}}}}\n",
+        "duplicate-server",
+        ["rename one of them"],
+    ),
+    "a chain without timers": (
+        CHAIN % (", budget_ms: 20, publish: {out: '{message}'}", ""),
+        "latency-budget",
+        ["use shorter budgets, or allow a higher latency"],
+    ),
+    "a chain with a timer": (
+        CHAIN % (", log: x", "\n    timers: {t: {period_ms: 50, publish: {out: {data: x}}}}"),
+        "latency-budget",
+        ["publish from the subscription, or use shorter timer periods"],
+    ),
+    "sensor data with a reliable subscription": (
+        f"{LIDAR}  map:\n"
+        f"    subscriptions: {{scan: {{{SCAN}, topic: /scan, qos: command, log: x}}}}\n",
+        "reliable-sensor-stream",
+        ["use 'qos: sensor_data' for it and for the subscriptions that request reliable QoS"],
+    ),
+    "sensor data for external nodes": (
+        LIDAR,
+        "reliable-sensor-stream",
+        ["use 'qos: sensor_data', unless an external node requests reliable QoS"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "rule", "hints"), HINTS.values(), ids=HINTS)
+def test_hint(tmp_path: Path, text: str, rule: str, hints: list[str | None]) -> None:
+    found = [item for item in diagnostics_in(text, tmp_path) if item.rule.name == rule]
+    assert [diagnostic.hint for diagnostic in found] == hints
+
+
+def test_reliable_subscriptions_are_labeled(tmp_path: Path) -> None:
+    text = HINTS["sensor data with a reliable subscription"][0]
+    [diagnostic] = [
+        item for item in diagnostics_in(text, tmp_path) if item.rule.name.startswith("reliable")
+    ]
+    assert [(label.message, label.span.line) for label in diagnostic.related] == [
+        ("'map.scan' requests it", 7)
+    ]
