@@ -105,7 +105,7 @@ def unbound_handlers(node: Node, source: BehaviorSource) -> list[Method]:
 
 def calls_of(source: BehaviorSource, method: Method) -> Iterator[Call]:
     """Yield the calls of ``method``, and those of the methods of its class that it calls."""
-    for reached in _reached(source, method):
+    for reached in reached_methods(source, method):
         yield from reached.calls
 
 
@@ -114,7 +114,8 @@ def escaping_publishers(source: BehaviorSource) -> frozenset[str]:
     return frozenset(port for method in source.methods for port in method.publishing.passed_on)
 
 
-def _reached(source: BehaviorSource, method: Method) -> Iterator[Method]:
+def reached_methods(source: BehaviorSource, method: Method) -> Iterator[Method]:
+    """Yield ``method`` and the methods of its class that it calls, directly or through others."""
     pending, seen = [method], {method.name}
     while pending:
         current = pending.pop()

@@ -6,8 +6,17 @@ decorator, ``__getattr__``) is marked as unknown, and rules do not report it as 
 """
 
 from composer.behavior_source.lookup import BehaviorSource, find_behavior
-from composer.behavior_source.method_body import Call
+from composer.behavior_source.method_body import Call, Function
 from composer.behavior_source.publishing import published_port
-from composer.behavior_source.syntax import Method
+from composer.behavior_source.syntax import Class, Method, Module
 
-__all__ = ["BehaviorSource", "Call", "Method", "find_behavior", "published_port"]
+__all__ = [
+    "BehaviorSource",
+    "Call",
+    "Class",
+    "Function",
+    "Method",
+    "Module",
+    "find_behavior",
+    "published_port",
+]

@@ -20,6 +20,8 @@ from composer.source import Span, shown_path
 #: Maximum number of files to read for one behavior.
 MAXIMUM_MODULES = 32
 
+#: Folders of installed packages; a virtual environment may be in the folder of the project.
+_INSTALLED = frozenset({"site-packages", "dist-packages"})
 #: Bases without handlers: the base class of behaviors, and those of the standard library.
 _PLAIN_BASES = frozenset(
     {
@@ -37,7 +39,10 @@ class BehaviorSource:
     """The syntax of a behavior.
 
     ``complete`` is true if ``methods`` contains all methods; only then can one be missing.
-    ``problem`` is the reason why a module that exists cannot be read.
+    ``problem`` is the reason why a module that exists cannot be read, ``problem_span`` its location
+    in the module. ``classes`` are the class and its bases, nearest first, each with its module;
+    bases that cannot be found are left out. ``own_modules`` are the files that were read for them
+    and that belong to the project.
     """
 
     reference: BehaviorReference
@@ -46,9 +51,18 @@ class BehaviorSource:
     complete: bool = False
     path: Path | None = None
     problem: str | None = None
+    problem_span: Span | None = field(default=None, compare=False)
     class_names: tuple[str, ...] = ()
     class_span: Span | None = field(default=None, compare=False)
     methods: tuple[Method, ...] = ()
+    classes: tuple[tuple[Module, Class], ...] = field(default=(), repr=False, compare=False)
+    own_modules: tuple[Module, ...] = field(default=(), repr=False, compare=False)
+
+    @property
+    def own_classes(self) -> Iterator[tuple[Module, Class]]:
+        """The classes in the project's own files, not in installed packages."""
+        own = {module.path for module in self.own_modules}
+        yield from (found for found in self.classes if found[0].path in own)
 
     def method(self, name: str) -> Method | None:
         """Return the method ``name``, own or inherited; None if it is not known."""
@@ -62,7 +76,9 @@ def find_behavior(reference: BehaviorReference) -> BehaviorSource:
         path = module_file(reference.module, reference.folder, reader.project)
         module = reader.module(path) if path is not None else None
     except Unreadable as error:
-        return BehaviorSource(reference, module_found=True, problem=str(error))
+        return BehaviorSource(
+            reference, module_found=True, problem=str(error), problem_span=error.span
+        )
     if module is None:
         compiled = is_compiled(reference.module)
         return BehaviorSource(reference, module_found=compiled, class_found=compiled)
@@ -78,9 +94,10 @@ def find_behavior(reference: BehaviorReference) -> BehaviorSource:
         )
     methods: dict[str, Method] = {}
     complete = True
-    for known in reader.with_bases(*start):
-        complete = complete and known is not None and not known.dynamic
-        for method in known.methods if known is not None else ():
+    classes = tuple(reader.with_bases(*start))
+    for found in classes:
+        complete = complete and found is not None and not found[1].dynamic
+        for method in found[1].methods if found is not None else ():
             methods.setdefault(method.name, method)
     return BehaviorSource(
         reference,
@@ -91,6 +108,8 @@ def find_behavior(reference: BehaviorReference) -> BehaviorSource:
         class_names=names,
         class_span=start[1].span,
         methods=tuple(methods.values()),
+        classes=tuple(found for found in classes if found is not None),
+        own_modules=tuple(filter(reader.is_own, reader.modules.values())),
     )
 
 
@@ -113,7 +132,12 @@ class _Reader:
             self.modules[path] = read_module(path, shown_path(path))
         return self.modules[path]
 
-    def with_bases(self, module: Module, start: Class) -> Iterator[Class | None]:
+    def is_own(self, module: Module) -> bool:
+        """Return whether a file belongs to the project."""
+        path = module.path
+        return self.project.holds(path) and not _INSTALLED.intersection(path.parts)
+
+    def with_bases(self, module: Module, start: Class) -> Iterator[_ClassInModule | None]:
         """Yield a class and all its bases, nearest first; None for a base that cannot be found."""
         seen: set[tuple[Path, str]] = set()
         pending: list[_ClassInModule] = [(module, start)]
@@ -122,7 +146,7 @@ class _Reader:
             if (home.path, known.name) in seen:
                 continue
             seen.add((home.path, known.name))
-            yield known
+            yield home, known
             for base in reversed(known.bases):
                 if self._is_plain(home, base):
                     continue

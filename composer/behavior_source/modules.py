@@ -12,6 +12,7 @@ from pathlib import Path
 
 from composer.project import Project
 from composer.project.ownership import TrustedUsers
+from composer.source import Span
 
 MAXIMUM_BYTES = 250_000
 
@@ -20,7 +21,14 @@ _ENCODINGS = frozenset({"utf-8", "utf-8-sig", "ascii", "us-ascii", "iso-8859-1",
 
 
 class Unreadable(Exception):
-    """The file of a module cannot be read as Python; the message is the reason."""
+    """The file of a module cannot be read as Python; the message is the reason.
+
+    ``span`` is the location of an error in the text.
+    """
+
+    def __init__(self, message: str, span: Span | None = None) -> None:
+        super().__init__(message)
+        self.span = span
 
 
 def module_file(module: str, folder: Path, project: Project) -> Path | None:
@@ -35,7 +43,7 @@ def module_file(module: str, folder: Path, project: Project) -> Path | None:
         return None
     for base in dict.fromkeys((folder, *project.node_folders)):
         file = base.joinpath(*parts).with_suffix(".py")  # the one that the runtime loads
-        found = file if _exists(file) else _below(base, parts)
+        found = file if _exists(file) else module_below(base, parts)
         if found is not None:
             return _checked(found, project)
     return _installed(parts)
@@ -60,7 +68,7 @@ def relative_module_file(module: str, level: int, importer: Path) -> Path | None
     base = importer.parent
     for _ in range(level - 1):
         base = base.parent
-    return _below(base, module.split(".") if module else [])
+    return module_below(base, module.split(".") if module else [])
 
 
 def read_text(path: Path) -> str:
@@ -83,7 +91,8 @@ def read_text(path: Path) -> str:
         raise Unreadable("is not text in the encoding it declares") from None
 
 
-def _below(base: Path, parts: Sequence[str]) -> Path | None:
+def module_below(base: Path, parts: Sequence[str]) -> Path | None:
+    """Return the file of the module with the given parts of its name, in a folder."""
     path = base.joinpath(*parts)
     candidates = [path / "__init__.py"]
     if parts:
@@ -118,9 +127,14 @@ def _installed(parts: list[str]) -> Path | None:
 
 def _submodules(spec: importlib.machinery.ModuleSpec, parts: list[str]) -> Iterator[Path]:
     for location in spec.submodule_search_locations or ():
-        found = _below(Path(location), parts)
+        found = module_below(Path(location), parts)
         if found is not None:
             yield found
+
+
+def is_installed(module: str) -> bool:
+    """Return whether the first part of ``module`` can be imported, without importing it."""
+    return _spec(module.partition(".")[0]) is not None
 
 
 def _spec(name: str) -> importlib.machinery.ModuleSpec | None:

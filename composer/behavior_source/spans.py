@@ -13,20 +13,31 @@ _LONGEST_LINE = 10_000
 def span_of(node: ast.stmt | ast.expr, source: SourceFile) -> Span:
     """Return the span of a node; of one with several lines, its first character."""
     line = source.line(node.lineno)
-    start = _characters(line, node.col_offset)
+    start = characters(line, node.col_offset)
     if node.end_lineno != node.lineno or node.end_col_offset is None:
         return Span(source, node.lineno, start + 1)
-    length = _characters(line, node.end_col_offset) - start
+    length = characters(line, node.end_col_offset) - start
     return Span(source, node.lineno, start + 1, max(length, 1))
 
 
-def start_span(node: ast.stmt | ast.expr, length: int, source: SourceFile) -> Span:
+def attribute_span(node: ast.Attribute, source: SourceFile) -> Span:
+    """Return the span of the name after the dot."""
+    if node.end_lineno is None or node.end_col_offset is None:
+        return span_of(node, source)
+    end = characters(source.line(node.end_lineno), node.end_col_offset)
+    return Span(source, node.end_lineno, end - len(node.attr) + 1, len(node.attr))
+
+
+def start_span(
+    node: ast.stmt | ast.expr | ast.keyword | ast.alias, length: int, source: SourceFile
+) -> Span:
     """Return the span of the first ``length`` characters of a node."""
-    start = _characters(source.line(node.lineno), node.col_offset)
+    start = characters(source.line(node.lineno), node.col_offset)
     return Span(source, node.lineno, start + 1, length)
 
 
-def _characters(line: str, size_bytes: int) -> int:
+def characters(line: str, size_bytes: int) -> int:
+    """Return the number of characters in the first ``size_bytes`` bytes of a line, as UTF-8."""
     if line.isascii() or len(line) > _LONGEST_LINE:
         return size_bytes
     return len(line.encode()[:size_bytes].decode(errors="replace"))

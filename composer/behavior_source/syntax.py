@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import ast
 import re
-import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
+from composer.behavior_source.compilation import NotPython, parse
 from composer.behavior_source.method_body import Call, Function, dotted, imported_names, read_body
 from composer.behavior_source.modules import Unreadable, read_text
 from composer.behavior_source.publishing import PublisherUses, publisher_uses
@@ -33,6 +33,7 @@ class Method:
     keywords: tuple[str, ...] = ()  # keyword-only arguments without a default
     is_async: bool = False
     known: bool = True
+    node: Function | None = field(default=None, repr=False, compare=False)
     calls: tuple[Call, ...] = field(default=(), compare=False)
     publishing: PublisherUses = field(default_factory=PublisherUses)
 
@@ -53,6 +54,7 @@ class Class:
     bases: tuple[str, ...]  # dotted, as written; "" for other expressions
     methods: tuple[Method, ...]
     dynamic: bool
+    node: ast.ClassDef = field(repr=False, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +71,8 @@ class Module:
     """The top-level definitions and imports of a Python file."""
 
     path: Path
+    source: SourceFile
+    tree: ast.Module = field(repr=False)
     classes: dict[str, Class]
     imports: dict[str, Import]
     assigned: frozenset[str]
@@ -91,28 +95,23 @@ def read_module(path: Path, shown: str) -> Module:
 @lru_cache(maxsize=128)
 def _read_module(path: Path, shown: str, _changed_ns: int, _bytes: int) -> Module:
     source = SourceFile(shown, read_text(path))
-    statements = tuple(_top_level(_parse(source.text)))
+    try:
+        tree = parse(source)
+    except NotPython as error:
+        raise Unreadable(f"is not Python: {error}", error.span) from None
+    statements = tuple(_top_level(tree.body))
     names = dict(_imported_names(statements))
     classes = (item for item in statements if isinstance(item, ast.ClassDef))
     imports = dict(_imports(statements))
     return Module(
         path=path,
+        source=source,
+        tree=tree,
         classes={item.name: _class(item, names, source) for item in classes},
         imports=imports,
         assigned=frozenset(name.id for item in statements for name in _assigned(item)),
         dynamic="*" in imports or any(_is_getattr(item) for item in statements),
     )
-
-
-def _parse(text: str) -> list[ast.stmt]:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return ast.parse(text).body
-    except SyntaxError as error:
-        raise Unreadable(f"is not Python: {error.msg} (line {error.lineno})") from None
-    except (ValueError, RecursionError, MemoryError):
-        raise Unreadable("is not Python that can be parsed") from None
 
 
 def _top_level(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
@@ -160,6 +159,7 @@ def _class(node: ast.ClassDef, names: Mapping[str, str], source: SourceFile) -> 
         tuple(_dotted(base) for base in node.bases),
         tuple(methods.values()),
         dynamic,
+        node,
     )
 
 
@@ -203,6 +203,7 @@ def _method(node: Function, names: Mapping[str, str], source: SourceFile) -> Met
         ),
         is_async=isinstance(node, ast.AsyncFunctionDef),
         known=decorators <= _TRANSPARENT and bool(positional or static),
+        node=node,
         calls=body.calls,
         publishing=publisher_uses(node, body),
     )

@@ -17,6 +17,7 @@ unknown. Unknown types never cause a problem, and one mistake causes one problem
 """
 
 from composer.field_types.checker import FieldChecker
+from composer.field_types.constants import constant_problem
 from composer.field_types.types import (
     ANYTHING,
     BOOL,
@@ -28,6 +29,8 @@ from composer.field_types.types import (
     Problem,
     Scope,
     ValueType,
+    described,
+    fields_of,
     parameter_type,
     resolve_path,
     type_of,
@@ -45,6 +48,9 @@ __all__ = [
     "Problem",
     "Scope",
     "ValueType",
+    "constant_problem",
+    "described",
+    "fields_of",
     "parameter_type",
     "resolve_path",
     "type_of",

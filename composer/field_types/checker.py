@@ -166,11 +166,12 @@ class FieldChecker:
     ) -> Iterator[Problem]:
         found, problems = self._infer(expression, span)
         yield from problems
-        if not problems and not self._fits(found, target):
+        if not problems and not self.fits(found, target):
             problem = f"{described(found)} where {described(target)} is expected"
             yield Problem(problem, span, _conversion_hint(expression, found, target))
 
-    def _fits(self, found: ValueType, target: FieldType | Message) -> bool:
+    def fits(self, found: ValueType, target: FieldType | Message) -> bool:
+        """Return whether values of type ``found`` can be assigned to ``target``."""
         if found is ANYTHING:
             return True
         if is_array(target):

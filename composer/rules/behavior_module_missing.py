@@ -53,5 +53,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 span,
                 hint=f"expected {reference.module.replace('.', '/')}.py next to the YAML file",
             )
-        elif source.problem is not None:
+        elif source.problem is not None and source.problem_span is None:
             yield Diagnostic(RULE, f"module '{reference.module}' {source.problem}", span)

@@ -87,8 +87,8 @@ def _handler(
             yield Diagnostic(
                 RULE,
                 f"handler '{name}' of '{source.reference.class_name}' blocks in '{call.name}'",
-                place,
-                (Label(call.span, "blocks here"),),
+                call.span,
+                (Label(place, "called here"),),
                 _hint(call),
             )
 

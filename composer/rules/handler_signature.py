@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from composer.analysis.behaviors import GENERAL_HANDLERS, behaviors, handlers
 from composer.analysis.context import Context
 from composer.behavior_source import BehaviorSource
+from composer.behavior_source.receivers import lacks_self
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.source import Span
 
@@ -62,12 +63,14 @@ def _method(
     method = source.method(name)
     if method is None or method.accepts(len(arguments)):
         return
+    if method.node is not None and lacks_self(method.node, len(arguments)):
+        return
     takes = ", ".join(("self", *method.arguments))
     gets = ", ".join(("self", *arguments))
     yield Diagnostic(
         RULE,
         f"'{name}' of '{source.reference.class_name}' is called with ({gets}), but takes ({takes})",
-        span,
-        (Label(method.span, "defined here"),),
+        method.span,
+        (Label(span, "called here"),),
         f"write 'def {name}({gets})'",
     )

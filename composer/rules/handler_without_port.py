@@ -68,8 +68,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 RULE,
                 f"handler '{method.name}' of '{source.reference.class_name}' matches no port or "
                 "timer",
-                source.reference.text.span,
-                (Label(method.span, "defined here"),),
+                method.span,
+                (Label(source.reference.text.span, "the behavior of this node"),),
                 _hint(node, method.name, [handler.name for handler in known]),
             )
 

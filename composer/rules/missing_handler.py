@@ -59,14 +59,14 @@ def check(context: Context) -> Iterator[Diagnostic]:
 def _diagnostic(source: BehaviorSource, handler: Handler, unbound: dict[str, Method]) -> Diagnostic:
     signature = f"{handler.name}({', '.join(('self', *handler.arguments))})"
     close = nearest(handler.name, unbound)
-    label = Label(unbound[close].span, f"'{close}' is never called") if close else None
-    if label is None and source.class_span is not None:
-        label = Label(source.class_span, "the behavior class")
-    return Diagnostic(
-        RULE,
+    message = (
         f"{handler.kind} '{handler.of}' has no handler: "
-        f"'{source.reference.class_name}' has no method '{handler.name}'",
-        handler.of.span,
-        (label,) if label is not None else (),
-        f"rename it to '{handler.name}'" if close else f"add 'def {signature}'",
+        f"'{source.reference.class_name}' has no method '{handler.name}'"
     )
+    if close is not None:  # a misspelled reference to the port
+        label = Label(handler.of.span, f"the {handler.kind}")
+        hint = f"rename '{close}' to '{handler.name}'"
+        return Diagnostic(RULE, message, unbound[close].span, (label,), hint)
+    span = source.class_span
+    related = (Label(span, "the behavior class"),) if span is not None else ()
+    return Diagnostic(RULE, message, handler.of.span, related, f"add 'def {signature}'")

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from composer.analysis.behavior_code import diagnostics_of
 from composer.analysis.context import Context
 from composer.analysis.fields import field_problems
+from composer.behavior_types import Kind
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(
@@ -34,7 +36,8 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Report the fields that do not exist."""
+    """Report the fields that do not exist, in YAML and in behaviors."""
     for problem in context.once(field_problems):
         if problem.missing:
             yield Diagnostic(RULE, problem.message, problem.span, hint=problem.hint)
+    yield from diagnostics_of(context, Kind.FIELD, RULE)

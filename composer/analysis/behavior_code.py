@@ -1,0 +1,87 @@
+"""The problems in the Python files of behaviors: types, imports and undefined names."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from composer.analysis.behaviors import behaviors, handlers
+from composer.analysis.context import Context
+from composer.behavior_source import BehaviorSource, Function, Module
+from composer.behavior_source.receivers import lacks_self
+from composer.behavior_source.spans import span_of
+from composer.behavior_source.undefined_names import undefined_names
+from composer.behavior_types import CodeProblem, Kind, behavior_problems, import_problems
+from composer.diagnostics import Diagnostic, Label, Rule, nearest
+from composer.model import Node
+
+
+def diagnostics_of(context: Context, kind: Kind, rule: Rule) -> Iterator[Diagnostic]:
+    """Yield the problems of one kind as diagnostics of ``rule``."""
+    for source, problem in context.once(_problems):
+        if problem.kind is kind:
+            label = Label(source.reference.text.span, "the behavior of this node")
+            yield Diagnostic(rule, problem.message, problem.span, (label,), problem.hint)
+
+
+def _problems(context: Context) -> tuple[tuple[BehaviorSource, CodeProblem], ...]:
+    """Return the problems of all behaviors; those of a file are found once."""
+    checked: set[Path] = set()
+    found: list[tuple[BehaviorSource, CodeProblem]] = []
+    for node, source in context.once(behaviors):
+        for module in source.own_modules:
+            if module.path not in checked:
+                checked.add(module.path)
+                found += ((source, problem) for problem in _of_file(context, node, source, module))
+        problems = behavior_problems(node, source, context.interfaces)
+        found += ((source, problem) for problem in problems)
+    return tuple(found)
+
+
+def _of_file(
+    context: Context, node: Node, source: BehaviorSource, module: Module
+) -> list[CodeProblem]:
+    try:
+        imports = list(import_problems(module, source.reference.folder, context.interfaces))
+        # The name that a misspelled import was meant to define is not reported again.
+        meant = {name for _, name in imports if name is not None}
+        if any(_lacking_self(module)):
+            meant.add("self")
+        meant.update(_missing_arguments(node, source))
+        undefined = [
+            CodeProblem(
+                Kind.NAME,
+                f"name '{name.id}' is not defined",
+                span_of(name, module.source),
+                _hint(name.id, known),
+            )
+            for name, known in undefined_names(module.tree)
+            if name.id not in meant
+        ]
+    except RecursionError:  # too deeply nested to be checked
+        return []
+    return [*(problem for problem, _ in imports), *undefined]
+
+
+def _hint(name: str, known: frozenset[str]) -> str:
+    if name in sys.stdlib_module_names:
+        return f"add 'import {name}'"
+    # Short names are alike too easily; most typos leave the first letter unchanged.
+    close = nearest(name, (other for other in known if other[:1].lower() == name[:1].lower()))
+    return f"did you mean '{close}'?" if close is not None else "import it, or define it"
+
+
+def _missing_arguments(node: Node, source: BehaviorSource) -> Iterator[str]:
+    """Yield the arguments of handlers that do not accept them; another rule reports these."""
+    for handler in handlers(node):
+        method = source.method(handler.name)
+        if method is not None and not method.accepts(len(handler.arguments)):
+            yield from handler.arguments
+
+
+def _lacking_self(module: Module) -> Iterator[Function]:
+    for known in module.classes.values():
+        for method in known.methods:
+            if method.node is not None and lacks_self(method.node):
+                yield method.node

@@ -1,0 +1,152 @@
+"""How a function ends: with a value, without one, or never."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Sequence
+
+from composer.behavior_source.method_body import Function
+
+_SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
+_LEAVES = (ast.Return, ast.Raise, ast.Break, ast.Yield, ast.YieldFrom)
+_WAITS = (ast.Await, ast.AsyncFor, ast.AsyncWith, ast.Yield, ast.YieldFrom)
+#: Functions of the standard library that do not return.
+_EXITS = frozenset({"exit", "quit", "_exit", "abort"})
+#: Calls that wait, or would if they were awaited.
+_WAITING_CALLS = frozenset({"sleep", "call", "send_goal", "result", "wait", "get", "join"})
+_ENDS_OR_WAITS = _EXITS | _WAITING_CALLS
+
+
+def empty_returns(function: Function) -> Iterator[ast.Return]:
+    """Yield the ``return`` statements of ``function`` that return None."""
+    for node in _own_nodes(function.body):
+        if isinstance(node, ast.Return) and (
+            node.value is None
+            or (isinstance(node.value, ast.Constant) and node.value.value is None)
+        ):
+            yield node
+
+
+def reaches_end(function: Function) -> bool:
+    """Return whether ``function`` may reach the end of its body, and so return None.
+
+    A generator is never said to. What calls do is not known: a method that always raises counts as
+    one that returns.
+    """
+    if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in _own_nodes(function.body)):
+        return False
+    return _continues(function.body)
+
+
+def endless_loops(function: Function) -> Iterator[ast.While]:
+    """Yield the loops that never let anything else run: they neither end nor wait.
+
+    A loop that waits for a request to cancel is one of them if it does not wait for anything else:
+    the request cannot be handled meanwhile.
+    """
+    for node in _own_nodes(function.body):
+        if isinstance(node, ast.While) and _never_ends(node):
+            yield node
+
+
+def _never_ends(loop: ast.While) -> bool:
+    inside = [loop.test, *_own_nodes(loop.body)]
+    if any(isinstance(node, _WAITS) for node in (*inside, *ast.walk(loop.test))):
+        return False
+    if any(isinstance(node, _LEAVES) or _called(node) in _ENDS_OR_WAITS for node in inside):
+        return False
+    return _is_true(loop.test) or _waits_for_cancel(loop.test) or _is_empty(loop.body)
+
+
+def _waits_for_cancel(test: ast.expr) -> bool:
+    return any(
+        isinstance(node, ast.Attribute) and node.attr == "is_cancel_requested"
+        for node in ast.walk(test)
+    )
+
+
+def _is_empty(body: Sequence[ast.stmt]) -> bool:
+    """Return whether a body does nothing, so that only other code can end its loop."""
+    return all(
+        isinstance(item, ast.Pass)
+        or (isinstance(item, ast.Expr) and isinstance(item.value, ast.Constant))
+        for item in body
+    )
+
+
+def _continues(body: Sequence[ast.stmt]) -> bool:
+    """Return whether the statement after ``body`` may be reached."""
+    return not any(_leaves(statement) for statement in body)
+
+
+def _leaves(statement: ast.stmt) -> bool:
+    """Return whether the statement after ``statement`` is never reached."""
+    match statement:
+        case ast.Return() | ast.Raise() | ast.Continue() | ast.Break():
+            found = True
+        case ast.If(body=body, orelse=orelse):
+            found = not _continues(body) and bool(orelse) and not _continues(orelse)
+        case ast.While(test=test, body=body):
+            found = _is_true(test) and not _has_break(body)
+        case ast.With(body=body) | ast.AsyncWith(body=body):
+            found = not _continues(body)
+        case ast.Match(cases=cases):
+            found = _is_exhaustive(cases) and not any(_continues(case.body) for case in cases)
+        case ast.Try() | ast.TryStar():
+            found = _try_leaves(statement)
+        case ast.Expr():
+            found = _called(statement.value) in _EXITS
+        case ast.Assert(test=ast.Constant(value=False)):
+            found = True
+        case _:
+            found = False
+    return found
+
+
+def _try_leaves(statement: ast.Try | ast.TryStar) -> bool:
+    if not _continues(statement.finalbody):
+        return True
+    body = [*statement.body, *statement.orelse]
+    handlers = (handler.body for handler in statement.handlers)
+    return not _continues(body) and not any(_continues(handler) for handler in handlers)
+
+
+def _is_exhaustive(cases: Sequence[ast.match_case]) -> bool:
+    last = cases[-1]
+    is_wildcard = isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None
+    return is_wildcard and last.guard is None
+
+
+def _called(node: ast.AST) -> str:
+    """Return the last part of the name of the function that ``node`` calls, or ""."""
+    if not isinstance(node, ast.Call):
+        return ""
+    return str(getattr(node.func, "attr", getattr(node.func, "id", "")))
+
+
+def _is_true(test: ast.expr) -> bool:
+    return isinstance(test, ast.Constant) and bool(test.value)
+
+
+def _has_break(body: Sequence[ast.stmt]) -> bool:
+    """Return whether a ``break`` in ``body`` leaves the loop that it is the body of."""
+    pending: list[ast.AST] = list(body)
+    while pending:
+        node = pending.pop()
+        if isinstance(node, ast.Break):
+            return True
+        if isinstance(node, ast.For | ast.AsyncFor | ast.While):
+            pending.extend(node.orelse)
+        elif not isinstance(node, _SCOPES):
+            pending.extend(ast.iter_child_nodes(node))
+    return False
+
+
+def _own_nodes(body: Sequence[ast.stmt]) -> Iterator[ast.AST]:
+    """Yield the nodes of ``body`` in source order, without nested functions and classes."""
+    pending: list[ast.AST] = list(reversed(body))
+    while pending:
+        node = pending.pop()
+        yield node
+        if not isinstance(node, _SCOPES):
+            pending.extend(reversed(list(ast.iter_child_nodes(node))))

@@ -1,0 +1,141 @@
+"""Names that are used in a Python file but defined nowhere."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+_MODULE_NAMES = frozenset(
+    {*dir(builtins), "__file__", "__path__", "__annotations__", "__builtins__", "__module__"}
+    | {"__qualname__", "__class__", "WindowsError"}
+)
+#: Functions with which a name can be defined without a statement that shows it.
+_DYNAMIC = frozenset({"exec", "eval", "globals", "locals", "vars"})
+_COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+
+
+@dataclass(slots=True)
+class _Scope:
+    names: set[str] = field(default_factory=set)
+    is_class: bool = False
+
+
+def undefined_names(tree: ast.Module) -> Iterator[tuple[ast.Name, frozenset[str]]]:
+    """Yield each undefined name where it is first used, with the names that are defined there.
+
+    Annotations are left out: they need not be evaluated. So is a file with names that its syntax
+    does not show, such as those of ``from module import *``.
+    """
+    if any(_is_dynamic(node) for node in ast.walk(tree)):
+        return
+    module = _Scope(set(_MODULE_NAMES) | set(_defined(tree.body)) | set(_globals(tree)))
+    seen: set[str] = set()
+    for name, known in _uses(tree.body, (module,)):
+        if name.id not in seen:
+            seen.add(name.id)
+            yield name, known
+
+
+def _uses(
+    body: Iterable[ast.AST], outer: tuple[_Scope, ...]
+) -> Iterator[tuple[ast.Name, frozenset[str]]]:
+    """Yield the undefined names in ``body``, which sees the names of the scopes ``outer``."""
+    pending = [(node, outer) for node in body][::-1]
+    while pending:
+        node, scopes = pending.pop()
+        if isinstance(node, ast.Name):
+            if isinstance(node.ctx, ast.Load) and not any(node.id in one.names for one in scopes):
+                yield node, frozenset().union(*(scope.names for scope in scopes))
+            continue
+        pending.extend(list(_children(node, scopes))[::-1])
+
+
+def _children(
+    node: ast.AST, scopes: tuple[_Scope, ...]
+) -> Iterator[tuple[ast.AST, tuple[_Scope, ...]]]:
+    """Yield the parts of a node that are evaluated, with the scopes that each of them sees."""
+    visible = tuple(scope for scope in scopes if not scope.is_class)  # methods do not see classes
+    match node:
+        case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.Lambda():
+            outside: list[ast.AST] = [*node.args.defaults, *filter(None, node.args.kw_defaults)]
+            outside += getattr(node, "decorator_list", [])
+            body = node.body if isinstance(node.body, list) else [node.body]
+            inside = (*visible, _Scope({*_arguments(node.args), *_defined(body), *_types(node)}))
+            yield from ((item, scopes) for item in outside)
+            yield from ((item, inside) for item in body)
+        case ast.ClassDef():
+            head = [*node.decorator_list, *node.bases, *(item.value for item in node.keywords)]
+            within = (*visible, _Scope(set(_types(node))))
+            yield from ((item, (*within, *scopes)) for item in head)
+            inside = (*within, _Scope(set(_defined(node.body)), is_class=True))
+            yield from ((item, inside) for item in node.body)
+        case ast.ListComp() | ast.SetComp() | ast.DictComp() | ast.GeneratorExp():
+            names = {name for item in node.generators for name in _stored(item.target)}
+            # The first iterable sees a class around it; for simplicity, all of it does.
+            inside = (*scopes, _Scope(names))
+            yield from ((item, inside) for item in ast.iter_child_nodes(node))
+        case ast.AnnAssign():
+            yield node.target, scopes
+            if node.value is not None:
+                yield node.value, scopes
+        case _:
+            yield from ((item, scopes) for item in ast.iter_child_nodes(node))
+
+
+def _defined(body: Iterable[ast.AST]) -> Iterator[str]:
+    """Yield the names that ``body`` binds in its own scope."""
+    pending = list(body)
+    while pending:
+        node = pending.pop()
+        match node:
+            case ast.Name(id=name, ctx=ast.Store() | ast.Del()):
+                yield name
+            case (
+                ast.FunctionDef(name=name)
+                | ast.AsyncFunctionDef(name=name)
+                | ast.ClassDef(name=name)
+            ):
+                yield name
+                continue
+            case ast.alias(name=name, asname=other):
+                yield other or name.partition(".")[0]
+            case ast.ExceptHandler(name=str() as name):
+                yield name
+            case ast.MatchAs(name=str() as name) | ast.MatchStar(name=str() as name):
+                yield name
+            case ast.MatchMapping(rest=str() as name):
+                yield name
+            case ast.Global(names=names) | ast.Nonlocal(names=names):
+                yield from names
+        if isinstance(node, _COMPREHENSIONS):  # only ':=' binds a name outside
+            inner = (part for part in ast.walk(node) if isinstance(part, ast.NamedExpr))
+            yield from (part.target.id for part in inner)
+        elif not isinstance(node, ast.Lambda):
+            pending.extend(ast.iter_child_nodes(node))
+
+
+def _globals(tree: ast.Module) -> Iterator[str]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Global):
+            yield from node.names
+
+
+def _stored(target: ast.expr) -> Iterator[str]:
+    yield from (node.id for node in ast.walk(target) if isinstance(node, ast.Name))
+
+
+def _arguments(arguments: ast.arguments) -> Iterator[str]:
+    yield from (node.arg for node in ast.iter_child_nodes(arguments) if isinstance(node, ast.arg))
+
+
+def _types(node: ast.AST) -> Iterator[str]:
+    """Yield the type parameters of a function or a class, which Python 3.12 introduced."""
+    yield from (item.name for item in getattr(node, "type_params", ()))
+
+
+def _is_dynamic(node: ast.AST) -> bool:
+    if isinstance(node, ast.alias):
+        return node.name == "*"
+    return isinstance(node, ast.Name) and node.id in _DYNAMIC

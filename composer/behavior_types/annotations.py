@@ -1,0 +1,72 @@
+"""The types that annotations name."""
+
+from __future__ import annotations
+
+import ast
+import warnings
+
+from composer.behavior_source import Module
+from composer.behavior_types.names import api_class, interface_name, own_name
+from composer.behavior_types.values import NONE, ApiValue, Value, join
+from composer.field_types import ANYTHING, BOOL, INTEGER, NUMBER, STRING
+from composer.interfaces import Action, Interfaces, Message, Service
+from composer.model import Node, PortKind
+
+_BUILTINS: dict[str, Value] = {"str": STRING, "int": INTEGER, "float": NUMBER, "bool": BOOL}
+_LONGEST_TEXT = 200
+#: The kind of port that a value of the API belongs to.
+_KINDS = {
+    "Goal": PortKind.ACTION_SERVER,
+    "SentGoal": PortKind.ACTION_CLIENT,
+    "GoalResult": PortKind.ACTION_CLIENT,
+}
+
+
+def annotated(annotation: ast.expr, home: Module, node: Node, interfaces: Interfaces) -> Value:
+    """Return the type that an annotation in ``home`` names, ANYTHING if it is unknown."""
+    match annotation:
+        case ast.Constant(value=None):
+            return NONE
+        case ast.Constant(value=str() as text):
+            parsed = _parsed(text)
+            return annotated(parsed, home, node, interfaces) if parsed is not None else ANYTHING
+        case ast.BinOp(left=first, op=ast.BitOr(), right=second):
+            return join(
+                annotated(first, home, node, interfaces), annotated(second, home, node, interfaces)
+            )
+        case ast.Subscript(value=ast.Name(id="Optional"), slice=inner):
+            return annotated(inner, home, node, interfaces)
+        case ast.Name(id=name) if name in _BUILTINS and name not in home.imports:
+            return _BUILTINS[name]
+        case ast.Name() | ast.Attribute():
+            return _named(own_name(annotation, home), node, interfaces)
+        case _:
+            return ANYTHING
+
+
+def _parsed(text: str) -> ast.expr | None:
+    if len(text) > _LONGEST_TEXT:
+        return None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return ast.parse(text, mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return None
+
+
+def _named(full: str, node: Node, interfaces: Interfaces) -> Value:
+    api = api_class(full)
+    if api is not None:
+        ports = node.ports_of(_KINDS[api]) if api in _KINDS else ()
+        return ApiValue(api, ports[0] if len(ports) == 1 else None)
+    name, rest = interface_name(full)
+    match interfaces.find(name) if name else None:
+        case Message() as message if not rest:
+            return message
+        case Service() as service if rest in {"Request", "Response"}:
+            return service.request if rest == "Request" else service.response
+        case Action() as action if rest in {"Goal", "Result", "Feedback"}:
+            return {"Goal": action.goal, "Result": action.result, "Feedback": action.feedback}[rest]
+        case _:
+            return ANYTHING

@@ -1,0 +1,126 @@
+"""What the names and attributes of a function are bound to, in no order."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from enum import Enum
+
+from composer.behavior_source import Function
+
+
+class How(Enum):
+    """How an expression determines the type of a name."""
+
+    VALUE = "value"  # the name has this value
+    ELEMENT = "element"  # the name is an element of this value
+    ANNOTATION = "annotation"  # the expression is the annotation
+
+
+@dataclass(frozen=True, slots=True)
+class Binding:
+    """One place that binds a name; an ``expression`` of None may be anything."""
+
+    expression: ast.expr | None = None
+    how: How = How.VALUE
+
+
+@dataclass(slots=True)
+class Bindings:
+    """The bindings of the names in a function, and of the attributes of its first argument."""
+
+    names: dict[str, list[Binding]] = field(default_factory=dict)
+    attributes: dict[str, list[Binding]] = field(default_factory=dict)
+    augmented: set[str] = field(default_factory=set)  # attributes changed by '+=' and the like
+    receiver: str | None = None
+
+    def bind(self, target: ast.AST, expression: ast.expr | None, how: How = How.VALUE) -> None:
+        """Record that ``target`` is bound to ``expression``."""
+        match target:
+            case ast.Name(id=name):
+                self.names.setdefault(name, []).append(Binding(expression, how))
+            case ast.Attribute(value=ast.Name(id=name), attr=attribute) if name == self.receiver:
+                self.attributes.setdefault(attribute, []).append(Binding(expression, how))
+            case ast.Tuple(elts=targets) | ast.List(elts=targets):
+                values = _elements(expression, len(targets)) if how is How.VALUE else None
+                for index, item in enumerate(targets):
+                    self.bind(item, values[index] if values is not None else None)
+            case ast.Starred(value=value):
+                self.bind(value, None)
+
+    def name(self, name: str | None) -> None:
+        """Record that ``name`` is bound to something unknown."""
+        if name is not None:
+            self.names.setdefault(name, []).append(Binding())
+
+
+def bindings_of(function: Function, *, is_method: bool = True) -> Bindings:
+    """Return the bindings in ``function`` and in the functions within it.
+
+    If ``is_method``, the first argument is the behavior.
+    """
+    arguments = (*function.args.posonlyargs, *function.args.args)
+    found = Bindings(receiver=arguments[0].arg if arguments and is_method else None)
+    for argument in arguments[1:] if is_method else arguments:
+        found.bind(ast.Name(argument.arg), argument.annotation, How.ANNOTATION)
+    for argument in function.args.kwonlyargs:
+        found.bind(ast.Name(argument.arg), argument.annotation, How.ANNOTATION)
+    for other in (function.args.vararg, function.args.kwarg):
+        found.name(other.arg if other is not None else None)
+    for node in nodes_of(function):
+        _bind(node, found)
+    return found
+
+
+def nodes_of(function: Function) -> Iterator[ast.AST]:
+    """Yield the nodes in the body of ``function`` in source order, without nested classes."""
+    pending: list[ast.AST] = list(reversed(function.body))
+    while pending:
+        node = pending.pop()
+        yield node
+        if not isinstance(node, ast.ClassDef):
+            pending.extend(reversed(list(ast.iter_child_nodes(node))))
+
+
+def _bind(node: ast.AST, found: Bindings) -> None:
+    match node:
+        case ast.Assign(targets=targets, value=value):
+            for target in targets:
+                found.bind(target, value)
+        case ast.AnnAssign(target=target, annotation=annotation):
+            found.bind(target, annotation, How.ANNOTATION)
+        case ast.NamedExpr(target=target, value=value):
+            found.bind(target, value)
+        case ast.AugAssign(target=ast.Attribute(attr=attribute)):
+            found.augmented.add(attribute)  # does not create it
+        case ast.AugAssign(target=target):
+            found.bind(target, None)
+        case ast.For() | ast.AsyncFor() | ast.comprehension():
+            is_async = isinstance(node, ast.AsyncFor) or bool(getattr(node, "is_async", False))
+            found.bind(node.target, None if is_async else node.iter, How.ELEMENT)
+        case ast.withitem(optional_vars=ast.expr() as target):
+            found.bind(target, None)
+        case ast.ExceptHandler(name=name) | ast.MatchAs(name=name) | ast.MatchStar(name=name):
+            found.name(name)
+        case ast.MatchMapping(rest=name):
+            found.name(name)
+        case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
+            found.name(name)
+        case ast.arg(arg=name):  # of a nested function or a lambda
+            found.name(name)
+        case ast.alias(name=name, asname=other):
+            found.name(other or name.partition(".")[0])
+        case ast.Global(names=names) | ast.Nonlocal(names=names):
+            for name in names:
+                found.name(name)
+        case _:
+            pass
+
+
+def _elements(expression: ast.expr | None, count: int) -> list[ast.expr] | None:
+    if not isinstance(expression, ast.Tuple | ast.List) or len(expression.elts) != count:
+        return None
+    if any(isinstance(item, ast.Starred) for item in expression.elts):
+        return None
+    return expression.elts

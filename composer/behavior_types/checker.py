@@ -1,0 +1,263 @@
+"""Checks the methods of a behavior against its node and the definitions of messages."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from composer.behavior_source import BehaviorSource, Function
+from composer.behavior_source.receivers import lacks_self
+from composer.behavior_source.spans import attribute_span, span_of, start_span
+from composer.behavior_types.attributes import attribute_problem
+from composer.behavior_types.bindings import nodes_of
+from composer.behavior_types.fitting import value_problem
+from composer.behavior_types.inference import BehaviorTypes, FunctionTypes, handler_arguments
+from composer.behavior_types.problems import CodeProblem, Kind
+from composer.behavior_types.stored_calls import used_without_await
+from composer.behavior_types.values import (
+    ApiMethod,
+    ApiValue,
+    InterfaceClass,
+    Parameters,
+    Pending,
+    Ports,
+    Value,
+)
+from composer.diagnostics import suggestion
+from composer.interfaces import Action, Interfaces, Message, Service
+from composer.model import Node
+from composer.source import Span
+
+#: Attributes of awaitables that code may use instead of awaiting them.
+_OF_AWAITABLES = frozenset({"add_done_callback", "cancel", "close", "done", "exception", "send"})
+
+
+def behavior_problems(
+    node: Node, source: BehaviorSource, interfaces: Interfaces
+) -> Iterator[CodeProblem]:
+    """Yield the problems in the behavior of a node, in methods of its own project."""
+    types = BehaviorTypes(node, source, interfaces)
+    for checker in _checkers(types, source):
+        try:
+            yield from list(checker.problems())
+        except RecursionError:  # too deeply nested to be checked
+            continue
+
+
+def _checkers(types: BehaviorTypes, source: BehaviorSource) -> Iterator[_FunctionChecker]:
+    own = {id(known) for _, known in source.own_classes}
+    arguments = handler_arguments(types.node, types.interfaces)
+    for home, known in source.own_classes:
+        for method in known.methods:
+            scope = types.scope(method, home)
+            given = arguments.get(method.name)
+            if scope is None or method.node is None:
+                continue
+            if not lacks_self(method.node, len(given) if given is not None else None):
+                yield _FunctionChecker(types, scope, method.node, given or ())
+    for home in source.own_modules:
+        for item in home.tree.body:
+            if isinstance(item, Function):
+                yield _FunctionChecker(types, types.function(item, home, is_method=False), item)
+        for known in home.classes.values():
+            for method in known.methods if id(known) not in own else ():
+                if method.node is not None:
+                    scope = types.function(method.node, home, is_method=True)
+                    yield _FunctionChecker(types, scope, method.node)
+
+
+@dataclass(frozen=True, slots=True)
+class _FunctionChecker:
+    types: BehaviorTypes
+    scope: FunctionTypes
+    function: Function
+    given: tuple[Value, ...] = ()  # what a handler gets, without self
+
+    def problems(self) -> Iterator[CodeProblem]:
+        """Yield the problems of the function."""
+        yield from self._annotations()
+        for pending in used_without_await(self.function, self.scope):
+            yield self._missing_await(pending)
+        for node in nodes_of(self.function):
+            match node:
+                case ast.Attribute():
+                    yield from self._attribute(node)
+                case ast.Subscript(value=owner, slice=ast.Constant(value=str() as name)):
+                    yield from self._key(owner, name, node)
+                case ast.Call():
+                    yield from self._call(node)
+                case ast.Assign(targets=[target], value=value):
+                    yield from self._assignment(target, value)
+            yield from self._unawaited(node)
+
+    # --- attributes
+
+    def _attribute(self, node: ast.Attribute) -> Iterator[CodeProblem]:
+        owner = self.scope.type_of(node.value)
+        if isinstance(owner, Pending):
+            if node.attr not in _OF_AWAITABLES:
+                yield self._missing_await(owner)
+            return
+        found = attribute_problem(self.types, owner, node.attr)
+        if found is not None:
+            kind, message, hint = found
+            span = attribute_span(node, self.scope.home.source)
+            if kind is Kind.VALUE:  # the value is wrong where it was stored
+                span = self._span(self._origin(node.value))
+            yield CodeProblem(kind, message, span, hint)
+
+    def _origin(self, node: ast.expr) -> ast.expr:
+        """Return the expression that a name was assigned, if there is exactly one."""
+        name = node.id if isinstance(node, ast.Name) else ""
+        bindings = self.scope.bindings.names.get(name, [])
+        only = bindings[0].expression if len(bindings) == 1 else None
+        return only if only is not None else node
+
+    def _key(self, owner: ast.expr, name: str, node: ast.Subscript) -> Iterator[CodeProblem]:
+        type_ = self.scope.type_of(owner)
+        if isinstance(type_, Ports | Parameters):
+            found = attribute_problem(self.types, type_, name)
+            if found is not None:
+                yield CodeProblem(found[0], found[1], self._span(node.slice), found[2])
+
+    # --- calls
+
+    def _call(self, node: ast.Call) -> Iterator[CodeProblem]:
+        match self.scope.type_of(node.func):
+            case InterfaceClass(definition=Message() as message):
+                yield from self._constructor(node, message)
+            case InterfaceClass(definition=Service() | Action() as definition):
+                parts = "Request" if isinstance(definition, Service) else "Goal"
+                name = definition.name.rpartition("/")[2]
+                problem = f"{definition.name} cannot be created"
+                hint = f"create {name}.{parts}()"
+                yield CodeProblem(Kind.VALUE, problem, self._span(node.func), hint)
+            case ApiMethod(owner=owner, member=member):
+                expected = self._expected(owner, member.name)
+                if expected is not None and node.args:
+                    yield from self._value(node.args[0], expected)
+
+    def _constructor(self, node: ast.Call, message: Message) -> Iterator[CodeProblem]:
+        for argument in node.args:
+            if not isinstance(argument, ast.Starred):
+                problem = f"{message.name} takes keyword arguments only"
+                fields = ", ".join(f"{name}=..." for name in message.field_names[:3])
+                hint = f"fields: {fields}" if fields else None
+                yield CodeProblem(Kind.VALUE, problem, self._span(argument), hint)
+                return
+        for keyword in node.keywords:
+            if keyword.arg is None:
+                continue
+            field = message.field(keyword.arg)
+            if field is not None:
+                yield from self._value(keyword.value, field.type)
+            elif keyword.arg != "check_fields":
+                problem = f"{message.name} has no field '{keyword.arg}'"
+                hint = suggestion(keyword.arg, message.field_names)
+                span = start_span(keyword, len(keyword.arg), self.scope.home.source)
+                yield CodeProblem(Kind.FIELD, problem, span, hint)
+
+    def _expected(self, owner: ApiValue, name: str) -> Message | None:
+        """Return the message that the first argument of a method of the API must be."""
+        port = owner.port
+        definition = self.types.interfaces.find(port.interface.value) if port else None
+        match name, definition:
+            case "publish", Message() as message:
+                return message
+            case "call", Service() as service:
+                return service.request
+            case "send_goal", Action() as action:
+                return action.goal
+            case "publish_feedback", Action() as action:
+                return action.feedback
+            case _:
+                return None
+
+    # --- values
+
+    def _assignment(self, target: ast.expr, value: ast.expr) -> Iterator[CodeProblem]:
+        if not isinstance(target, ast.Attribute):
+            if isinstance(target, ast.Tuple) and isinstance(self.scope.type_of(value), Pending):
+                yield from self._pending(value)
+            return
+        owner = self.scope.type_of(target.value)
+        message = owner if isinstance(owner, Message) else None
+        field = message.field(target.attr) if message is not None else None
+        if field is not None:
+            yield from self._value(value, field.type)
+
+    def _value(self, node: ast.expr, expected: Value) -> Iterator[CodeProblem]:
+        found = self.scope.type_of(node)
+        if isinstance(found, Pending):
+            yield self._missing_await(found)
+            return
+        problem = value_problem(node, found, expected, self.types.interfaces)
+        if problem is not None:
+            yield CodeProblem(Kind.VALUE, problem[0], self._span(node), problem[1])
+
+    # --- awaitables
+
+    def _unawaited(self, node: ast.AST) -> Iterator[CodeProblem]:
+        match node:
+            case ast.Expr(value=value):
+                yield from self._pending(value)
+            case ast.If(test=test) | ast.While(test=test) | ast.IfExp(test=test):
+                yield from self._pending_call(test)
+            case ast.UnaryOp(operand=operand):
+                yield from self._pending_call(operand)
+            case ast.BoolOp(values=values):
+                for value in values:
+                    yield from self._pending_call(value)
+            case ast.BinOp(left=left, right=right):
+                yield from self._pending(left)
+                yield from self._pending(right)
+            case ast.Compare(left=left, comparators=others):
+                for value in (left, *others):
+                    yield from self._pending_call(value)
+            case ast.Subscript(value=value) | ast.FormattedValue(value=value):
+                yield from self._pending(value)
+            case ast.For(iter=iterated):
+                yield from self._pending(iterated)
+            case ast.Return(value=ast.Call() as value):
+                if isinstance(self.function, ast.AsyncFunctionDef):
+                    yield from self._pending(value)
+            case _:
+                pass
+
+    def _pending(self, node: ast.expr) -> Iterator[CodeProblem]:
+        found = self.scope.type_of(node)
+        if isinstance(found, Pending):
+            yield self._missing_await(found)
+
+    def _pending_call(self, node: ast.expr) -> Iterator[CodeProblem]:
+        """Check a call; a name in this place may well be an awaitable that was stored."""
+        if isinstance(node, ast.Call):
+            yield from self._pending(node)
+
+    def _missing_await(self, pending: Pending) -> CodeProblem:
+        is_async = isinstance(self.function, ast.AsyncFunctionDef)
+        hint = "write 'await' before it"
+        if not is_async:
+            hint += f", and 'async def {self.function.name}'"
+        message = f"'{pending.name}' is asynchronous and is not awaited"
+        return CodeProblem(Kind.AWAIT, message, self._span(pending.call.func), hint)
+
+    # --- annotations
+
+    def _annotations(self) -> Iterator[CodeProblem]:
+        arguments = self.function.args
+        positional = (*arguments.posonlyargs, *arguments.args)[1:]
+        for argument, type_ in zip(positional, self.given, strict=False):
+            if argument.annotation is None or not isinstance(type_, Message):
+                continue
+            found = self.scope.name(argument.arg)
+            if isinstance(found, Message) and found != type_:
+                yield CodeProblem(
+                    Kind.ANNOTATION,
+                    f"'{self.function.name}' gets a {type_.name}, not a {found.name}",
+                    self._span(argument.annotation),
+                )
+
+    def _span(self, node: ast.expr) -> Span:
+        return span_of(node, self.scope.home.source)

@@ -1,0 +1,300 @@
+"""Checks the imports of the files of a behavior."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from composer.behavior_source import Module
+from composer.behavior_source.library import is_standard, standard_names
+from composer.behavior_source.method_body import dotted
+from composer.behavior_source.modules import (
+    Unreadable,
+    is_installed,
+    module_file,
+    relative_module_file,
+)
+from composer.behavior_source.spans import attribute_span, start_span
+from composer.behavior_source.syntax import read_module
+from composer.behavior_types.api import API_NAMES
+from composer.behavior_types.problems import CodeProblem, Kind
+from composer.diagnostics import nearest, suggestion
+from composer.interfaces import Interfaces
+from composer.project import Project
+from composer.source import Span, shown_path
+
+_API = "composer.behavior"
+_FOLDERS = ("msg", "srv", "action")
+#: Packages that behaviors often import, for hints.
+_USUAL = ("composer", "cv2", "numpy", "rclpy", "tf2_ros")
+_IMPORT_ERRORS = frozenset({"ImportError", "ModuleNotFoundError", "Exception", "BaseException"})
+
+
+@dataclass(frozen=True, slots=True)
+class _Missing:
+    """A module or a name that cannot be imported; ``part`` is the misspelled part of its name."""
+
+    message: str
+    hint: str | None = None
+    part: str = ""
+    meant: str | None = None
+    kind: Kind = Kind.IMPORT
+
+
+def import_problems(
+    module: Module, folder: Path, interfaces: Interfaces
+) -> Iterator[tuple[CodeProblem, str | None]]:
+    """Yield the problems of the imports in a file, each with the name that is probably meant."""
+    checker = _Imports(module, folder, interfaces)
+    for node in _unguarded(module.tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                found = checker.missing_module(alias.name)
+                if found is not None:
+                    meant = found.meant if alias.asname is None else None
+                    yield _problem(found, alias.name, alias, module), meant
+        elif isinstance(node, ast.ImportFrom):
+            yield from checker.imported_from(node)
+    yield from ((problem, None) for problem in _attributes(module))
+
+
+@dataclass(frozen=True, slots=True)
+class _Imports:
+    module: Module
+    folder: Path
+    interfaces: Interfaces
+
+    def imported_from(self, node: ast.ImportFrom) -> Iterator[tuple[CodeProblem, str | None]]:
+        """Check a ``from`` import."""
+        if node.level:
+            yield from self._relative(node)
+            return
+        name = node.module or ""
+        found = self.missing_module(name)
+        if found is not None:
+            yield _problem(found, name, node, self.module, offset=len("from ")), None
+            return
+        names = self._names(name)
+        for alias in node.names:
+            if names is None or alias.name == "*" or self._has(name, names, alias.name):
+                continue
+            missing = _Missing(
+                f"module '{name}' has no '{alias.name}'", suggestion(alias.name, names)
+            )
+            close = nearest(alias.name, names)
+            yield _problem(missing, alias.name, alias, self.module), close
+
+    def missing_module(self, name: str) -> _Missing | None:
+        """Return why a module cannot be imported, or should not be."""
+        top, _, rest = name.partition(".")
+        if self._local(name) is not None:
+            return None
+        if top == "composer":
+            return _of_composer(name)
+        if top in self.interfaces.packages():
+            return self._package_part(top, rest)
+        if is_standard(top):
+            try:
+                standard_names(name)
+            except LookupError:
+                parent = name.rpartition(".")[0]
+                names = standard_names(parent) if is_standard(parent) else None
+                last = name.rpartition(".")[2]
+                hint = suggestion(last, names) if names and nearest(last, names) else None
+                return _Missing(f"no module named '{name}'", hint, last)
+            return None
+        if is_installed(top):
+            return None
+        known = {*sys.stdlib_module_names, *self.interfaces.packages(), *self._siblings(), *_USUAL}
+        close = nearest(top, (other for other in known if other[0] != "_"))
+        if close is None:
+            hint = "install it, or correct the name"
+            message = f"no module named '{top}' is installed"
+            return _Missing(message, hint, top, kind=Kind.NOT_INSTALLED)
+        return _Missing(f"no module named '{top}'", f"did you mean '{close}'?", top, close)
+
+    def _package_part(self, package: str, rest: str) -> _Missing | None:
+        if rest.partition(".")[0] in ("", *_FOLDERS) or is_installed(package):
+            first = rest.partition(".")[0]
+            if first in ("", *_FOLDERS) or module_file(f"{package}.{first}", *self._place):
+                return None
+        hint = suggestion(rest, [item for item in _FOLDERS if self._in_folder(package, item)])
+        return _Missing(f"no module named '{package}.{rest}'", hint, rest)
+
+    @property
+    def _place(self) -> tuple[Path, Project]:
+        return self.folder, Project.at(self.folder)
+
+    def _local(self, name: str) -> Path | None:
+        """Return the file of a module next to the importing one, or in the project."""
+        homes = (self.module.path.parent, self.folder)
+        for home in dict.fromkeys(homes):
+            try:
+                found = module_file(name, home, Project.at(home))
+            except Unreadable:
+                return self.module.path
+            if found is not None and _is_in_project(found, home):
+                return found
+        return None
+
+    def _siblings(self) -> Iterator[str]:
+        for folder in (self.module.path.parent, self.folder):
+            yield from (path.stem for path in sorted(folder.glob("*.py"))[:200])
+
+    def _in_folder(self, package: str, folder: str) -> tuple[str, ...]:
+        prefix = f"{package}/{folder}/"
+        names = self.interfaces.names(folder)
+        return tuple(name.removeprefix(prefix) for name in names if name.startswith(prefix))
+
+    def _names(self, module: str) -> frozenset[str] | None:
+        """Return the names that can be imported from a module; None if they are not known."""
+        local = self._local(module)
+        if local is not None:
+            return _names_in(local)
+        if module == _API:
+            return API_NAMES | {"Any"}
+        package, _, folder = module.partition(".")
+        if package in self.interfaces.packages():
+            return frozenset(self._in_folder(package, folder)) if folder in _FOLDERS else None
+        return standard_names(module) if is_standard(module) else None
+
+    def _has(self, module: str, names: frozenset[str], name: str) -> bool:
+        if name in names or (name.startswith("__") and name.endswith("__")):
+            return True
+        if module.partition(".")[0] in self.interfaces.packages():
+            # Python also has Trigger_Request, and private modules.
+            return name.startswith("_") or name.partition("_")[0] in names
+        return self._local(f"{module}.{name}") is not None
+
+    def _relative(self, node: ast.ImportFrom) -> Iterator[tuple[CodeProblem, str | None]]:
+        path = relative_module_file(node.module or "", node.level, self.module.path)
+        name = "." * node.level + (node.module or "")
+        if path is None and node.module:
+            missing = _Missing(f"no module named '{name}'")
+            yield _problem(missing, name, node, self.module, offset=len("from ")), None
+
+
+def _of_composer(name: str) -> _Missing | None:
+    if name in ("composer", _API):
+        return None
+    close = nearest(name, [_API])
+    path = module_file(name, Path(__file__).parent.parent.parent, Project.at(Path(__file__).parent))
+    if path is None:
+        hint = f"did you mean '{_API}'?" if close else f"behaviors import from '{_API}'"
+        return _Missing(f"no module named '{name}'", hint, name)
+    return _Missing(
+        f"'{name}' is internal to the composer and may change without notice",
+        f"behaviors import from '{_API}' only",
+        name,
+        kind=Kind.INTERNAL,
+    )
+
+
+def _is_in_project(path: Path, home: Path) -> bool:
+    if {"site-packages", "dist-packages"}.intersection(path.parts):
+        return False
+    return path.is_relative_to(home) or any(
+        path.is_relative_to(folder) for folder in Project.at(home).node_folders
+    )
+
+
+def _names_in(path: Path) -> frozenset[str] | None:
+    """Return the names that a file of the project defines; None if it may have others."""
+    try:
+        module = read_module(path, shown_path(path))
+    except Unreadable:
+        return None
+    if module.dynamic:
+        return None
+    functions = (
+        item.name
+        for item in ast.walk(module.tree)
+        if isinstance(item, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
+    )
+    stored = (
+        item.id
+        for item in ast.walk(module.tree)
+        if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Store)
+    )
+    modules = {name.partition(".")[0] for name in module.imports}
+    return frozenset({*functions, *stored, *modules, *module.imports})
+
+
+def _unguarded(tree: ast.Module) -> Iterator[ast.AST]:
+    """Yield the nodes of a file, except where a ``try`` handles a failing import."""
+    pending: list[ast.AST] = [tree]
+    while pending:
+        node = pending.pop()
+        yield node
+        if isinstance(node, ast.Try) and any(_handles_imports(item) for item in node.handlers):
+            pending.extend([*node.handlers, *node.orelse, *node.finalbody][::-1])
+        elif isinstance(node, ast.If) and _is_type_checking(node.test):
+            pending.extend(node.orelse[::-1])
+        else:
+            pending.extend(list(ast.iter_child_nodes(node))[::-1])
+
+
+def _handles_imports(handler: ast.ExceptHandler) -> bool:
+    if handler.type is None:
+        return True
+    names = (node.id for node in ast.walk(handler.type) if isinstance(node, ast.Name))
+    return not _IMPORT_ERRORS.isdisjoint(names)
+
+
+def _is_type_checking(test: ast.expr) -> bool:
+    return dotted(test).endswith("TYPE_CHECKING")
+
+
+def _attributes(module: Module) -> Iterator[CodeProblem]:
+    """Check the attributes of the modules of the standard library that a file imports."""
+    aliases = {
+        bound: imported.module
+        for bound, imported in module.imports.items()
+        if not imported.name and "." not in bound and is_standard(imported.module)
+    }
+    stored = {
+        node.id
+        for node in ast.walk(module.tree)
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)
+    }
+    arguments = {node.arg for node in ast.walk(module.tree) if isinstance(node, ast.arg)}
+    for node in ast.walk(module.tree):
+        if not isinstance(node, ast.Attribute) or not isinstance(node.value, ast.Name):
+            continue
+        name = node.value.id
+        if name not in aliases or name in stored or name in arguments:
+            continue
+        names = _known_names(aliases[name])
+        if names is not None and node.attr not in names and not node.attr.startswith("__"):
+            message = f"module '{aliases[name]}' has no '{node.attr}'"
+            hint = suggestion(node.attr, names) if nearest(node.attr, names) else None
+            span = attribute_span(node, module.source)
+            yield CodeProblem(Kind.IMPORT, message, span, hint)
+
+
+def _known_names(module: str) -> frozenset[str] | None:
+    try:
+        return standard_names(module)
+    except LookupError:
+        return None
+
+
+def _problem(
+    missing: _Missing,
+    name: str,
+    node: ast.alias | ast.ImportFrom,
+    module: Module,
+    *,
+    offset: int = 0,
+) -> CodeProblem:
+    start = start_span(node, len(name), module.source)
+    text = module.source.line(start.line)
+    column = text.find(name, start.column - 1 + offset)
+    if column >= 0:
+        start = Span(module.source, start.line, column + 1, len(name))
+    part = name.find(missing.part) if missing.part else -1
+    span = start.part(part, len(missing.part)) if part >= 0 else start
+    return CodeProblem(missing.kind, missing.message, span, missing.hint)

@@ -1,0 +1,64 @@
+"""What the names in a Python file mean: interfaces, classes of the API, and functions."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+from composer.behavior_source import Module
+from composer.behavior_source.method_body import Function, dotted
+from composer.behavior_types.api import API_CLASSES
+from composer.interfaces import Interfaces
+
+_API_MODULE = "composer.behavior"
+_INTERFACE = re.compile(r"(?P<package>\w+)\.(?P<folder>msg|srv|action)\.(?P<name>[A-Za-z]\w*)")
+
+
+def full_name(name: str, module: Module) -> str:
+    """Return the full name of a dotted name, as in ``std_msgs.msg.String``; "" if unknown."""
+    head, _, rest = name.partition(".")
+    imported = module.imports.get(head)
+    if imported is None:
+        # 'import std_msgs.msg' binds 'std_msgs'.
+        return name if any(other.startswith(f"{head}.") for other in module.imports) else ""
+    if imported.level or head in module.assigned:
+        return ""
+    parts = (imported.module, imported.name, rest)
+    return ".".join(part for part in parts if part)
+
+
+def interface_name(full: str) -> tuple[str, str]:
+    """Return the interface that a full name begins with, and the rest; "" if there is none."""
+    found = _INTERFACE.match(full)
+    if found is None:
+        return "", ""
+    name = f"{found['package']}/{found['folder']}/{found['name']}"
+    return name, full[found.end() :].removeprefix(".")
+
+
+def api_class(full: str) -> str | None:
+    """Return the class of the API with that full name, or None."""
+    package, _, name = full.rpartition(".")
+    return name if package == _API_MODULE and name in API_CLASSES else None
+
+
+def function_named(name: str, module: Module) -> Function | None:
+    """Return the function at the top level of a module, if nothing else has its name."""
+    found = [
+        item
+        for item in module.tree.body
+        if isinstance(item, ast.FunctionDef | ast.AsyncFunctionDef) and item.name == name
+    ]
+    is_plain = len(found) == 1 and name not in module.assigned and name not in module.imports
+    return found[0] if is_plain else None
+
+
+def is_interface(full: str, interfaces: Interfaces) -> bool:
+    """Return whether a full name begins with an interface that exists."""
+    return interfaces.find(interface_name(full)[0]) is not None
+
+
+def own_name(node: ast.expr, module: Module) -> str:
+    """Return the full name of an expression; "" for other expressions than imported names."""
+    name = dotted(node)
+    return full_name(name, module) if name else ""

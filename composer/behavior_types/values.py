@@ -1,0 +1,99 @@
+"""The types of values in behaviors, beyond those of message fields."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from composer.behavior_source import Method, Module
+from composer.behavior_types.api import Member
+from composer.field_types import ANYTHING, ValueType
+from composer.interfaces import Action, Message, Service
+from composer.model import Port, PortKind
+
+
+@dataclass(frozen=True, slots=True)
+class NoneType:
+    """The type of None."""
+
+
+NONE = NoneType()
+
+
+@dataclass(frozen=True, slots=True)
+class Self:
+    """The behavior itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ports:
+    """``self.publishers``, ``self.clients`` or ``self.action_clients``."""
+
+    kind: PortKind
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """``self.parameters``."""
+
+
+@dataclass(frozen=True, slots=True)
+class InterfaceClass:
+    """A class of messages, services or actions."""
+
+    definition: Message | Service | Action
+
+
+@dataclass(frozen=True, slots=True)
+class ApiValue:
+    """A value of a class of the API; ``port`` is the port that it belongs to, if it is known."""
+
+    class_name: str
+    port: Port | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ApiMethod:
+    """A method of a value of the API."""
+
+    owner: ApiValue
+    member: Member
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OwnMethod:
+    """A method of the behavior."""
+
+    method: Method
+    home: Module
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModuleFunction:
+    """A function of the behavior's module."""
+
+    node: ast.FunctionDef | ast.AsyncFunctionDef
+    home: Module
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pending:
+    """What an asynchronous ``call`` returns; waiting for it gives ``result``."""
+
+    name: str
+    call: ast.Call
+    result: Value
+
+
+Value: TypeAlias = (
+    "ValueType | NoneType | Self | Ports | Parameters | InterfaceClass | ApiValue | ApiMethod"
+    " | OwnMethod | ModuleFunction | Pending"
+)
+
+
+def join(first: Value, second: Value) -> Value:
+    """Return the type of a value that is of one of two types; None is disregarded."""
+    if first == second or second is NONE:
+        return first
+    return second if first is NONE else ANYTHING

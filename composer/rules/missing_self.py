@@ -1,0 +1,75 @@
+"""A method without self."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.behaviors import GENERAL_HANDLERS, behaviors, handlers
+from composer.analysis.context import Context
+from composer.behavior_source import Function
+from composer.behavior_source.receivers import lacks_self
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+
+RULE = register(
+    Rule(
+        code="RC449",
+        name="missing-self",
+        severity=Severity.ERROR,
+        summary="A method of a behavior lacks its first argument 'self'.",
+        why=(
+            "Python passes the object as the first argument of every method. Without 'self', "
+            "the call raises TypeError, or the arguments are shifted by one."
+        ),
+        bad="""\
+# file: system.yaml
+system: behavior
+nodes:
+  counter:
+    behavior: counter:Counter
+    timers: {tick: {period_ms: 100}}
+# file: counter.py
+class Counter:
+    def on_tick():
+        pass
+""",
+        good="""\
+# file: system.yaml
+system: behavior
+nodes:
+  counter:
+    behavior: counter:Counter
+    timers: {tick: {period_ms: 100}}
+# file: counter.py
+class Counter:
+    def on_tick(self):
+        pass
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Check the methods of all classes in the files of behaviors."""
+    for node, source in context.once(behaviors):
+        expected = {name: len(arguments) for name, arguments in GENERAL_HANDLERS.items()}
+        expected |= {handler.name: len(handler.arguments) for handler in handlers(node)}
+        own = {id(known) for _, known in source.own_classes}
+        for module in source.own_modules:
+            for known in module.classes.values():
+                arguments = expected if id(known) in own else {}
+                for method in known.methods:
+                    if method.node is None or not lacks_self(
+                        method.node, arguments.get(method.name)
+                    ):
+                        continue
+                    yield Diagnostic(
+                        RULE,
+                        f"method '{method.name}' of '{known.name}' lacks 'self'",
+                        method.span,
+                        hint=_hint(method.node),
+                    )
+
+
+def _hint(function: Function) -> str:
+    positional = (item.arg for item in (*function.args.posonlyargs, *function.args.args))
+    return f"write 'def {function.name}({', '.join(('self', *positional))})'"

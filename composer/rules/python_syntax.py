@@ -1,0 +1,59 @@
+"""A behavior whose module is not valid Python."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.behaviors import behaviors
+from composer.analysis.context import Context
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+
+RULE = register(
+    Rule(
+        code="RC441",
+        name="python-syntax",
+        severity=Severity.ERROR,
+        summary="The module of a behavior is not valid Python.",
+        why=(
+            "The node cannot be created. The module is compiled and not executed, so that all "
+            "errors of Python's compiler are found, such as 'await' outside an async function."
+        ),
+        bad="""\
+# file: system.yaml
+system: behavior
+nodes:
+  counter:
+    behavior: counter:Counter
+    timers: {tick: {period_ms: 100}}
+# file: counter.py
+class Counter:
+    def on_tick(self):
+        await self.clock.sleep(0.05)
+""",
+        good="""\
+# file: system.yaml
+system: behavior
+nodes:
+  counter:
+    behavior: counter:Counter
+    timers: {tick: {period_ms: 100}}
+# file: counter.py
+class Counter:
+    async def on_tick(self):
+        await self.clock.sleep(0.05)
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Report the first error of each module."""
+    for _, source in context.once(behaviors):
+        if source.problem is not None and source.problem_span is not None:
+            label = Label(source.reference.text.span, "the behavior of this node")
+            yield Diagnostic(
+                RULE,
+                f"module '{source.reference.module}' {source.problem}",
+                source.problem_span,
+                (label,),
+            )

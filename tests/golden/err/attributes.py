@@ -1,0 +1,15 @@
+from std_msgs.msg import String
+
+
+class Robot:
+    def on_activate(self):
+        self.count = 0
+
+    def on_tick(self):
+        self.publishers.comand.publish(String())
+        self.publishers.command.publsh(String())
+        self.publishers.reset.publish(String())
+        self.log.info(str(self.parameters.sped + self.parameters["velocity"]))
+        self.cuont += 1
+        self.log.warning("done")
+        self.timers.tick.cancel()

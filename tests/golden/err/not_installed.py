@@ -1,0 +1,6 @@
+import fastkalman.filters
+
+
+class Robot:
+    def on_tick(self):
+        fastkalman.filters.predict()

@@ -1,0 +1,6 @@
+class Walker:
+    def on_tick(self):
+        pass
+
+
+return Walker

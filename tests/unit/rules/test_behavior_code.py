@@ -1,0 +1,303 @@
+"""Mistakes in the Python code of behaviors, and code that is right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.diagnostics import Diagnostic
+from tests.unit.support.checking import diagnostics_in, quoted
+
+SYSTEM = """\
+system: demo
+nodes:
+  robot:
+    behavior: code:Code
+    parameters:
+      speed: {type: double, default: 1.0}
+      names: {type: string_array, default: [a]}
+      wheel.radius: {type: double, default: 0.1}
+    publishers:
+      text: {type: std_msgs/msg/String, qos: command, external: true}
+      path: {type: nav_msgs/msg/Path, qos: command, external: true}
+      charge: {type: sensor_msgs/msg/BatteryState, qos: command, external: true}
+    subscriptions:
+      odometry: {type: nav_msgs/msg/Odometry, qos: command, external: true}
+    services: {reset: {type: std_srvs/srv/Trigger}}
+    clients: {stop: {type: std_srvs/srv/Trigger, external: true}}
+    action_servers: {drive: {type: composer_interfaces/action/Navigate}}
+    action_clients: {turn: {type: composer_interfaces/action/Navigate, external: true}}
+"""
+
+CODE = """\
+import asyncio
+import math
+import threading
+import time
+
+from builtin_interfaces.msg import Time
+from composer_interfaces.action import Navigate
+from geometry_msgs.msg import Point, PoseStamped
+from nav_msgs.msg import Odometry, Path
+from sensor_msgs.msg import BatteryState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from composer.behavior import Behavior, CallError, Goal, SentGoal
+
+
+class Code(Behavior):
+    LIMIT = 3
+
+    def on_activate(self):
+        self.last = None
+        self.count = 0
+        self.other = 0
+        self.point: Point | None = None
+
+    def on_odometry(self, message):
+        self.last = message
+        {odometry}
+
+    def on_reset(self, request, response):
+        {reset}
+        return response
+
+    async def on_drive(self, goal):
+        {drive}
+
+    async def on_configure(self):
+        {configure}
+
+    async def _wait(self) -> Point:
+        await self.clock.sleep(0.1)
+        return Point()
+
+    def _text(self) -> str:
+        return "text"
+
+    def _follow(self, sent: SentGoal, goal: Goal):
+        {follow}
+
+
+async def wait(stamp: Time):
+    {function}
+"""
+PLACES = ("odometry", "reset", "drive", "configure", "follow", "function")
+
+
+def found(place: str, statement: str, folder: Path) -> list[Diagnostic]:
+    """Return the diagnostics in the code with ``statement`` in ``place``."""
+    code = CODE
+    for other in PLACES:
+        text = statement if other == place else "pass"
+        indentation = "    " if other == "function" else "        "
+        code = code.replace(f"{{{other}}}", text.replace("\n", f"\n{indentation}"))
+    (folder / "code.py").write_text(code, encoding="utf-8")
+    return diagnostics_in(SYSTEM, folder)
+
+
+#: The statement, the place that it is in, the rule, the text that is underlined, and a hint.
+MISTAKES = [
+    # ports and parameters
+    ("odometry", "self.publishers.txt.publish(String())", "unknown-attribute", "txt", "'text'"),
+    ("odometry", "self.publishers['txt']", "unknown-attribute", "'txt'", "'text'"),
+    ("odometry", "self.publishers.stop", "unknown-attribute", "stop", "'clients'"),
+    ("odometry", "self.parameters.sped", "unknown-attribute", "sped", "'speed'"),
+    ("odometry", "self.parameters.wheel", "unknown-attribute", "wheel", None),
+    ("configure", "await self.clients.stp.call(0)", "unknown-attribute", "stp", "'stop'"),
+    ("configure", "self.action_clients.trn", "unknown-attribute", "trn", "'turn'"),
+    # the API
+    ("odometry", "self.publishers.text.send(String())", "unknown-attribute", "send", None),
+    ("odometry", "self.log.warning('no')", "unknown-attribute", "warning", "'warn'"),
+    ("odometry", "self.clock.time()", "unknown-attribute", "time", None),
+    ("drive", "goal.cancelled()", "unknown-attribute", "cancelled", "'canceled'"),
+    ("follow", "goal.is_canceled", "unknown-attribute", "is_canceled", None),
+    ("follow", "sent.status", "unknown-attribute", "status", None),
+    # the behavior itself
+    ("odometry", "self.publisher.text.publish(0)", "unknown-attribute", "publisher", "shers'"),
+    ("odometry", "self.cuont += 1", "unknown-attribute", "cuont", "'count'"),
+    ("odometry", "self._txet()", "unknown-attribute", "_txet", "'_text'"),
+    ("odometry", "self.zebra", "unknown-attribute", "zebra", "no method"),
+    # fields
+    ("odometry", "message.pose.positon", "unknown-field", "positon", None),
+    ("odometry", "message.pose.pose.position.w", "unknown-field", "w", "x, y, z"),
+    ("odometry", "message.header.frame = 'odom'", "unknown-field", "frame", "'frame_id'"),
+    ("odometry", "header = message.header\nheader.stmp", "unknown-field", "stmp", "'stamp'"),
+    ("odometry", "self.last.twst", "unknown-field", "twst", "'twist'"),
+    ("odometry", "self.point.w", "unknown-field", "w", None),
+    ("odometry", "for pose in Path().poses:\n    pose.pos", "unknown-field", "pos", "'pose'"),
+    ("odometry", "Path().poses[0].pos", "unknown-field", "pos", "'pose'"),
+    ("odometry", "[p.pos for p in Path().poses]", "unknown-field", "pos", "'pose'"),
+    ("odometry", "Path().poses.header", "unknown-field", "header", "use an index"),
+    ("odometry", "message.child_frame_id.data", "unknown-field", "data", None),
+    ("odometry", "String(dta='x')", "unknown-field", "dta", "'data'"),
+    ("odometry", "BatteryState.POWER_SUPPLY_STATUS_FUL", "unknown-field", None, "STATUS_FULL'"),
+    ("reset", "response.sucess = True", "unknown-field", "sucess", "'success'"),
+    ("reset", "request.data", "unknown-field", "data", None),
+    ("drive", "goal.request.targt", "unknown-field", "targt", "'target'"),
+    ("drive", "goal.publish_feedback(Navigate.Feedback(x=1))", "unknown-field", "x", None),
+    ("drive", "return Navigate.Reslt()", "unknown-field", "Reslt", "'Result'"),
+    ("follow", "goal.request.targt", "unknown-field", "targt", "'target'"),
+    ("configure", "(await self.clients.stop.call(0)).okay", "unknown-field", "okay", None),
+    ("configure", "point = await self._wait()\npoint.w", "unknown-field", "w", None),
+    ("configure", "self.publishers.text.message_type(dat='')", "unknown-field", "dat", None),
+    ("function", "stamp.secs", "unknown-field", "secs", "'sec'"),
+    # values
+    ("odometry", "String(data=5)", "unfit-value", "5", None),
+    ("odometry", "String('x')", "unfit-value", "'x'", "data=..."),
+    ("odometry", "message.child_frame_id = 5", "unfit-value", "5", None),
+    ("odometry", "Time(sec=0.5)", "unfit-value", "0.5", None),
+    ("odometry", "PoseStamped(pose=Point())", "unfit-value", "Point()", None),
+    ("odometry", "self.publishers.text.publish('x')", "unfit-value", "'x'", None),
+    ("odometry", "self.publishers.text.publish(String)", "unfit-value", "String", "String()"),
+    ("odometry", "self.publishers.text.publish(self._text)", "unfit-value", None, "_text()"),
+    ("odometry", "self.publishers.text.publish(Path())", "unfit-value", "Path()", None),
+    ("odometry", "path = Path\npath.header", "unfit-value", "Path", "add '()'"),
+    ("configure", "await self.clients.stop.call(Trigger())", "unfit-value", "Trigger", "Request()"),
+    # awaiting
+    ("configure", "self.clock.sleep(1.0)", "missing-await", "self.clock.sleep", "'await'"),
+    ("configure", "self._wait()", "missing-await", "self._wait", "'await'"),
+    ("configure", "wait(Time())", "missing-await", "wait", "'await'"),
+    ("odometry", "self._wait()", "missing-await", "self._wait", "'async def on_odometry'"),
+    ("configure", "self._wait().x", "missing-await", "self._wait", None),
+    ("configure", "point = self._wait()\npoint.x", "missing-await", "self._wait", None),
+    ("configure", "x, y = self._wait()", "missing-await", "self._wait", None),
+    ("configure", "if self._wait():\n    pass", "missing-await", "self._wait", None),
+    ("configure", "text = self._wait()\nself.log.info(f'{text}')", "missing-await", None, None),
+    ("configure", "text = self._wait()\nString(data=text)", "missing-await", None, None),
+    ("configure", "sent = self.action_clients.turn.send_goal(Navigate.Goal())\n"
+     "await sent.result()", "missing-await", "self.action_clients.turn.send_goal", None),
+    ("drive", "return self._wait()", "missing-await", "self._wait", None),
+    # names that are not defined or cannot be imported
+    ("odometry", "self.log.info(mesage)", "undefined-name", "mesage", "'message'"),
+    ("odometry", "Twist()", "undefined-name", "Twist", "import it"),
+    ("odometry", "random.random()", "undefined-name", "random", "'import random'"),
+    ("odometry", "math.sqroot(2)", "unknown-import", "sqroot", "'sqrt'"),
+    ("odometry", "import tyme", "unknown-import", "tyme", "'time'"),
+    ("odometry", "from composer.behavior import Publishr", "unknown-import", "Publishr", None),
+    ("odometry", "from std_msgs.msg import Strng", "unknown-import", "Strng", "'String'"),
+    ("odometry", "from std_msgs.srv import Trigger", "unknown-import", "Trigger", None),
+    ("odometry", "from std_msgs.mgs import String", "unknown-import", "mgs", "'msg'"),
+    ("odometry", "from code import Cod", "unknown-import", "Cod", "'Code'"),
+    ("odometry", "from .nowhere import x", "unknown-import", ".nowhere", None),
+    ("odometry", "import qwertzuiop", "module-not-installed", "qwertzuiop", None),
+    ("odometry", "from composer.names import expand_name", "internal-import", None, None),
+    # control flow
+    ("reset", "if request:\n    return", "missing-return", "return", "'return response'"),
+    ("reset", "return None", "missing-return", "return None", None),
+    ("configure", "while True:\n    self.count = 1", "endless-loop", "while", "sleep"),
+    ("drive", "while not goal.is_cancel_requested:\n    pass", "endless-loop", "while", None),
+    ("drive", "time.sleep(1.0)", "blocking-call", "time.sleep", "self.clock.sleep"),
+]  # fmt: skip
+
+RIGHT = [
+    ("odometry", "self.publishers.text.publish(String(data=self._text()))"),
+    ("odometry", "self.publishers['text'].publish(String())"),
+    ("odometry", "self.parameters['wheel.radius']"),
+    ("odometry", "self.publishers.path.publish(Path(header=message.header))"),
+    ("odometry", "String(**{'dta': 1})"),
+    ("odometry", "String.get_fields_and_field_types()"),
+    ("odometry", "BatteryState.POWER_SUPPLY_STATUS_FULL"),
+    ("odometry", "BatteryState().POWER_SUPPLY_STATUS_FULL"),
+    ("odometry", "Point(x=1, y=True)"),
+    ("odometry", "Point(x=self.parameters.speed, y=float('1'))"),
+    ("odometry", "message.__class__.__name__"),
+    ("odometry", "message.child_frame_id.upper()"),
+    ("odometry", "Path().poses.append(PoseStamped())"),
+    ("odometry", "value = message if self.count else 'text'\nvalue.anything"),
+    ("odometry", "value = message\nvalue = 5\nvalue.anything"),
+    ("odometry", "items = [message]\nfor message in items:\n    message.anything"),
+    ("odometry", "(lambda message: message.anything)(5)"),
+    ("odometry", "def inner(message):\n    return message.anything\ninner(5)"),
+    ("odometry", "setattr(self, 'later', 1)\nself.later"),
+    ("odometry", "self.LIMIT, self.name, self.__dict__, self.__class__"),
+    ("odometry", "self.extra = 1\nself.extra += 1"),
+    ("odometry", "asyncio.run(self._wait())"),
+    ("odometry", "threading.Thread(target=self._text).start()"),
+    ("odometry", "try:\n    import tyme\nexcept ImportError:\n    tyme = None"),
+    ("odometry", "import numpy as np\nnp.anything"),
+    ("odometry", "from std_srvs.srv import Trigger_Request"),
+    ("odometry", "import os.path\nos.path.join('a')"),
+    ("odometry", "import concurrent.futures\nconcurrent.futures.Future"),
+    ("odometry", "[x for x in range(3) if (y := x)]\ny"),
+    ("odometry", "match message:\n    case Odometry(header=header):\n        header.anything"),
+    ("odometry", "try:\n    pass\nexcept CallError as error:\n    self.log.warn(str(error))"),
+    ("odometry", "global later\nlater = 1"),
+    ("configure", "task = self._wait()\nawait task"),
+    ("configure", "await asyncio.gather(self._wait(), wait(Time()))"),
+    ("configure", "tasks = [self._wait()]\nawait asyncio.wait(tasks)"),
+    ("configure", "self.task = self._wait()\nif self.task is not None:\n    await self.task"),
+    ("configure", "sent = await self.action_clients.turn.send_goal(Navigate.Goal())\n"
+     "ended = await sent.result()\nended.result.message, ended.status, await sent.cancel()"),
+    ("configure", "while True:\n    await self.clock.sleep(1.0)"),
+    ("configure", "while True:\n    if self.count:\n        break"),
+    ("configure", "while self.count < 5:\n    self.count += 1"),
+    ("drive", "goal.request.target.x\ngoal.succeed()\nreturn Navigate.Result()"),
+    ("drive", "while not goal.is_cancel_requested:\n    await self.clock.sleep(0.1)"),
+    ("drive", "return await self._wait() and None"),
+    ("reset", "response.success = True"),
+    ("reset", "while True:\n    return response"),
+    ("reset", "raise ValueError(request)"),
+    ("follow", "goal.request.target\nsent.cancel"),
+    ("function", "stamp.sec\nstamp.nanosec"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("place", "statement", "rule", "text", "hint"), MISTAKES)
+def test_a_mistake_is_reported_once_where_it_is(
+    place: str, statement: str, rule: str, text: str | None, hint: str | None, tmp_path: Path
+) -> None:
+    [diagnostic] = found(place, statement, tmp_path)
+    assert diagnostic.rule.name == rule
+    assert diagnostic.primary.file.path.endswith("code.py")
+    assert text is None or quoted(diagnostic) == text
+    assert hint is None or hint in str(diagnostic.hint)
+
+
+@pytest.mark.parametrize(("place", "statement"), RIGHT)
+def test_right_code_is_not_reported(place: str, statement: str, tmp_path: Path) -> None:
+    assert [item.message for item in found(place, statement, tmp_path)] == []
+
+
+def test_the_annotation_of_a_handler_decides_in_it(tmp_path: Path) -> None:
+    system = SYSTEM.replace("nav_msgs/msg/Odometry", "geometry_msgs/msg/Point")
+    code = (
+        "from nav_msgs.msg import Odometry\n\n\nclass Code:\n"
+        "    def on_odometry(self, message: Odometry):\n        print(message.pose)\n\n"
+        "    def on_reset(self, request, response):\n        return response\n\n"
+        "    def on_drive(self, goal):\n        pass\n"
+    )
+    (tmp_path / "code.py").write_text(code, encoding="utf-8")
+    [diagnostic] = diagnostics_in(system, tmp_path)
+    assert diagnostic.rule.name == "handler-annotation"
+    assert quoted(diagnostic) == "Odometry"
+
+
+def test_two_nodes_with_one_class_report_it_once(tmp_path: Path) -> None:
+    system = "system: demo\nnodes:\n"
+    for name in ("left", "right"):
+        system += f"  {name}: {{behavior: code:Code, timers: {{tick: {{period_ms: 100}}}}}}\n"
+    code = "class Code:\n    def on_tick(self):\n        self.publishers.text.publish(0)\n"
+    (tmp_path / "code.py").write_text(code, encoding="utf-8")
+    [diagnostic] = diagnostics_in(system, tmp_path)
+    assert diagnostic.rule.name == "unknown-attribute"
+
+
+def test_a_comment_in_python_ignores_a_warning(tmp_path: Path) -> None:
+    assert found("drive", "time.sleep(1.0)  # compose: ignore[blocking-call]", tmp_path) == []
+
+
+def test_installed_classes_are_not_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    packages = tmp_path / "site-packages"
+    packages.mkdir()
+    (packages / "of_others.py").write_text(
+        "class Code:\n    def on_tick(self):\n        self.zebra\n", encoding="utf-8"
+    )
+    monkeypatch.syspath_prepend(packages)
+    system = (
+        "system: demo\nnodes:\n"
+        "  robot: {behavior: of_others:Code, timers: {tick: {period_ms: 100}}}\n"
+    )
+    assert diagnostics_in(system, tmp_path) == []
