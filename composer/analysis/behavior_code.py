@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import sys
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
-from composer.analysis.behaviors import behaviors, handlers
+from composer.analysis.behaviors import distinct_behaviors, handlers
 from composer.analysis.context import Context
 from composer.behavior_source import BehaviorSource, Function, Module
 from composer.behavior_source.receivers import lacks_self
@@ -29,7 +31,7 @@ def _problems(context: Context) -> tuple[tuple[BehaviorSource, CodeProblem], ...
     """Return the problems of all behaviors; those of a file are found once."""
     checked: set[Path] = set()
     found: list[tuple[BehaviorSource, CodeProblem]] = []
-    for node, source in context.once(behaviors):
+    for node, source in context.once(distinct_behaviors):
         for module in source.own_modules:
             if module.path not in checked:
                 checked.add(module.path)
@@ -56,12 +58,17 @@ def _of_file(
                 span_of(name, module.source),
                 _hint(name.id, known),
             )
-            for name, known in undefined_names(module.tree)
+            for name, known in _undefined_names(module)
             if name.id not in meant
         ]
     except RecursionError:  # too deeply nested to be checked
         return []
     return [*(problem for problem, _ in imports), *undefined]
+
+
+@lru_cache(maxsize=128)
+def _undefined_names(module: Module) -> tuple[tuple[ast.Name, frozenset[str]], ...]:
+    return tuple(undefined_names(module.tree))
 
 
 def _hint(name: str, known: frozenset[str]) -> str:

@@ -58,6 +58,21 @@ def behaviors(context: Context) -> tuple[tuple[Node, BehaviorSource], ...]:
     return tuple(found)
 
 
+def distinct_behaviors(context: Context) -> tuple[tuple[Node, BehaviorSource], ...]:
+    """Return one node for each behavior and each set of ports, timers and parameters it is used in.
+
+    Hundreds of copies of a node are equal in all that a rule about Python code needs.
+    """
+    found: dict[object, tuple[Node, BehaviorSource]] = {}
+    for node, source in context.once(behaviors):
+        ports = tuple((port.kind, port.name.value, port.interface.value) for port in node.ports)
+        parameters = tuple((item.name.value, item.type.value) for item in node.parameters)
+        timers = tuple(timer.name.value for timer in node.timers)
+        key = (id(source), node.complete, ports, parameters, timers)
+        found.setdefault(key, (node, source))
+    return tuple(found.values())
+
+
 def complete_behaviors(context: Context) -> Iterator[tuple[Node, BehaviorSource]]:
     """Yield the nodes whose behavior is known completely, with its source."""
     for node, source in context.once(behaviors):

@@ -66,7 +66,7 @@ class Import:
     level: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Module:
     """The top-level definitions and imports of a Python file."""
 

@@ -77,9 +77,11 @@ class _Imports:
         if found is not None:
             yield _problem(found, name, node, self.module, offset=len("from ")), None
             return
-        names = self._names(name)
         for alias in node.names:
-            if names is None or alias.name == "*" or self._has(name, names, alias.name):
+            if alias.name == "*" or self._is_interface(name, alias.name):
+                continue
+            names = self._names(name)
+            if names is None or self._has(name, names, alias.name):
                 continue
             missing = _Missing(
                 f"module '{name}' has no '{alias.name}'", suggestion(alias.name, names)
@@ -160,6 +162,9 @@ class _Imports:
         if package in self.interfaces.packages():
             return frozenset(self._in_folder(package, folder)) if folder in _FOLDERS else None
         return standard_names(module) if is_standard(module) else None
+
+    def _is_interface(self, module: str, name: str) -> bool:
+        return self.interfaces.find(f"{module.replace('.', '/')}/{name}") is not None
 
     def _has(self, module: str, names: frozenset[str], name: str) -> bool:
         if name in names or (name.startswith("__") and name.endswith("__")):
@@ -255,6 +260,8 @@ def _attributes(module: Module) -> Iterator[CodeProblem]:
         for bound, imported in module.imports.items()
         if not imported.name and "." not in bound and is_standard(imported.module)
     }
+    if not aliases:
+        return
     stored = {
         node.id
         for node in ast.walk(module.tree)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from composer.analysis.behaviors import (
     GENERAL_HANDLERS,
-    behaviors,
+    distinct_behaviors,
     handlers,
     reached_methods,
 )
@@ -62,7 +62,7 @@ class Counter:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the loops in the handlers of every behavior, and in the methods that these call."""
-    for node, source in context.once(behaviors):
+    for node, source in context.once(distinct_behaviors):
         names = (*GENERAL_HANDLERS, *(handler.name for handler in handlers(node)))
         found = [method for name in names if (method := source.method(name)) is not None]
         reached = {id(item): item for method in found for item in reached_methods(source, method)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import Handler, behaviors, handlers
+from composer.analysis.behaviors import Handler, distinct_behaviors, handlers
 from composer.analysis.context import Context
 from composer.behavior_source import Function, Method
 from composer.behavior_source.flow import empty_returns, reaches_end
@@ -53,7 +53,7 @@ class Counter:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check every way out of the handlers of services and of 'accept'."""
-    for node, source in context.once(behaviors):
+    for node, source in context.once(distinct_behaviors):
         for handler in handlers(node):
             method = source.method(handler.name)
             if method is not None and method.known and method.node is not None:

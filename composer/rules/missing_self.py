@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import GENERAL_HANDLERS, behaviors, handlers
+from composer.analysis.behaviors import GENERAL_HANDLERS, distinct_behaviors, handlers
 from composer.analysis.context import Context
 from composer.behavior_source import Function
 from composer.behavior_source.receivers import lacks_self
@@ -50,7 +50,7 @@ class Counter:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the methods of all classes in the files of behaviors."""
-    for node, source in context.once(behaviors):
+    for node, source in context.once(distinct_behaviors):
         expected = {name: len(arguments) for name, arguments in GENERAL_HANDLERS.items()}
         expected |= {handler.name: len(handler.arguments) for handler in handlers(node)}
         own = {id(known) for _, known in source.own_classes}

@@ -3,7 +3,7 @@ import os.pth
 from math import sqroot
 
 import time
-from composer.behavior import Behaviour
+from composer.behavior import Behavier
 from composer.behaviors import Behavior
 from geometry_msgs.msg import Pont
 from geometry_msgs.msgs import Point

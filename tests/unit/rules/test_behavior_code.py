@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from composer.analysis import behavior_code
+from composer.behavior_types import CodeProblem, behavior_problems
 from composer.diagnostics import Diagnostic
+from composer.model import Node
 from tests.unit.support.checking import diagnostics_in, quoted
 
 SYSTEM = """\
@@ -34,7 +39,6 @@ CODE = """\
 import asyncio
 import math
 import threading
-import time
 
 from builtin_interfaces.msg import Time
 from composer_interfaces.action import Navigate
@@ -112,7 +116,7 @@ MISTAKES = [
     ("odometry", "self.publishers.text.send(String())", "unknown-attribute", "send", None),
     ("odometry", "self.log.warning('no')", "unknown-attribute", "warning", "'warn'"),
     ("odometry", "self.clock.time()", "unknown-attribute", "time", None),
-    ("drive", "goal.cancelled()", "unknown-attribute", "cancelled", "'canceled'"),
+    ("drive", "goal.cancel()", "unknown-attribute", "cancel", "'canceled'"),
     ("follow", "goal.is_canceled", "unknown-attribute", "is_canceled", None),
     ("follow", "sent.status", "unknown-attribute", "status", None),
     # the behavior itself
@@ -140,7 +144,8 @@ MISTAKES = [
     ("drive", "goal.publish_feedback(Navigate.Feedback(x=1))", "unknown-field", "x", None),
     ("drive", "return Navigate.Reslt()", "unknown-field", "Reslt", "'Result'"),
     ("follow", "goal.request.targt", "unknown-field", "targt", "'target'"),
-    ("configure", "(await self.clients.stop.call(0)).okay", "unknown-field", "okay", None),
+    ("configure", "got = await self.clients.stop.call(Trigger.Request())\ngot.ok", "unknown-field",
+     "ok", None),
     ("configure", "point = await self._wait()\npoint.w", "unknown-field", "w", None),
     ("configure", "self.publishers.text.message_type(dat='')", "unknown-field", "dat", None),
     ("function", "stamp.secs", "unknown-field", "secs", "'sec'"),
@@ -301,3 +306,19 @@ def test_installed_classes_are_not_checked(tmp_path: Path, monkeypatch: pytest.M
         "  robot: {behavior: of_others:Code, timers: {tick: {period_ms: 100}}}\n"
     )
     assert diagnostics_in(system, tmp_path) == []
+
+
+def test_copies_of_a_node_are_checked_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    checked = []
+
+    def counted(node: Node, *rest: Any) -> Iterator[CodeProblem]:
+        checked.append(node.name.value)
+        return behavior_problems(node, *rest)
+
+    monkeypatch.setattr(behavior_code, "behavior_problems", counted)
+    (tmp_path / "code.py").write_text("class Code:\n    def on_tick(self):\n        self.a\n")
+    entry = "behavior: code:Code, timers: {tick: {period_ms: 100}}"
+    system = f"system: a\nnodes:\n  a${{i}}: {{for_each: {{i: 20}}, {entry}}}\n"
+    [diagnostic] = diagnostics_in(system, tmp_path)
+    assert diagnostic.rule.name == "unknown-attribute"
+    assert checked == ["a0"]
