@@ -39,6 +39,7 @@ CODE = """\
 import asyncio
 import math
 import threading
+import time
 
 from builtin_interfaces.msg import Time
 from composer_interfaces.action import Navigate
