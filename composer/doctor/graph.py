@@ -17,6 +17,7 @@ from composer.qos import incompatibilities
 from composer.remote.graph_names import GraphNames
 from composer.remote.session import Deadline, Session
 from composer.runtime.intra_process.ignore_local_publications import unsupported_reason
+from composer.runtime.process.environment import ROS_ARGUMENTS
 from composer.runtime.ros.endpoints import EndpointInfo, TopicInfo
 from composer.runtime.ros.messages import MessageError, interface_class
 
@@ -53,7 +54,7 @@ def check_discovery(session: Session, deadline: Deadline) -> CheckResult:
     """Start a second participant and check that it is discovered."""
     name = f"_compose_doctor_{os.getpid()}"
     context = Context()
-    context.init([])
+    context.init(list(ROS_ARGUMENTS))
     limit = Deadline(min(_DISCOVERY_S, deadline.left_s))
     started_s = time.monotonic()
     try:

@@ -20,6 +20,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 
 from composer.runtime.process import dds_profiles
 from composer.runtime.process.dds_participants import count_participants, enlarge_receive_buffers
+from composer.runtime.process.environment import ROS_ARGUMENTS
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.ros.graph import (
     COMMAND_PREFIX,
@@ -100,7 +101,7 @@ class Session:
     def __init__(self) -> None:
         self._context = Context()
         # Without signal handlers: Ctrl-C remains Python's KeyboardInterrupt.
-        self._context.init([])
+        self._context.init(list(ROS_ARGUMENTS))
         self.node = _SessionNode(
             f"{COMMAND_PREFIX}{os.getpid()}",
             context=self._context,

@@ -41,7 +41,7 @@ from composer.runtime.node.node import NodeListener, RunningNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import StartRefused
 from composer.runtime.process.dds_profiles import use_large_system_profile
-from composer.runtime.process.environment import prepare_environment
+from composer.runtime.process.environment import ROS_ARGUMENTS, prepare_environment
 from composer.runtime.process.fast_exit import leave_ros_graph, supports_fast_exit
 from composer.runtime.process.instance_lock import already_running, hold_instance_lock
 from composer.runtime.process.signals import stop_signals
@@ -341,7 +341,7 @@ class Host:
 
 def _start_ros() -> None:
     try:
-        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=list(ROS_ARGUMENTS), signal_handler_options=SignalHandlerOptions.NO)
     except rclpy_implementation.RCLError as error:
         raise StartRefused(f"ROS does not start: {error}", "see the lines above") from error
 

@@ -45,3 +45,13 @@ def test_the_process_imports_nothing_from_the_current_folder(
     with pytest.raises(CommandError, match="did not come up") as raised:
         run_in_background("nothing", ["nothing"], 60.0)
     assert "there is no file 'nothing'" in raised.value.text()
+
+
+def test_a_log_folder_that_cannot_be_created_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "file" / "log"))
+    with pytest.raises(CommandError, match="cannot write the log of the system to ") as raised:
+        run_in_background("minimal", ["minimal"], 60.0)
+    assert "set ROS_LOG_DIR to a writable folder" in raised.value.text()

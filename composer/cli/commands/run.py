@@ -241,6 +241,7 @@ def _numbers(options: dict[str, float | None]) -> list[str]:
 
 def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
     from composer.cli.support.console import queued_output
+    from composer.cli.support.line_format import console_format
     from composer.cli.support.process import end_now
     from composer.cli.support.progress import Progress, summary
     from composer.plan import tear_down
@@ -248,7 +249,7 @@ def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
     from composer.runtime.process import StartRefused
 
     with queued_output():
-        progress = Progress(sys.stderr)
+        progress = Progress(sys.stderr, console_format())
         host = Host(system, plan, tear_down(system), options, progress.show)
         try:
             outcome = host.run()

@@ -11,9 +11,10 @@ import sys
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import NoReturn, TextIO
+from typing import BinaryIO, NoReturn, TextIO
 
 from composer.cli.support.errors import CommandError
+from composer.cli.support.line_format import CONSOLE_FORMAT_VARIABLE, file_format
 
 #: Holds the file descriptor on which a background process reports that the system is up.
 READY_VARIABLE = "COMPOSE_READY_FD"
@@ -30,9 +31,9 @@ def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> 
     killed.
     """
     log = _log_path(system)
-    log.parent.mkdir(parents=True, exist_ok=True)
+    output = _new_file(log)
     reading, writing = os.pipe()
-    with os.fdopen(reading, encoding="utf-8") as pipe, log.open("wb") as output:
+    with os.fdopen(reading, encoding="utf-8") as pipe, output:
         try:
             process = subprocess.Popen(  # noqa: S603 - this very program
                 # -P: do not import modules from the current folder
@@ -40,7 +41,11 @@ def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> 
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,
-                env={**os.environ, READY_VARIABLE: str(writing)},
+                env={
+                    **os.environ,
+                    READY_VARIABLE: str(writing),
+                    CONSOLE_FORMAT_VARIABLE: file_format(),
+                },
                 pass_fds=(writing,),
                 start_new_session=True,  # survive Ctrl-C and the end of the terminal
             )
@@ -109,3 +114,14 @@ def _log_path(system: str) -> Path:
     folder = log_folder(os.environ) or Path.home() / ".ros" / "log"
     now = datetime.now().astimezone().strftime("%Y-%m-%d-%H-%M-%S")
     return folder / f"{system}-{now}-{os.getpid()}.log"
+
+
+def _new_file(path: Path) -> BinaryIO:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path.open("wb")
+    except OSError as problem:
+        raise CommandError(
+            f"cannot write the log of the system to '{path}': {problem.strerror}",
+            hint="set ROS_LOG_DIR to a writable folder",
+        ) from problem

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from typing import TextIO
 
 from composer.cli.support.callback_tables import summary_table
+from composer.cli.support.line_format import Line, LineFormat
 from composer.cli.support.process import report_ready
 from composer.cli.support.terminal import columns, use_color
 from composer.runtime.supervision.events import (
@@ -31,11 +33,15 @@ _MAX_NODES_WITH_ERRORS = 5
 
 
 class Progress:
-    """Print one line per event, except for faults, which the nodes have logged."""
+    """Print one line per event, except for faults, which the nodes have logged.
 
-    def __init__(self, stream: TextIO) -> None:
+    By default, lines begin with the time since the start.
+    """
+
+    def __init__(self, stream: TextIO, line_format: LineFormat | None = None) -> None:
         self._stream = stream
         self._color = use_color(stream)
+        self._format = line_format
 
     def show(self, event: Event) -> None:
         """Print the event."""
@@ -43,17 +49,27 @@ class Progress:
             return
         if isinstance(event, BroughtUp):
             report_ready(str(event))
-        line = f"[{event.elapsed_s:.3f}] [{_severity(event)}] [compose] {event}"
-        if isinstance(event, Logged):
-            line = str(event)
+        line = self._line(event)
         code = _code(event)
         if self._color and code:
             line = f"\x1b[{code}m{line}\x1b[0m"
         self._stream.write(f"{line}\n")
 
+    def _line(self, event: Event) -> str:
+        if isinstance(event, Logged):
+            name, text = event.logger, event.message
+        else:
+            name, text = "compose", str(event)
+        severity = _severity(event)
+        if self._format is None:
+            return f"[{event.elapsed_s:.3f}] [{severity}] [{name}] {text}"
+        return self._format.render(Line(severity, name, text, time.time_ns()))
+
 
 def _severity(event: Event) -> str:
     match event:
+        case Logged():
+            return event.level.upper()
         case NodeTransitionFailed() | RollingBack() | Stuck() | NodeFailed():
             return "ERROR"
         case _:

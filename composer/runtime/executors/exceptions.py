@@ -9,15 +9,10 @@ from __future__ import annotations
 import os
 import traceback
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-from composer.runtime.executors.stacks import calls_user_code
+from composer.runtime.executors.stacks import calls_user_code, is_internal
 
-_COMPOSER = f"{Path(__file__).parents[2]}{os.sep}"
-#: The example nodes of an installed composer are user code.
-_SHARE = f"{_COMPOSER}share{os.sep}"
-_IMPORT_SYSTEM = "<frozen importlib"
 #: The longest texts, in characters.
 _LINE_LENGTH = 1000
 _VALUE_LENGTH = 80
@@ -107,14 +102,9 @@ def _keep_user_frames(full: traceback.TracebackException) -> bool:
     while pending:
         entry = pending.pop()
         pending += filter(None, (entry.__cause__, entry.__context__, *(entry.exceptions or ())))
-        entry.stack[:] = [frame for frame in entry.stack if not _is_internal(frame.filename)]
+        entry.stack[:] = [frame for frame in entry.stack if not is_internal(frame.filename)]
         has_frames = has_frames or bool(entry.stack)
     return has_frames
-
-
-def _is_internal(path: str) -> bool:
-    is_composer = path.startswith(_COMPOSER) and not path.startswith(_SHARE)
-    return is_composer or path.startswith(_IMPORT_SYSTEM)
 
 
 def _name(kind: type) -> str:

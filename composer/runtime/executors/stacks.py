@@ -8,13 +8,20 @@ deadlock (gh-106883), and reading a frame may crash. So no garbage is collected 
 from __future__ import annotations
 
 import gc
+import os
 import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any, TypeVar
+
+_COMPOSER = f"{Path(__file__).parents[2]}{os.sep}"
+#: The example nodes of an installed composer are user code.
+_SHARE = f"{_COMPOSER}share{os.sep}"
+_IMPORT_SYSTEM = "<frozen importlib"
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -77,8 +84,30 @@ def format_stack(stack: Sequence[FrameType]) -> str:
 
 
 def format_stacks(threads: Iterable[int]) -> str:
-    """Return the stacks of threads as text; empty if there are none."""
-    return "\n".join(map(format_stack, stacks_of(threads).values()))
+    """Return the stacks of threads as text; empty if there are none.
+
+    Of a callback, they show the frames of user code only, unless COMPOSE_DEBUG is set.
+    """
+    stacks = stacks_of(threads).values()
+    if not os.environ.get("COMPOSE_DEBUG"):
+        return "\n".join(format_stack(user_frames(stack)) for stack in stacks)
+    return "\n".join(map(format_stack, stacks))
+
+
+def user_frames(stack: Sequence[FrameType]) -> Sequence[FrameType]:
+    """Return the frames of a stack that belong to user code; all of them if none does."""
+    internal = [is_internal(frame.f_code.co_filename) for frame in stack]
+    # The outermost frames are those of the thread.
+    depth = len(internal) - internal[::-1].index(True) - 1 if True in internal else 0
+    return [
+        frame for frame, skip in zip(stack[:depth], internal, strict=False) if not skip
+    ] or stack
+
+
+def is_internal(path: str) -> bool:
+    """Return whether a source file belongs to the composer or to Python's import system."""
+    is_composer = path.startswith(_COMPOSER) and not path.startswith(_SHARE)
+    return is_composer or path.startswith(_IMPORT_SYSTEM)
 
 
 def _outward(frame: FrameType | None) -> Iterator[FrameType]:

@@ -22,6 +22,8 @@ DISCOVERY_RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 _DISABLED = ("", "0", "false", "no", "off")
 #: Tokens: https://docs.ros.org/en/jazzy/Tutorials/Demos/Logging-and-logger-configuration.html
 CONSOLE_FORMAT = "[{severity}] [{name}] {message}"
+#: For ``rclpy.init``: without the log file of rcl, which would nearly always be empty.
+ROS_ARGUMENTS = ("--ros-args", "--disable-external-lib-logs")
 
 
 def check_environment(environment: Mapping[str, str]) -> None:
@@ -40,7 +42,7 @@ def refusals(environment: Mapping[str, str]) -> Iterator[StartRefused]:
 
 
 def log_folder(environment: Mapping[str, str]) -> Path | None:
-    """Return the folder that ROS writes its logs to; None without a home folder.
+    """Return the folder for logs of ROS programs; None without a home folder.
 
     See https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Logging.html.
     """
@@ -140,23 +142,9 @@ def _check_middleware(environment: Mapping[str, str]) -> None:
         )
 
 
-def _check_log_folder(environment: Mapping[str, str]) -> None:
-    """Refuse to start without a writable folder for logs, as rcl does."""
-    folder = log_folder(environment)
-    if folder is None:
-        return
-    ancestors = (path for path in (folder, *folder.parents) if os.path.lexists(path))
-    if not os.access(next(ancestors, folder), os.W_OK | os.X_OK):
-        raise StartRefused(
-            f"ROS cannot write its logs to '{folder}'",
-            "set ROS_LOG_DIR to a writable folder",
-        )
-
-
 _CHECKS = (
     _check_domain_id,
     _check_discovery_range,
     _check_security,
     _check_middleware,
-    _check_log_folder,
 )

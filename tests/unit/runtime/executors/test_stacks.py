@@ -11,7 +11,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from composer.runtime.executors.stacks import format_stack, gc_paused, stacks_of
+from composer.runtime.executors.exceptions import describe
+from composer.runtime.executors.stacks import format_stack, gc_paused, stacks_of, user_frames
 
 
 @pytest.fixture
@@ -42,6 +43,21 @@ def test_the_innermost_frame_is_first_and_shown_last(waiting: int) -> None:
     lines = format_stack(stack).splitlines()
     assert lines[0].endswith("in _bootstrap")
     assert "may_go.wait()" in format_stack(stack)
+
+
+def test_user_frames_are_those_within_the_composer(waiting: int) -> None:
+    stack = stacks_of((waiting,))[waiting]
+    assert user_frames(stack) == stack, "the composer is not in it"
+    found: list[str] = []
+
+    class Raised(Exception):
+        def __str__(self) -> str:
+            frames = user_frames(stacks_of((threading.get_ident(),))[threading.get_ident()])
+            found.extend(frame.f_code.co_name for frame in frames)
+            return ""
+
+    describe(Raised())
+    assert found == ["__str__"]
 
 
 def test_threads_that_have_ended_are_left_out(waiting: int) -> None:

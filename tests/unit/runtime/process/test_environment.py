@@ -74,17 +74,6 @@ def test_invalid_values_are_refused(environment: dict[str, str], message: str, h
     assert hint in refusal.value.hint
 
 
-@pytest.mark.parametrize("below", ["", "log"])
-def test_a_folder_for_logs_that_cannot_be_created_is_refused(tmp_path: Path, below: str) -> None:
-    (tmp_path / "file").touch(mode=0o644)
-    folder = str(tmp_path / "file" / below)
-    check_environment({"ROS_LOG_DIR": str(tmp_path / "new" / "folder")})
-    with pytest.raises(StartRefused, match="ROS cannot write its logs to") as refusal:
-        check_environment({"ROS_LOG_DIR": folder})
-    assert folder in str(refusal.value)
-    assert "ROS_LOG_DIR" in refusal.value.hint
-
-
 def test_the_folder_for_logs_is_that_of_ros() -> None:
     home = {"HOME": "/home/me"}
     assert log_folder({}) is None

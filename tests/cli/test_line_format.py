@@ -1,0 +1,72 @@
+"""Log lines have the format of RCUTILS_CONSOLE_OUTPUT_FORMAT."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from composer.cli.support.line_format import Line, LineFormat, console_format, file_format
+from composer.cli.support.progress import Progress
+from composer.model import LogLevel
+from composer.runtime.supervision.events import BroughtUp, Logged
+
+LINE = Line("WARN", "robot.planner", "no {name} yet", 1_700_000_000_012_345_678)
+
+
+@pytest.fixture(autouse=True)
+def time_zone() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TZ", "UTC")
+        time.tzset()
+        yield
+    time.tzset()
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[{severity}] [{name}] {message}", "[WARN] [robot.planner] no {name} yet"),
+        ("{time}|{time_as_nanoseconds}", "1700000000.012345678|1700000000012345678"),
+        ("{date_time_with_ms}", "2023-11-14 22:13:20.012"),
+        ("{file_name}:{line_number} {function_name}", ":0 "),
+        ("{unknown} {} {severity", "{unknown} {} {severity"),
+        (r"a\tb\n", "a\tb\n"),
+        ("", ""),
+    ],
+)
+def test_tokens_are_replaced_as_by_rcutils(text: str, expected: str) -> None:
+    assert LineFormat(text).render(LINE) == expected
+
+
+def test_without_a_format_lines_begin_with_the_elapsed_time() -> None:
+    stream = io.StringIO()
+    progress = Progress(stream)
+    progress.show(Logged(1.5, "planner", LogLevel.WARN, "no map"))
+    progress.show(BroughtUp(2.0, 3, 3))
+    assert stream.getvalue() == (
+        "[1.500] [WARN] [planner] no map\n"
+        "[2.000] [INFO] [compose] 3 of 3 nodes active after 2.00 s\n"
+    )
+
+
+def test_the_format_of_the_user_applies_to_all_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RCUTILS_CONSOLE_OUTPUT_FORMAT", "{severity} {name}: {message}")
+    stream = io.StringIO()
+    progress = Progress(stream, console_format())
+    progress.show(Logged(1.5, "planner", LogLevel.WARN, "no map"))
+    progress.show(BroughtUp(2.0, 3, 3))
+    assert stream.getvalue() == (
+        "WARN planner: no map\nINFO compose: 3 of 3 nodes active after 2.00 s\n"
+    )
+    assert file_format() == "{severity} {name}: {message}"
+
+
+def test_log_files_have_the_date_and_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("RCUTILS_CONSOLE_OUTPUT_FORMAT", raising=False)
+    assert console_format() is None
+    assert LineFormat(file_format()).render(LINE) == (
+        "[2023-11-14 22:13:20.012] [WARN] [robot.planner] no {name} yet"
+    )
