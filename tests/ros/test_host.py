@@ -166,6 +166,22 @@ def test_a_hanging_callback_does_not_delay_the_end(tmp_path: Path, peer: Peer, k
     assert {node.node: node.state for node in outcome.nodes}["/sensor"] == "finalized"
 
 
+def test_a_stuck_node_is_reported_before_it_continues(tmp_path: Path) -> None:
+    module = HANG.format(handler="on_deactivate").replace("sleep(6.0)", "while True: sleep(0.01)")
+    options = HostOptions(stop_within_s=1.0)
+    text = HANGING.replace("KIND", "events")
+    with running(text, tmp_path, options=options, planner=module) as system:
+        outcome = system.stop()
+    assert (outcome.exit_code, outcome.hung) == (1, False)
+    (stuck,) = system.reported(Stuck)
+    assert str(stuck).startswith("/planner is stuck and did not deactivate in\n")
+    assert "composer/runtime" not in stuck.stack, "only user code"
+    changes = system.states("/planner")
+    assert changes[2:] == ["/planner unconfigured", "/planner finalized"]
+    texts = list(map(str, system.events))
+    assert system.events.index(stuck) < texts.index(changes[2])
+
+
 def test_a_hanging_transition_fails_the_bring_up(tmp_path: Path) -> None:
     text = HANGING.replace("KIND", "events")
     module = HANG.format(handler="on_configure")

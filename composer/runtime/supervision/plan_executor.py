@@ -73,6 +73,7 @@ class _RunningStep:
     started_s: float
     limit_s: float
     end_s: float
+    is_reported: bool = False  # as stuck
 
     @property
     def late_s(self) -> float:
@@ -128,7 +129,7 @@ class PlanExecutor:
         main_queue: MainQueue[Item],
         report_failure: Callable[[StepFailed], None],
     ) -> None:
-        """Call ``report_failure`` for each failed step as soon as it has failed."""
+        """Call ``report_failure`` for each failed step as soon as it has failed, or is stuck."""
         self._node_set = node_set
         self._main_queue = main_queue
         self._report_failure = report_failure
@@ -207,7 +208,8 @@ class PlanExecutor:
         failure = self._failure(item)
         if failure is not None:
             phase.failures.append(failure)
-            self._report_failure(failure)
+            if not item.is_reported:
+                self._report_failure(failure)
 
     def _update_expected_state(self, item: _RunningStep) -> None:
         """Expect the node in the state that the step ended in; in none while the step runs."""
@@ -249,6 +251,10 @@ class PlanExecutor:
         if not own and time.monotonic() < item.late_s:
             return ""
         stack = node.loop.current_stack()
+        if running:  # report it now: once it is interrupted, the node may continue
+            item.is_reported = True
+            failure = StepFailed(item.step, "stuck", node.state, stuck=True, stack=stack)
+            self._report_failure(failure)
         for callback in own or running:
             callback.interrupt()
         if running:

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 from textwrap import dedent
 
+import pytest
 from std_msgs.msg import Int64
 
 from tests.ros.support.commands import COMPOSE, PATIENCE_S
@@ -42,15 +43,18 @@ class Loud(Behavior):
 """
 
 
-def test_a_system_whose_output_nothing_reads_runs_and_ends_in_time(
-    tmp_path: Path, peer: Peer
-) -> None:
-    (tmp_path / "loud.yaml").write_text(dedent(LOUD), encoding="utf-8")
-    (tmp_path / "loud.py").write_text(dedent(MODULE), encoding="utf-8")
+@pytest.fixture
+def loud(tmp_path: Path) -> Path:
+    path = tmp_path / "loud.yaml"
+    path.write_text(dedent(LOUD), encoding="utf-8")
+    path.with_suffix(".py").write_text(dedent(MODULE), encoding="utf-8")
+    return path
+
+
+def test_a_system_whose_output_nothing_reads_runs_and_ends_in_time(loud: Path, peer: Peer) -> None:
     reading, writing = os.pipe()
     fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
-    command = [*COMPOSE, "run", str(tmp_path / "loud.yaml")]
-    process = subprocess.Popen(command, stdout=writing, stderr=writing)
+    process = subprocess.Popen([*COMPOSE, "run", str(loud)], stdout=writing, stderr=writing)
     os.close(writing)
     try:
         beats = peer.listen(Int64, "/beat")
@@ -63,3 +67,12 @@ def test_a_system_whose_output_nothing_reads_runs_and_ends_in_time(
         process.kill()
         process.wait()
         os.close(reading)
+
+
+def test_a_closed_stderr_does_not_change_the_exit_code(loud: Path) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [*COMPOSE, "run", str(loud), "--for", "0.1"]
+    done = subprocess.run(command, stdout=writing, stderr=writing, check=False, timeout=PATIENCE_S)
+    os.close(writing)
+    assert done.returncode == 0
