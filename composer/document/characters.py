@@ -5,20 +5,13 @@ from __future__ import annotations
 import re
 import unicodedata
 
+from composer.characters import UNSAFE
 from composer.diagnostics import Diagnostic
 from composer.document.rules import FORBIDDEN_CHARACTER
 from composer.source import SourceFile, Span
 
-#: Controls (all but tab and line ends), characters that end a line for YAML 1.1 only, those that
-#: change the direction of text or are invisible, half surrogate pairs, byte-order marks inside
-#: the text, and noncharacters.
-_FORBIDDEN = (
-    "\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f"
-    "\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069"
-    "\ud800-\udfff\ufeff\ufff9-\ufffb\ufffe\uffff\U000e0000-\U000e007f"
-)
-_FORBIDDEN_IN_TEXT = re.compile(f"[{_FORBIDDEN}]")
-_FORBIDDEN_IN_VALUE = re.compile(f"[{_FORBIDDEN}\r]")
+_FORBIDDEN_IN_TEXT = re.compile(f"[{UNSAFE}]")
+_FORBIDDEN_IN_VALUE = re.compile(f"[{UNSAFE}\r]")
 
 
 def check_text(source: SourceFile) -> list[Diagnostic]:

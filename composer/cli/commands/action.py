@@ -24,7 +24,7 @@ from composer.cli.support.options import (
 )
 from composer.cli.support.output import as_json, as_yaml, print_names
 from composer.cli.support.ros import graph_names, ros_session
-from composer.cli.support.terminal import say, write
+from composer.cli.support.terminal import lines, say, write
 
 app = typer.Typer(
     help="List actions and send goals.",
@@ -65,10 +65,10 @@ def info(action: Action, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEO
     if json:
         write(as_json(asdict(found), indent=2))
         return
-    lines = [f"Action: {found.name}", f"Type: {', '.join(found.types)}"]
+    shown = [f"Action: {found.name}", f"Type: {', '.join(found.types)}"]
     for title, nodes in (("Action clients", found.clients), ("Action servers", found.servers)):
-        lines += [f"{title}: {len(nodes)}", *(f"  {node}" for node in nodes)]
-    write("\n".join(lines))
+        shown += [f"{title}: {len(nodes)}", *(f"  {node}" for node in nodes)]
+    write(lines(shown))
 
 
 def send_goal(

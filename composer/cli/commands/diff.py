@@ -14,7 +14,7 @@ from composer.cli.support.options import Json, Namespace, Timeout, examples, fin
 from composer.cli.support.output import as_json
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import SystemName, load_system, system_file
-from composer.cli.support.terminal import say, write
+from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
     from composer.drift import Drift, Snapshot
@@ -186,7 +186,7 @@ def _print(system: System, drifts: tuple[Drift, ...], *, json: bool) -> None:
         data = {"system": system.name.value, "clean": not drifts, "drift": found}
         write(as_json(data, indent=2))
     elif drifts:
-        write("\n".join(line for drift in drifts for line in _lines(drift)))
+        write(lines(line for drift in drifts for line in _lines(drift)))
     count = len(drifts)
     differences = f"{count} difference{'s' if count != 1 else ''}"
     say(f"{system.name.value}: {differences if count else 'runs as declared'}")
@@ -195,7 +195,7 @@ def _print(system: System, drifts: tuple[Drift, ...], *, json: bool) -> None:
 def _event(what: str, drift: Drift, *, json: bool) -> str:
     if json:
         return as_json({"event": what, **_as_data(drift)})
-    return "\n".join(
+    return lines(
         f"{what}: {line}" if number == 0 else line for number, line in enumerate(_lines(drift))
     )
 

@@ -15,7 +15,7 @@ from composer.cli.support.errors import FAILED
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
 from composer.cli.support.output import as_json
 from composer.cli.support.ros import ros_session
-from composer.cli.support.terminal import say, write
+from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
     from composer.doctor.result import CheckResult, Level
@@ -128,8 +128,8 @@ def _check_live_graph(timeout: float) -> Iterator[CheckResult]:
 
 def _text(result: CheckResult) -> str:
     head = f"{result.level.value:<{_LEVEL_WIDTH}}  {result.area:<{_AREA_WIDTH}}  "
-    line = head + result.message
-    return line if result.remedy is None else f"{line}\n{' ' * len(head)}-> {result.remedy}"
+    remedy = () if result.remedy is None else (f"{' ' * len(head)}-> {result.remedy}",)
+    return lines([head + result.message, *remedy])
 
 
 def _count(results: list[CheckResult], level: Level) -> int:

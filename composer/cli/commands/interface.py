@@ -11,7 +11,7 @@ from composer.cli.support.completion import complete_type
 from composer.cli.support.errors import CommandError
 from composer.cli.support.options import Json, examples
 from composer.cli.support.output import as_json
-from composer.cli.support.terminal import write
+from composer.cli.support.terminal import lines, write
 
 if TYPE_CHECKING:
     from composer.interfaces import Interfaces, Message
@@ -59,7 +59,7 @@ def list_interfaces(
     if json:
         write(as_json(names, indent=2))
     elif names:
-        write("\n".join(names))
+        write(lines(names))
 
 
 @app.command(
@@ -134,11 +134,11 @@ def _as_data(message: Message) -> dict[str, Any]:
 def _lines_of(message: Message, interfaces: Interfaces, flat: bool, indent: str = "") -> str:
     from composer.interfaces import Message
 
-    lines = [f"{indent}{item.type} {item.name}={item.value}" for item in message.constants]
+    shown = [f"{indent}{item.type} {item.name}={item.value}" for item in message.constants]
     for field in message.fields:
         default = "" if field.default is None else f" {field.default}"
-        lines.append(f"{indent}{field.type} {field.name}{default}")
+        shown.append(f"{indent}{field.type} {field.name}{default}")
         inner = None if flat or field.type.is_primitive else interfaces.find(field.type.name)
         if isinstance(inner, Message) and inner.fields:
-            lines.append(_lines_of(inner, interfaces, flat, indent + "  "))
-    return "\n".join(lines)
+            shown.append(_lines_of(inner, interfaces, flat, indent + "  "))
+    return "\n".join(shown)

@@ -14,7 +14,7 @@ from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
 from composer.cli.support.output import as_json, say_none_found
 from composer.cli.support.ros import ros_session
-from composer.cli.support.terminal import columns, say, write
+from composer.cli.support.terminal import columns, lines, say, write
 
 if TYPE_CHECKING:
     from composer.remote.lifecycle import LifecycleClient
@@ -91,7 +91,7 @@ def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False) -> None:
 def get(node: NodeName, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
     """Print the lifecycle state of a node."""
     with _client(timeout) as client:
-        write(client.state(client.find(node)))
+        write(lines([client.state(client.find(node))]))
 
 
 @app.command("list", epilog=examples("compose lifecycle list planner"))
@@ -105,7 +105,7 @@ def list_transitions(
         found = [{"id": item.id, "label": item.label, "goal": item.goal} for item in transitions]
         write(as_json(found, indent=2))
     elif transitions:
-        write("\n".join(item.label for item in transitions))
+        write(lines(item.label for item in transitions))
 
 
 class GoalState(StrEnum):
@@ -177,7 +177,7 @@ def set_state(
         failed = False
         for outcome in change_each(session, deadline, targets if nodes is None else nodes, request):
             if outcome.error is None:
-                write(str(outcome.result))
+                write(lines([str(outcome.result)]))
             else:
                 failed = True
                 say(CommandError(str(outcome.error), hint=outcome.error.hint).text())

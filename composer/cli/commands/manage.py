@@ -6,7 +6,7 @@ from composer.cli.support.errors import CommandError
 from composer.cli.support.options import Timeout, examples
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import RunningSystem, running_system_name
-from composer.cli.support.terminal import write
+from composer.cli.support.terminal import lines, write
 
 #: As long as a transition may take by default, with a margin.
 _TIMEOUT_S = 15.0
@@ -53,7 +53,7 @@ def down(system: RunningSystem, timeout: Timeout = _TIMEOUT_S) -> None:
         systems = Systems(session, deadline)
         found = systems.find(name)
         message = systems.shut_down(found)
-    write(f"{found}: {message}")
+    write(lines([f"{found}: {message}"]))
 
 
 def pause(system: RunningSystem, timeout: Timeout = _TIMEOUT_S) -> None:
@@ -92,4 +92,4 @@ def _command(command: str, service: str, text: str, timeout_s: float, *, failure
         success, message = systems.command(found, service)
     if not success:
         raise CommandError(f"{found} {failure}: {message}", hint=_HINT)
-    write(f"{found}: {message}")
+    write(lines([f"{found}: {message}"]))

@@ -11,7 +11,7 @@ from composer.cli.support.completion import complete_node
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Count, Hidden, Json, Timeout, examples
 from composer.cli.support.output import as_json, say_none_found
 from composer.cli.support.ros import graph_names, ros_session
-from composer.cli.support.terminal import columns, write
+from composer.cli.support.terminal import columns, lines, write
 
 app = typer.Typer(
     help="List and inspect running nodes.",
@@ -45,7 +45,7 @@ def list_nodes(
     elif json:
         write(as_json(nodes, indent=2))
     elif nodes:
-        write("\n".join(nodes))
+        write(lines(nodes))
     else:
         say_none_found("node")
 
@@ -73,9 +73,9 @@ def info(
     if json:
         write(as_json(found, indent=2))
         return
-    lines = [found["name"]]
+    shown = [found["name"]]
     for title, key in _SECTIONS:
-        lines.append(f"  {title}:")
+        shown.append(f"  {title}:")
         rows = [(f"    {item}:", ", ".join(types)) for item, types in found[key]]
-        lines += columns(rows).splitlines()
-    write("\n".join(lines))
+        shown += columns(rows).split("\n") if rows else []
+    write(lines(shown))

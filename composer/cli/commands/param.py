@@ -15,7 +15,7 @@ from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
 from composer.cli.support.output import as_json, as_yaml, say_none_found
 from composer.cli.support.ros import ros_session
-from composer.cli.support.terminal import columns, say, use_color, write
+from composer.cli.support.terminal import columns, lines, say, say_raw, use_color, write
 
 if TYPE_CHECKING:
     from composer.remote.parameters import ParameterClient, ParameterDescription
@@ -76,7 +76,7 @@ def list_parameters(
     if json:
         write(as_json(list(names), indent=2))
     elif names:
-        write("\n".join(names))
+        write(lines(names))
 
 
 def _list_all(json: bool, timeout: float) -> None:
@@ -95,7 +95,7 @@ def _list_all(json: bool, timeout: float) -> None:
                 f"{node} did not respond: its parameter services may be disabled, or it may be busy"
             )
         else:
-            write("\n".join((f"{node}:", *(f"  {name}" for name in names))))
+            write(lines([f"{node}:", *(f"  {name}" for name in names)]))
 
 
 @app.command("get", epilog=examples("compose param get planner max_velocity"))
@@ -186,7 +186,7 @@ def _print_values(node: str, values: dict[str, Any], json: bool) -> None:
     if json:
         write(as_json({node: {"ros__parameters": values}}, indent=2))
     else:
-        write("\n".join(f"{node} {name}: {as_json(value)}" for name, value in values.items()))
+        write(lines(f"{node} {name}: {as_json(value)}" for name, value in values.items()))
 
 
 def _yaml(text: str) -> Any:
@@ -207,7 +207,7 @@ def _read(file: Path) -> ParameterFiles:
     sections = ParameterFiles()
     diagnostics = read_parameter_file(file, sections)
     if diagnostics:
-        say(render(diagnostics, color=use_color(sys.stderr)))
+        say_raw(render(diagnostics, color=use_color(sys.stderr)))
     if has_errors(diagnostics):
         raise CommandError(f"'{file}' is not a ROS parameter file")
     return sections

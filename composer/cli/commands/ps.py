@@ -10,7 +10,7 @@ from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examp
 from composer.cli.support.output import as_json
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
-from composer.cli.support.terminal import columns, write
+from composer.cli.support.terminal import columns, lines, write
 
 if TYPE_CHECKING:
     from composer.remote.process_list import ProcessList
@@ -86,10 +86,11 @@ def _as_text(listed: ProcessList) -> str:
 
 def _system(name: str, report: SystemReport | None) -> str:
     if report is None:
-        return f"{name}: no response, its process may be busy or gone"
+        return lines([f"{name}: no response, its process may be busy or gone"])
     where = f"host {report.host}, process {report.pid}"
     rows = [_HEAD, *(_row(node) for node in report.nodes)]
-    return f"{name}: {report.activity}, {report.message} ({where})\n{columns(rows)}"
+    title = lines([f"{name}: {report.activity}, {report.message} ({where})"])
+    return f"{title}\n{columns(rows)}"
 
 
 def _row(node: NodeReport) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from composer.cli.support.options import (
 )
 from composer.cli.support.output import as_json, as_yaml, print_names
 from composer.cli.support.ros import graph_names, ros_session, types_of
-from composer.cli.support.terminal import write
+from composer.cli.support.terminal import lines, write
 
 app = typer.Typer(
     help="List and call services.",
@@ -52,7 +52,7 @@ def list_services(
 def type_of(service: Service, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
     """Print the type of a service."""
     types = types_of("compose service", "service", service, timeout)
-    write(as_json(list(types), indent=2) if json else "\n".join(types))
+    write(as_json(list(types), indent=2) if json else lines(types))
 
 
 @app.command(

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from composer.cli.support.terminal import columns
+from composer.cli.support.terminal import columns, lines
 from composer.runtime.metrics.figures import CallbackFigures, CallbackRates, rates
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def top_table(
     )
     text = columns([_TOP_HEAD, *map(_top_row, callbacks)], numbers_from=2)
     chains = [f"chain {chain.chain}: {chain.text}" for chain in report.chains]
-    shown = [title, *chains, *text.splitlines()]
+    shown = [*lines([title, *chains]).split("\n"), *text.split("\n")]
     if max_lines is not None and len(shown) > max_lines:
         shown = [*shown[: max_lines - 1], f"{len(shown) - max_lines + 1} more"]
     return "\n".join(shown)

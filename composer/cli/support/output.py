@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from composer.characters import escape_json, is_safe
 from composer.cli.support.terminal import columns, say, write
 
 
@@ -13,19 +14,25 @@ def as_yaml(value: Any, *, one_line: bool = False) -> str:
     """Return plain data as YAML, keys in their order."""
     import yaml
 
-    text: str = yaml.safe_dump(
-        value,
-        sort_keys=False,
-        allow_unicode=True,
-        width=float("inf") if one_line else 120,
-        default_flow_style=one_line,
-    )
+    def dump(*, allow_unicode: bool) -> str:
+        text: str = yaml.safe_dump(
+            value,
+            sort_keys=False,
+            allow_unicode=allow_unicode,
+            width=float("inf") if one_line else 120,
+            default_flow_style=one_line,
+        )
+        return text
+
+    text = dump(allow_unicode=True)
+    if not is_safe(text):  # PyYAML does not escape characters that change the direction of text
+        text = dump(allow_unicode=False)
     return text.removesuffix("\n...\n").rstrip("\n")  # the dots end a document of one scalar
 
 
 def as_json(value: Any, *, indent: int | None = None) -> str:
     """Return plain data as JSON; one line unless ``indent`` is given."""
-    return json.dumps(value, ensure_ascii=False, indent=indent)
+    return escape_json(json.dumps(value, ensure_ascii=False, indent=indent))
 
 
 def print_names(

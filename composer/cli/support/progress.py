@@ -6,10 +6,11 @@ import time
 from collections.abc import Sequence
 from typing import TextIO
 
+from composer.characters import escape_lines
 from composer.cli.support.callback_tables import summary_table
 from composer.cli.support.line_format import Line, LineFormat
 from composer.cli.support.process import report_ready
-from composer.cli.support.terminal import columns, use_color
+from composer.cli.support.terminal import columns, lines, use_color
 from composer.runtime.supervision.events import (
     BroughtUp,
     CallbackFailed,
@@ -29,6 +30,7 @@ from composer.runtime.supervision.events import (
 
 _GREEN, _YELLOW, _RED, _DIM = "32", "33", "31", "2"
 _MAX_CALLBACKS = 10
+_INDENT = "  "
 _MAX_NODES_WITH_ERRORS = 5
 
 
@@ -60,10 +62,16 @@ class Progress:
             name, text = event.logger, event.message
         else:
             name, text = "compose", str(event)
+        text = _continued(text)  # not the line: a format may have colors
         severity = _severity(event)
         if self._format is None:
             return f"[{event.elapsed_s:.3f}] [{severity}] [{name}] {text}"
         return self._format.render(Line(severity, name, text, time.time_ns()))
+
+
+def _continued(text: str) -> str:
+    """Return ``text`` with all lines but the first indented: a message must not look like two."""
+    return escape_lines(text).replace("\n", f"\n{_INDENT}")
 
 
 def _severity(event: Event) -> str:
@@ -95,7 +103,8 @@ def summary(outcome: Outcome) -> str:
     head = ("node", "state", "received", "sent", "requests", "dropped", "errors")
     rows = [head, *map(_row, outcome.nodes)]
     parts = [
-        f"ran for {outcome.elapsed_s:.1f} s: {outcome.reason}\n{columns(rows, numbers_from=2)}"
+        lines([f"ran for {outcome.elapsed_s:.1f} s: {outcome.reason}"]),
+        columns(rows, numbers_from=2),
     ]
     called = [callback for callback in outcome.callbacks if callback.count or callback.dropped]
     if called:

@@ -10,6 +10,7 @@ import tty
 from contextlib import suppress
 from typing import Any, Self
 
+from composer.characters import escape_lines
 from composer.cli.support.terminal import write, write_raw
 
 _ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
@@ -50,7 +51,7 @@ class Screen:
             write(f"{text}\n" if "\n" in text else text)  # a blank line between tables
             return
         width = shutil.get_terminal_size().columns
-        shown = "\n".join(f"{line[:width]}{_CLEAR_LINE}" for line in text.splitlines())
+        shown = "\n".join(f"{line[:width]}{_CLEAR_LINE}" for line in escape_lines(text).split("\n"))
         write_raw(f"{_HOME}{shown}{_CLEAR_BELOW}")
 
     def quit_requested(self) -> bool:

@@ -11,7 +11,7 @@ import typer
 
 from composer.cli.support.completion import complete_running_system
 from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.terminal import say, use_color
+from composer.cli.support.terminal import say, say_raw, use_color
 
 if TYPE_CHECKING:
     from composer.loading import LoadResult
@@ -174,7 +174,7 @@ def load_system(
     )
     reported = [item for item in result.diagnostics if item.severity is not Severity.INFO]
     if reported:
-        say(render(reported, color=use_color(sys.stderr)))
+        say_raw(render(reported, color=use_color(sys.stderr)))
     return result
 
 

@@ -1,13 +1,20 @@
-"""Output streams: data to stdout, messages to stderr, colors only on terminals."""
+"""Output streams: data to stdout, messages to stderr, colors only on terminals.
+
+Names, messages and parameters come from other processes and may contain anything. What would
+control the terminal is escaped here, so that no command has to. Only the command knows what belongs
+on one line: :func:`lines` and :func:`columns` escape line breaks too.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NoReturn, TextIO
 
+from composer.characters import escape_line, escape_lines
 from composer.cli.support.streams import drop
+from composer.report.display import visible, width
 
 #: The exit code that shells report after a write to a closed pipe (128 + SIGPIPE).
 CLOSED_PIPE = 141
@@ -16,13 +23,13 @@ CLOSED_PIPE = 141
 def write(text: str) -> None:
     """Print ``text`` and a newline to stdout. Ends the process quietly if the pipe is closed."""
     try:
-        print(text, flush=True)
+        print(escape_lines(text), flush=True)
     except BrokenPipeError:
         _end_quietly()
 
 
 def write_raw(text: str) -> None:
-    """Write exactly ``text`` to stdout, like :func:`write`."""
+    """Write exactly ``text`` to stdout, like :func:`write`, with its colors and controls."""
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
@@ -42,22 +49,36 @@ def write_bytes(data: bytes) -> None:
 
 def say(text: str) -> None:
     """Print ``text``, a message for the user, to stderr."""
+    say_raw(escape_lines(text))
+
+
+def say_raw(text: str) -> None:
+    """Print exactly ``text`` to stderr, like :func:`say`, with its colors and controls."""
     print(text, file=sys.stderr, flush=True)
+
+
+def lines(texts: Iterable[str]) -> str:
+    """Return texts as one line each."""
+    return "\n".join(map(escape_line, texts))
 
 
 def columns(rows: Sequence[Sequence[str]], numbers_from: int | None = None) -> str:
     """Return the rows as lines with their cells aligned, two spaces apart.
 
-    Columns from ``numbers_from`` on (counted from 0) are right-aligned.
+    Columns from ``numbers_from`` on (counted from 0) are right-aligned. A line break in a cell is
+    escaped; wide characters take two columns of the terminal.
     """
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    safe_rows = [[visible(cell) for cell in row] for row in rows]
+    widths = [max(map(width, column)) for column in zip(*safe_rows, strict=True)]
     numbers = len(widths) if numbers_from is None else numbers_from
+
+    def padded(cell: str, index: int) -> str:
+        space = " " * (widths[index] - width(cell))
+        return f"{cell}{space}" if index < numbers else f"{space}{cell}"
+
     return "\n".join(
-        "  ".join(
-            cell.ljust(width) if index < numbers else cell.rjust(width)
-            for index, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
+        "  ".join(padded(cell, index) for index, cell in enumerate(row)).rstrip()
+        for row in safe_rows
     )
 
 

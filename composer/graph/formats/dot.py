@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from composer.characters import escape_line, escape_lines
 from composer.graph.diagram import Cluster, Edge, EdgeKind, Graph, Vertex, VertexKind
 
 _VERTICES = {
@@ -87,8 +88,8 @@ def _label(lines: tuple[str, ...]) -> str:
 
 
 def _key(key: str) -> str:
-    """Quote an identifier, in which only quotes are special."""
-    return '"' + key.replace('"', '\\"') + '"'
+    """Quote an identifier. Its backslashes are doubled: the last one would escape the quote."""
+    return '"' + escape_line(key).replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def _text(text: str) -> str:
@@ -97,5 +98,5 @@ def _text(text: str) -> str:
 
 def _escaped(text: str) -> str:
     """Escape a label, in which backslashes start sequences and ampersands HTML entities."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("&", "&amp;")
+    escaped = escape_lines(text).replace("\\", "\\\\").replace('"', '\\"').replace("&", "&amp;")
     return escaped.replace("\n", "\\n")

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from composer.characters import escape_json
 from composer.graph.diagram import Cluster, Edge, Graph, Vertex
 
 
 def render(graph: Graph) -> str:
     """Return the graph as indented JSON text with a newline at the end."""
-    return json.dumps(as_data(graph), indent=2, ensure_ascii=False) + "\n"
+    return escape_json(json.dumps(as_data(graph), indent=2, ensure_ascii=False)) + "\n"
 
 
 def as_data(graph: Graph) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from composer.characters import escape_line
 from composer.graph.diagram import Cluster, Edge, EdgeKind, Graph, Vertex, VertexKind
 
 #: Mermaid's default limits (``maxTextSize``, ``maxEdges``).
@@ -67,7 +68,7 @@ def _lines(graph: Graph) -> Iterator[str]:
 
 def _title(graph: Graph) -> str:
     """Return the title as quoted YAML for Mermaid's front matter."""
-    text = f"{graph.title}: {graph.view}".replace("\\", "\\\\").replace('"', '\\"')
+    text = escape_line(f"{graph.title}: {graph.view}").replace("\\", "\\\\").replace('"', '\\"')
     return f'"{text}"'
 
 
@@ -119,4 +120,5 @@ def _quoted(lines: tuple[str, ...]) -> str:
 def _escaped(text: str) -> str:
     """Escape characters of Mermaid's and HTML's syntax as codes (``#35;`` is ``#``)."""
     special = '#&<>"`\\'
-    return "".join(f"#{ord(letter)};" if letter in special else letter for letter in text)
+    line = escape_line(text)
+    return "".join(f"#{ord(letter)};" if letter in special else letter for letter in line)

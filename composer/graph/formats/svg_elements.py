@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 
+from composer.characters import is_safe
 from composer.graph.diagram import EdgeKind, Vertex, VertexKind
 from composer.graph.layout import Frame, Path, Point, Rectangle, Size
 from composer.graph.measure import (
@@ -120,8 +121,8 @@ def text(line_text: str) -> str:
 
 
 def _is_shown(letter: str) -> bool:
-    """Return whether XML allows the character (XML 1.0, section 2.2)."""
-    return letter in "\t\n\r" or (letter >= " " and letter not in "\ufffe\uffff")
+    """Return whether XML allows the character (XML 1.0, section 2.2) and it is visible."""
+    return letter == "\r" or is_safe(letter)
 
 
 def _data_attributes(key: str, kind: str, namespace: str) -> str:

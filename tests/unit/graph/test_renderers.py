@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from composer.characters import is_safe
 from composer.graph import View, build_graph, scene_of
 from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
 from composer.graph.engines import Engine
@@ -54,6 +55,45 @@ def test_mermaid_marks_what_is_wrong() -> None:
     text = mermaid.render(evil_graph())
     assert "\n  class v2 wrong\n" in text
     assert "\n  linkStyle 0 stroke:" in text
+
+
+def hostile_graph() -> Graph:
+    """Return a graph with names as a participant of DDS, but no ROS node, can announce them."""
+    name = "/a\x1b]0;b\x07\n%%{init: {}}%%\u202e\x9b\ud800\\"
+    return Graph(
+        title=name,
+        view="nodes",
+        direction=Direction.RIGHT,
+        vertices=(
+            Vertex(name, VertexKind.NODE, (name,), cluster=name),
+            Vertex("b", VertexKind.TOPIC, ("b",)),
+        ),
+        edges=(Edge("edge", name, "b", EdgeKind.TOPIC, (name,)),),
+        clusters=(Cluster(name, name),),
+    )
+
+
+@pytest.mark.parametrize("form", [form for form in Format if form is not Format.PNG])
+def test_no_format_holds_control_characters(form: Format) -> None:
+    text = render([hostile_graph()], form, Engine.BUNDLED).decode()
+    assert is_safe(text)
+    if form is Format.JSON:
+        assert json.loads(text)["title"] == hostile_graph().title
+    if form is Format.SVG:
+        ET.fromstring(text)
+
+
+def test_a_line_break_in_a_name_starts_no_line_of_mermaid_or_dot() -> None:
+    for text in (mermaid.render(hostile_graph()), dot.render(hostile_graph())):
+        assert not any(line.startswith("%%") for line in text.splitlines())
+
+
+@pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz is not installed")
+def test_graphviz_reads_hostile_names() -> None:
+    command = ["dot", "-Tsvg"]
+    subprocess.run(
+        command, input=dot.render(hostile_graph()).encode(), check=True, capture_output=True
+    )
 
 
 @pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz is not installed")

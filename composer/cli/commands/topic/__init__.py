@@ -21,7 +21,7 @@ from composer.cli.support.options import (
 )
 from composer.cli.support.output import as_json, print_names
 from composer.cli.support.ros import graph_names, ros_session
-from composer.cli.support.terminal import write
+from composer.cli.support.terminal import lines, write
 
 if TYPE_CHECKING:
     from composer.qos import QosProfile
@@ -77,15 +77,15 @@ def info(
 
 
 def _as_text(found: TopicInfo, verbose: bool) -> str:
-    lines = [f"Type: {', '.join(found.types)}"]
+    shown = [f"Type: {', '.join(found.types)}"]
     for title, endpoints in (
         ("Publisher", found.publishers),
         ("Subscription", found.subscriptions),
     ):
-        lines.append(f"{title} count: {len(endpoints)}")
+        shown.append(f"{title} count: {len(endpoints)}")
         if verbose:
-            lines += [f"  {line}" for item in endpoints for line in _endpoint_lines(item)]
-    return "\n".join(lines)
+            shown += [f"  {line}" for item in endpoints for line in _endpoint_lines(item)]
+    return lines(shown)
 
 
 def _endpoint_lines(endpoint: EndpointInfo) -> list[str]:

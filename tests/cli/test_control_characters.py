@@ -1,0 +1,119 @@
+"""Names, messages and parameters of other processes do not control the terminal."""
+
+from __future__ import annotations
+
+import json
+from io import StringIO
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import yaml
+
+from composer.characters import is_safe
+from composer.cli.commands import diff, doctor, ps
+from composer.cli.commands import topic as topic_command
+from composer.cli.commands.topic.message_format import MessageFormat
+from composer.cli.support.output import as_json, as_yaml, print_names
+from composer.cli.support.progress import Progress
+from composer.cli.support.terminal import columns, lines, say, write
+from composer.doctor.result import warning
+from composer.drift.drift import Drift, DriftKind
+from composer.model import LogLevel
+from composer.runtime.supervision.events import Logged, Stopping
+
+#: Sets the title of the terminal, forges a line, turns the direction of the text, and reports CSI.
+HOSTILE = "a\x1b]0;b\x07\n[ERROR] forged\r\u202ec\x9b2J"
+
+
+def test_what_is_written_is_escaped(capsys: pytest.CaptureFixture[str]) -> None:
+    write(HOSTILE)
+    say(HOSTILE)
+    out, err = capsys.readouterr()
+    assert out == err == "a\\x1b]0;b\\x07\n[ERROR] forged\\r\\u202ec\\x9b2J\n"
+
+
+def test_one_text_is_one_line() -> None:
+    assert lines([HOSTILE, "next"]).split("\n")[1] == "next"
+
+
+def test_columns_stay_aligned() -> None:
+    table = columns([("name", "state"), (HOSTILE, "x"), ("\u4e16\u754c", "y"), ("e\u0301", "z")])
+    head, hostile, wide, combined = table.split("\n")
+    column = head.index("state")
+    assert hostile.index("x", column) == column
+    assert wide == "\u4e16\u754c".ljust(column - 2) + "y"
+    assert combined == "e\u0301".ljust(column + 1) + "z"
+
+
+def test_numbers_stay_aligned() -> None:
+    assert columns([("\u4e16", "1"), ("b", "10")], numbers_from=1).split("\n") == [
+        "\u4e16   1",
+        "b   10",
+    ]
+
+
+@pytest.mark.parametrize("types", [False, True])
+def test_a_hostile_name_is_one_line_of_a_list(
+    types: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    print_names("topic", [(HOSTILE, (HOSTILE,))], types=types, count=False, json=False)
+    out = capsys.readouterr().out
+    assert is_safe(out)
+    assert out.count("\n") == 1
+
+
+@pytest.mark.parametrize("value", [HOSTILE, "\u202e", "\x7f", "\ud800", "\u2028", "caf\xe9"])
+@pytest.mark.parametrize("one_line", [False, True])
+def test_data_is_escaped_without_loss(value: str, one_line: bool) -> None:
+    data: dict[str, Any] = {value: [value]}
+    text, shown = as_json(data), as_yaml(data, one_line=one_line)
+    assert is_safe(text)
+    assert is_safe(shown)
+    assert json.loads(text) == data
+    if value != "\ud800":  # PyYAML reads no surrogates
+        assert yaml.safe_load(shown) == data
+
+
+def test_texts_that_are_not_ascii_are_shown_as_they_are() -> None:
+    assert as_yaml({"name": "\u4e16 caf\xe9"}) == "name: \u4e16 caf\xe9"
+    assert as_json({"name": "\u4e16 caf\xe9"}) == '{"name": "\u4e16 caf\xe9"}'
+
+
+@pytest.mark.parametrize("options", [{}, {"json": True}, {"csv": True}, {"flow_style": True}])
+def test_payloads_are_escaped(options: dict[str, bool], capsys: pytest.CaptureFixture[str]) -> None:
+    write(MessageFormat(**options).text({"data": HOSTILE}))
+    assert is_safe(capsys.readouterr().out)
+
+
+def test_a_hostile_drift_has_the_usual_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    drift = Drift(DriftKind.EXTRA_NODE, HOSTILE, hint=HOSTILE)
+    write(diff._event("drift", drift, json=False))
+    assert len(capsys.readouterr().out.splitlines()) == 2
+
+
+def test_a_hostile_check_has_the_usual_lines() -> None:
+    assert len(doctor._text(warning("graph", HOSTILE, HOSTILE)).split("\n")) == 2
+
+
+def test_a_hostile_topic_has_the_usual_lines() -> None:
+    found: Any = SimpleNamespace(types=(HOSTILE,), publishers=(), subscriptions=())
+    assert len(topic_command._as_text(found, verbose=True).split("\n")) == 3
+
+
+def test_a_hostile_system_has_one_title() -> None:
+    report: Any = SimpleNamespace(activity="up", message=HOSTILE, host=HOSTILE, pid="1", nodes=())
+    for text in (ps._system(HOSTILE, None), ps._system("/robot", report).partition("\nnode ")[0]):
+        assert is_safe(text)
+        assert "\n" not in text
+
+
+def test_a_message_in_the_log_starts_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NO_COLOR", "1")
+    stream = StringIO()
+    progress = Progress(stream)
+    progress.show(Logged(1.0, "planner", LogLevel.INFO, HOSTILE))
+    progress.show(Stopping(1.0, HOSTILE))
+    shown = stream.getvalue()
+    assert is_safe(shown)
+    assert [line[:7] for line in shown.splitlines()] == ["[1.000]", "  [ERRO", "[1.000]", "  [ERRO"]
