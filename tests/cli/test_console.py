@@ -100,7 +100,8 @@ with queued_output():
     print("from Python")
     print("a message", file=sys.stderr)
     if os.fork() == 0:
-        print("from a forked process", flush=True)
+        sys.stdout.write("from a forked process\\n")
+        sys.stdout.flush()
         os._exit(0)
     os.wait()
     for _ in range(LINES):

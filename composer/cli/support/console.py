@@ -21,8 +21,11 @@ from composer.cli.support.streams import WrappedStream
 
 #: Text that may wait; beyond that, the oldest is dropped.
 _MAX_WAITING_CHARACTERS = 1_048_576
-#: One write; up to this size, Linux does not mix the writes of different processes to a pipe.
-_WRITE_CHARACTERS = 4096
+#: One write. If all threads are busy, this thread gets the GIL every 5 ms: with writes of 4 KiB, it
+#: would drop lines that could be written.
+_WRITE_CHARACTERS = 65_536
+#: One write at the end, when the program waits for progress.
+_LAST_WRITE_CHARACTERS = 4096
 #: At the end, waiting text is given up if none of it is written for this time ...
 _STALLED_S = 0.25
 #: ... and in any case after this time.
@@ -102,7 +105,8 @@ class OutputQueue:
                 note = f"... {self._dropped_lines} lines dropped: the output was blocked\n"
                 taken.append(note)
                 self._dropped_lines = 0
-            while self._texts and length < _WRITE_CHARACTERS:
+            limit = _LAST_WRITE_CHARACTERS if self._is_closing else _WRITE_CHARACTERS
+            while self._texts and length < limit:
                 taken.append(self._texts.popleft())
                 length += len(taken[-1])
             self._waiting -= length
