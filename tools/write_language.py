@@ -115,8 +115,8 @@ class Schema:
             return _NAMES.get(definition) or self.kind(self.definitions[definition], definition)
         if "enum" in part:
             return _either([f"`{word}`" for word in part["enum"]])
-        choices = [one for one in _branches(part) if "enum" in one]
-        if choices and "type" not in part:
+        choices = [one for one in part.get("oneOf", ()) if "enum" in one]
+        if choices:
             return self.kind(choices[0], key)
         types = part.get("type", [])
         words = [

@@ -199,9 +199,18 @@ def _wrong_type(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]
 
 
 def _unknown_word(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+    return _no_word_of(error, error.required)
+
+
+def _no_word_or_variable(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+    """Explain a value of ``oneOf: [{enum: ...}, a variable]``."""
+    return _no_word_of(error, [word for part in error.required for word in part.get("enum", ())])
+
+
+def _no_word_of(error: _SchemaError, words: list[str]) -> Iterator[Diagnostic]:
     found = describe(error.place.tree)
-    message = f"expected {_any_of(error.required)}{error.subject}, found {found}"
-    close = nearest(error.instance, error.required) if isinstance(error.instance, str) else None
+    message = f"expected {_any_of(words)}{error.subject}, found {found}"
+    close = nearest(error.instance, words) if isinstance(error.instance, str) else None
     hint = f"did you mean '{close}'?" if close is not None else None
     yield Diagnostic(rules.UNKNOWN_WORD, message, error.place.value_span, hint=hint)
 
@@ -239,6 +248,7 @@ _EXPLAINERS: dict[str, Callable[[_SchemaError, _MisspelledKeys], Iterator[Diagno
     "type": _wrong_type,
     "pattern": _wrong_type,
     "enum": _unknown_word,
+    "oneOf": _no_word_or_variable,
     **dict.fromkeys(_LIMITS, _out_of_range),
     "minItems": _nothing_there,
     "minProperties": _nothing_there,

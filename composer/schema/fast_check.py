@@ -121,6 +121,11 @@ def _some(compiler: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
     yield lambda value: any(part(value) for part in parts)
 
 
+def _one(compiler: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
+    parts = [compiler.test(part) for part in schema["oneOf"]]
+    yield lambda value: sum(part(value) for part in parts) == 1
+
+
 def _not(compiler: _Compiler, schema: dict[str, Any]) -> Iterable[Check]:
     part = compiler.test(schema["not"])
     yield lambda value: not part(value)
@@ -161,6 +166,7 @@ _KEYWORDS: dict[str, Callable[[_Compiler, dict[str, Any]], Iterable[Check]]] = {
     "items": _items,
     "allOf": _every,
     "anyOf": _some,
+    "oneOf": _one,
     "not": _not,
     "if": _if,
 }

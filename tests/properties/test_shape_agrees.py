@@ -64,6 +64,7 @@ def test_on_mutated_files(content: Any) -> None:
         ({"items": {"type": "string"}}, [[], ["a"], {}], [["a", 1]]),
         ({"allOf": [{"minimum": 1}, {"type": "integer"}]}, [1], [0, 1.5]),
         ({"anyOf": [{"minimum": 5}, {"type": "integer"}]}, [1, 5.5], [1.5]),
+        ({"oneOf": [{"minimum": 5}, {"type": "integer"}]}, [1, 5.5], [1.5, 5]),
         ({"not": {"type": "string"}}, [1, None], ["a"]),
         (
             {"if": {"type": "string"}, "then": {"pattern": "a"}, "else": {"minimum": 1}},
