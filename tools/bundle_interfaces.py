@@ -3,11 +3,15 @@
 Run it in an environment with ROS 2 Jazzy and composer_interfaces when either of them changes::
 
     python tools/bundle_interfaces.py
+
+Packages that this environment lacks keep their definitions. In the snapshot, tf2_msgs (license
+BSD-3-Clause) is from Debian's package ros-tf2-msgs, since it is not on PyPI.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 from composer.interfaces.parser import without_comments
@@ -16,9 +20,13 @@ from composer.interfaces.sources import FOLDERS, installed_prefixes
 TARGET = Path(__file__).parent.parent / "composer" / "interfaces" / "jazzy.json"
 
 
-def definitions() -> dict[str, str]:
-    """Return all installed definitions without comments, by name."""
-    texts: dict[str, str] = {}
+def definitions(known: Mapping[str, str]) -> dict[str, str]:
+    """Return all installed definitions without comments, by name.
+
+    Those of packages that are not installed are taken from ``known``.
+    """
+    installed = frozenset().union(*(prefix.packages() for prefix in installed_prefixes()))
+    texts = {name: text for name, text in known.items() if name.split("/")[0] not in installed}
     for prefix in installed_prefixes():
         for folder in FOLDERS:
             for name in prefix.names(folder):
@@ -30,7 +38,8 @@ def definitions() -> dict[str, str]:
 
 def main() -> None:
     """Write the snapshot."""
-    text = json.dumps(definitions(), indent=0, ensure_ascii=False)
+    known = json.loads(TARGET.read_text(encoding="utf-8"))
+    text = json.dumps(definitions(known), indent=0, ensure_ascii=False)
     TARGET.write_text(text + "\n", encoding="utf-8")
 
 

@@ -7,16 +7,10 @@ from importlib.util import find_spec
 
 from composer.doctor.result import CheckResult, error, ok
 from composer.interfaces import Interfaces
+from composer.interfaces.building import how_to_build
 
 AREA = "interfaces"
 _KINDS = ("msg", "srv", "action")
-
-
-def how_to_build(package: str) -> str:
-    """Return the commands that build and install an interface package."""
-    by_colcon = f"colcon build --packages-select {package}, then source install/setup.bash"
-    ours = package == "composer_interfaces"  # part of ros2-composer, which pip can build
-    return f"pip install ./interfaces   or: {by_colcon}" if ours else by_colcon
 
 
 def check_interfaces(
@@ -32,7 +26,7 @@ def check_interfaces(
         yield error(
             AREA,
             f"interface package '{package}' is not built: nodes that use it cannot start",
-            how_to_build(package),
+            how_to_build(package, sources.source_folder(package)),
         )
     stale = {
         package: names
@@ -44,7 +38,7 @@ def check_interfaces(
             AREA,
             f"interface package '{package}' was built from different definitions of"
             f" {', '.join(names)}",
-            f"colcon build --packages-select {package}, then restart all processes",
+            f"{how_to_build(package, sources.source_folder(package))}, then restart all processes",
         )
     if found and not missing and not stale:
         yield ok(AREA, f"built: {', '.join(found)}")

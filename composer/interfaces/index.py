@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from composer.diagnostics import nearest, suggestion
+from composer.diagnostics import nearest, shown, suggestion
 from composer.interfaces.definitions import Action, Interface, Message, Service
 from composer.interfaces.parser import DefinitionError, parse_definition, split_name
 from composer.interfaces.share_json import read_description
@@ -14,6 +15,8 @@ from composer.interfaces.sources import (
     Bundle,
     Definition,
     InterfaceSource,
+    Packages,
+    Prefix,
     find_packages,
     installed_prefixes,
 )
@@ -41,9 +44,13 @@ class InvalidDefinition:
 class Interfaces:
     """All known interfaces. A definition is read on first use."""
 
-    def __init__(self, sources: Iterable[InterfaceSource]) -> None:
-        self._sources = tuple(sources)
+    def __init__(self, sources: Iterable[InterfaceSource], project: Packages | None = None) -> None:
+        """Look for definitions in the packages of the ``project``, then in ``sources``."""
+        self._project = project if project is not None else Packages({})
+        self._others = tuple(sources)
         self._found: dict[str, Interface | InvalidDefinition | None] = {}
+        self._installed: dict[str, Interface | None] = {}
+        self._packages: frozenset[str] | None = None
 
     @classmethod
     def load(cls, folders: Iterable[Path] = ()) -> Interfaces:
@@ -53,7 +60,11 @@ class Interfaces:
         installed, installed packages are used at run time, and the snapshot is used if ROS is not
         installed.
         """
-        return cls((find_packages(folders), *installed_prefixes(), Bundle()))
+        return cls((*installed_prefixes(), Bundle()), find_packages(folders))
+
+    @property
+    def _sources(self) -> tuple[InterfaceSource, ...]:
+        return (self._project, *self._others)
 
     def find(self, name: str) -> Message | Service | Action | None:
         """Return the interface ``package/msg/Name`` (or srv, action); None if there is none.
@@ -72,6 +83,47 @@ class Interfaces:
         """Return the error in the definition of ``name``, or None."""
         found = self._look_up(name)
         return found if isinstance(found, InvalidDefinition) else None
+
+    def outdated(self, name: str) -> str | None:
+        """Return the interface that has to be built again before ``name`` can be used, or None.
+
+        It is ``name`` or a message in it, with a definition in the project that differs from the
+        installed one.
+        """
+        pending, seen = [name], {name}
+        while pending:
+            current = pending.pop()
+            if self._differs(current):
+                return current
+            found = self.find(current) if self._is_of_project(current) else None
+            inner = {field.type.name for part in _parts(found) for field in part.fields} - seen
+            seen |= inner
+            pending += sorted(inner)
+        return None
+
+    def source_folder(self, name: str) -> Path | None:
+        """Return the folder of the project's package that defines ``name``, or None."""
+        return self._project.folders.get(name.partition("/")[0])
+
+    def _is_of_project(self, name: str) -> bool:
+        return self.source_folder(name) is not None
+
+    def _differs(self, name: str) -> bool:
+        if not self._is_of_project(name):
+            return False
+        if name not in self._installed:
+            self._installed[name] = self._read_installed(name)
+        found, installed = self.find(name), self._installed[name]
+        return found is not None and installed is not None and found != installed
+
+    def _read_installed(self, name: str) -> Interface | None:
+        """Return the definition that was installed as text; descriptions lack the constants."""
+        for source in self._others:
+            definition = source.read(name) if isinstance(source, Prefix) else None
+            if definition is not None:
+                parsed = None if definition.is_json else _parse(name, definition)
+                return None if isinstance(parsed, InvalidDefinition) else parsed
+        return None
 
     def packages(self) -> frozenset[str]:
         """Return the packages that define interfaces."""
@@ -92,8 +144,47 @@ class Interfaces:
         for source in self._sources:
             definition = source.read(name)
             if definition is not None:
-                return _parse(name, definition)
+                parsed = _parse(name, definition)
+                return self._check_fields(parsed, definition) or parsed
         return None
+
+    def _check_fields(
+        self, interface: Interface | InvalidDefinition, definition: Definition
+    ) -> InvalidDefinition | None:
+        """Return an error if a field of a project's interface has a type that does not exist.
+
+        Types of unknown packages are not errors: their definitions may be installed elsewhere.
+        """
+        if isinstance(interface, InvalidDefinition) or not self._is_of_project(interface.name):
+            return None
+        for field in (field for part in _parts(interface) for field in part.fields):
+            if field.type.is_primitive or self._may_exist(field.type.name):
+                continue
+            written = re.search(rf"(?m)^.*\s{re.escape(field.name)}\b", definition.text)
+            line = definition.text.count("\n", 0, written.start()) + 1 if written else 1
+            message = f"field '{field.name}' has the unknown type '{shown(field.type.name)}'"
+            return InvalidDefinition(interface.name, definition.path, line, message)
+        return None
+
+    def _may_exist(self, name: str) -> bool:
+        if self._packages is None:
+            self._packages = self.packages()
+        if name.partition("/")[0] not in self._packages:
+            return True
+        return any(source.read(name) is not None for source in self._sources)
+
+
+def _parts(interface: Interface | None) -> tuple[Message, ...]:
+    """Return the messages that an interface is made of."""
+    match interface:
+        case Message():
+            return (interface,)
+        case Service():
+            return (interface.request, interface.response)
+        case Action():
+            return (interface.goal, interface.result, interface.feedback)
+        case None:
+            return ()
 
 
 def _parse(name: str, definition: Definition) -> Interface | InvalidDefinition:

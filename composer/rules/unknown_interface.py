@@ -72,4 +72,4 @@ def _hint(context: Context, port: Port) -> str | None:
     hint = similar_interface(full if slash else name, known)
     if hint is not None or not slash:
         return hint or f"include the package, as in std_msgs/{folder}/Name"
-    return f"package '{package}' is neither installed nor among the project's interfaces"
+    return f"install the package '{package}', or put its source into the folder 'interfaces'"

@@ -35,7 +35,12 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Check every reference to a profile by name."""
+    """Check every reference to a profile by name.
+
+    The systems that use a node type may declare the profiles that it names.
+    """
+    if context.system.node_type:
+        return
     for name in context.once(unknown_profiles):
         hint = (
             "omit 'qos' to use rclpy's defaults, or use 'command', which is the same"

@@ -44,7 +44,8 @@ def test_every_check_has_a_report() -> None:
     for path in (ROOT / ERRORS).glob("*.txt"):
         reported |= set(CODE.findall(path.read_text(encoding="utf-8")))
     checked = {check.__globals__["RULE"].code for check in all_checks()}
-    assert checked - reported == set()
+    # Outdated interfaces need an installed package: tests/unit/rules/test_outdated_interface.py.
+    assert checked - reported == {"RC307"}
 
 
 def test_ten_mistakes_give_ten_diagnostics(monkeypatch: pytest.MonkeyPatch) -> None:

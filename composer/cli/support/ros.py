@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.cli.support.errors import CommandError
@@ -38,7 +39,10 @@ def require_ros(command: str) -> None:
 
 def require_interfaces(system: System) -> None:
     """Raise CommandError if Python lacks an interface package that a port of the system uses."""
-    from composer.doctor.interfaces import how_to_build
+    from composer.interfaces.building import how_to_build
+    from composer.interfaces.sources import find_packages
+    from composer.node_types import interface_folders
+    from composer.project import Project
 
     users: dict[str, Node] = {}  # the first node that uses each package
     for node in system.nodes:
@@ -46,10 +50,11 @@ def require_interfaces(system: System) -> None:
             users.setdefault(port.interface.value.partition("/")[0], node)
     for package, node in users.items():
         if find_spec(package) is None:
+            folders = interface_folders(Project.at(Path.cwd()))
             raise CommandError(
                 f"interface package '{package}' of node '{node.name}' is not installed for"
                 " this Python",
-                hint=how_to_build(package),
+                hint=how_to_build(package, find_packages(folders).folders.get(package)),
             )
 
 

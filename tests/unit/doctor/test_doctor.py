@@ -108,7 +108,10 @@ def test_interface_packages_that_are_not_built_are_reported(tmp_path: Path) -> N
     (result,) = check_interfaces(["arm_interfaces"], sources, Interfaces.load())
     assert (result.level, result.area) == (Level.ERROR, "interfaces")
     assert "'arm_interfaces' is not built" in result.message
-    assert "colcon build --packages-select arm_interfaces" in (result.remedy or "")
+    assert (result.remedy or "").startswith("colcon build --packages-select arm_interfaces")
+    (package / "pyproject.toml").touch()
+    (result,) = check_interfaces(["arm_interfaces"], sources, Interfaces.load())
+    assert (result.remedy or "").startswith(f"pip install {package} ")
 
 
 def test_outdated_interface_packages_are_reported(tmp_path: Path) -> None:

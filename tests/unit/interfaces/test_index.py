@@ -210,3 +210,54 @@ def test_a_package_without_msg_text_is_read_from_its_type_description(tmp_path: 
 def test_other_json_is_not_a_type_description(text: str) -> None:
     with pytest.raises(ValueError, match=r"."):
         read_description("a_msgs/msg/A", text)
+
+
+def test_transforms_are_known_without_ros() -> None:
+    message = BUNDLED.message("tf2_msgs/msg/TFMessage")
+    assert message is not None
+    assert message.field_names == ("transforms",)
+
+
+@pytest.mark.parametrize(
+    ("files", "message", "line"),
+    [
+        ({"msg_Demo": "# a\nbool on\nOthr other\n"}, "field 'other' has the unknown type", 3),
+        ({"msg_Demo": "std_msgs/Heder header\n"}, "field 'header' has the unknown type", 1),
+        ({"msg_Demo": "bool on\nint33 x\n"}, "'int33' is neither a primitive type", 2),
+        ({"msg_Demo": "bool on\nOther other\n", "msg_Other": ""}, None, 0),
+        ({"msg_Demo": "elsewhere_msgs/Other other\n"}, None, 0),
+    ],
+)
+def test_wrong_types_of_fields_are_found(
+    tmp_path: Path, files: dict[str, str], message: str | None, line: int
+) -> None:
+    package(tmp_path / "demo", "demo_msgs", **files)
+    found = Interfaces.load([tmp_path])
+    problem = found.problem("demo_msgs/msg/Demo")
+    assert (problem is None) == (message is None)
+    assert (found.find("demo_msgs/msg/Demo") is None) == (message is not None)
+    if problem is not None and message is not None:
+        assert problem.message.startswith(message)
+        assert problem.place.endswith(f"demo/msg/Demo.msg:{line}")
+
+
+@pytest.mark.parametrize(
+    ("source", "outdated"),
+    [
+        ({"msg_Demo": "bool on\nOther other", "msg_Other": "int8 x"}, None),
+        ({"msg_Demo": "# new\nbool  on\nOther other", "msg_Other": "int8 x"}, None),
+        ({"msg_Demo": "bool off\nOther other", "msg_Other": "int8 x"}, "demo_msgs/msg/Demo"),
+        ({"msg_Demo": "bool on\nOther other", "msg_Other": "int16 x"}, "demo_msgs/msg/Other"),
+    ],
+)
+def test_changes_since_the_build_are_found(
+    tmp_path: Path, source: dict[str, str], outdated: str | None
+) -> None:
+    package(tmp_path / "source", "demo_msgs", **source)
+    built = {"msg_Demo": "bool on\nOther other", "msg_Other": "int8 x"}
+    installed = prefix(tmp_path / "install", "demo_msgs", **built)
+    found = Interfaces([installed, Bundle()], find_packages([tmp_path / "source"]))
+    assert found.outdated("demo_msgs/msg/Demo") == outdated
+    assert Interfaces([installed]).outdated("demo_msgs/msg/Demo") is None
+    without = Interfaces([Bundle()], find_packages([tmp_path / "source"]))
+    assert without.outdated("demo_msgs/msg/Demo") is None

@@ -43,4 +43,5 @@ def test_good_example_breaks_none(
 
 def test_all_checks_have_tested_examples() -> None:
     run = {rule.code for rule in RULES}
-    assert {check.__globals__["RULE"].code for check in all_checks()} - run == set()
+    # RC307 needs an installed package: test_outdated_interface.py.
+    assert {check.__globals__["RULE"].code for check in all_checks()} - run == {"RC307"}
