@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rclpy.action.server import CancelResponse, GoalResponse, ServerGoalHandle
+from rclpy.serialization import serialize_message
 
 from composer.behavior import CallCancelled
 from composer.model import FeedbackSteps, Port
@@ -15,7 +16,7 @@ from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.callbacks.timing import CallbackTimer
 from composer.runtime.executors.entities.goal_server import GoalServer
-from composer.runtime.executors.exceptions import is_closing, shown, text_of
+from composer.runtime.executors.exceptions import describe, is_closing, shown, text_of
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import sleep, within
@@ -220,9 +221,9 @@ class ActionServerPort:
 
         It succeeds, or is canceled if that was requested.
         """
-        if result is not None and not isinstance(result, self._type.Result):
-            text = f"returned {shown(result)}, not a {self._type.__name__}.Result"
-            self._context.error_log.error(f"on_{self._name}", text)
+        objection = self._objection(result)
+        if objection:
+            self._context.error_log.error(f"on_{self._name}", objection)
             self._end(goal, None, canceled=False)
             return
         if goal.is_open:
@@ -231,6 +232,18 @@ class ActionServerPort:
             else:
                 goal.succeed()
         self._end(goal, result, canceled=False)
+
+    def _objection(self, result: Any) -> str:
+        """Return why a handler's result cannot be sent; empty if it can."""
+        if result is None:
+            return ""
+        if not issubclass(type(result), self._type.Result):
+            return f"returned {shown(result)}, not a {self._type.__name__}.Result"
+        try:
+            serialize_message(result)
+        except Exception as error:  # such as a string that is not valid Unicode
+            return f"returned a result that cannot be sent: {describe(error)}"
+        return ""
 
     def _force_cancel(self, goal: RunningGoal) -> None:
         self._end(goal, None, canceled=True)

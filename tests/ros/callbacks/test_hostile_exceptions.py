@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pytest
+from action_msgs.msg import GoalStatus
+from composer_interfaces.action import Navigate
+from rclpy.action import ActionClient
 from std_srvs.srv import Trigger
 
-from tests.ros.support.in_process import Peer, running, wait_until
+from tests.ros.support.in_process import Peer, finished, running, wait_until
 
 SYSTEM = """
 system: hostile
@@ -18,9 +22,12 @@ nodes:
     services:
       ask: {type: std_srvs/srv/Trigger, external: true}
       ask_later: {type: std_srvs/srv/Trigger, external: true}
+    action_servers:
+      drive: {type: composer_interfaces/action/Navigate, external: true}
     timers: {tick: {period_ms: 2}, later: {period_ms: 2}}
 """
 MODULE = """
+from composer_interfaces.action import Navigate
 from composer.behavior import Behavior
 
 class TextRaises(Exception):
@@ -50,6 +57,11 @@ class Hostile(Behavior):
         self.ticks += 1
         if self.ticks <= len(ERRORS):
             raise ERRORS[self.ticks - 1]
+
+    async def on_drive(self, goal):
+        if goal.request.max_velocity < len(ERRORS):
+            raise ERRORS[int(goal.request.max_velocity)]
+        return Navigate.Result(message="\\udc80")  # cannot be sent
 
     async def on_later(self):
         await self.clock.sleep(0)
@@ -102,8 +114,15 @@ def test_whatever_a_handler_raises_is_counted_and_answered(
                 assert not response.success
                 assert reason in response.message
             assert peer.call(Trigger, service).success
+        client = ActionClient(peer.node, Navigate, "/drive")
+        wait_until(client.server_is_ready)
+        for number in range(7):
+            goal = Navigate.Goal(max_velocity=float(number))
+            handle = finished(peer.run(partial(client.send_goal_async, goal)))
+            response = finished(peer.run(handle.get_result_async))
+            assert response.status == GoalStatus.STATUS_ABORTED
         assert peer.state("/hostile") == "active"
-    assert system.summary("/hostile").errors == 2 * 6 + 2 * len(REASONS)
+    assert system.summary("/hostile").errors == 2 * 6 + 2 * len(REASONS) + 7
     log = system.log_text()
     assert "on_tick: TextRaises: <its text is not available: __str__ failed>\nTraceback" in log
     assert "composer/runtime" not in log, "only the lines of the user"
