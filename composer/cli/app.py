@@ -106,7 +106,7 @@ def compose(
         typer.Option(
             "--debug",
             callback=_set_debug,
-            help="Print the traceback of an internal error (or set COMPOSE_DEBUG=1).",
+            help="Print complete tracebacks of all errors (or set COMPOSE_DEBUG=1).",
         ),
     ] = False,
 ) -> None:

@@ -40,8 +40,9 @@ def report_of(error: BaseException) -> str:
 
     The traceback has only the frames of user code, if any; with COMPOSE_DEBUG set, all frames.
     """
+    line = describe(error)
     frames = _traceback(error, all_frames=bool(os.environ.get("COMPOSE_DEBUG")))
-    return f"{describe(error)}\n{frames}" if frames else describe(error)
+    return f"{line}\n{frames}" if frames else line
 
 
 def internal_report_of(error: BaseException) -> str:
