@@ -14,11 +14,12 @@ from typing import Any, Self, TypeVar
 
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.utilities import get_rmw_implementation_identifier
 
-from composer.runtime.process import dds_profiles
+from composer.runtime.process import dds_profiles, start_refused
 from composer.runtime.process.dds_participants import count_participants, enlarge_receive_buffers
 from composer.runtime.process.environment import ROS_ARGUMENTS
 from composer.runtime.process.instance_lock import local_systems
@@ -99,17 +100,23 @@ class Session:
     """A node in the ROS graph, hidden from node lists. Use it in a ``with`` block."""
 
     def __init__(self) -> None:
+        """Join the ROS graph. Raises RosError."""
         self._context = Context()
-        # Without signal handlers: Ctrl-C remains Python's KeyboardInterrupt.
-        self._context.init(list(ROS_ARGUMENTS))
-        self.node = _SessionNode(
-            f"{COMMAND_PREFIX}{os.getpid()}",
-            context=self._context,
-            use_global_arguments=False,
-            enable_rosout=False,
-            start_parameter_services=False,
-            parameter_overrides=[Parameter("start_type_description_service", value=False)],
-        )
+        try:
+            # Without signal handlers: Ctrl-C remains Python's KeyboardInterrupt.
+            self._context.init(list(ROS_ARGUMENTS))
+            self.node = _SessionNode(
+                f"{COMMAND_PREFIX}{os.getpid()}",
+                context=self._context,
+                use_global_arguments=False,
+                enable_rosout=False,
+                start_parameter_services=False,
+                parameter_overrides=[Parameter("start_type_description_service", value=False)],
+            )
+        except rclpy_implementation.RCLError as error:
+            self._context.try_shutdown()
+            refusal = start_refused(error)
+            raise RosError(str(refusal), refusal.hint) from error
         self.graph = RosGraph(self.node)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)

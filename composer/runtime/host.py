@@ -3,7 +3,7 @@
 ::
 
     from composer.runtime.host import Host, HostOptions
-    from composer.runtime.process import StartRefused
+    from composer.runtime.process import start_refused
 
     host = Host(system, bring_up(system), tear_down(system), HostOptions(run_for_s=5.0), report)
     try:
@@ -39,7 +39,7 @@ from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
 from composer.runtime.manager.other_instances import Instance
 from composer.runtime.node.node import NodeListener, RunningNode
 from composer.runtime.node.options import ProcessContext
-from composer.runtime.process import StartRefused
+from composer.runtime.process import start_refused
 from composer.runtime.process.dds_profiles import use_large_system_profile
 from composer.runtime.process.environment import ROS_ARGUMENTS, prepare_environment
 from composer.runtime.process.fast_exit import leave_ros_graph, supports_fast_exit
@@ -175,7 +175,10 @@ class Host:
             write_log=self._reporter.log,
         )
         use_sim_time = self._system.use_sim_time
-        manager = ManagerNode(namespace, self._status, callbacks, use_sim_time=use_sim_time)
+        try:  # the first node of a process joins the ROS graph
+            manager = ManagerNode(namespace, self._status, callbacks, use_sim_time=use_sim_time)
+        except rclpy_implementation.RCLError as error:
+            raise start_refused(error) from error
         try:
             if self._create(manager.process_context):
                 self._bring_up_and_supervise()
@@ -343,7 +346,7 @@ def _start_ros() -> None:
     try:
         rclpy.init(args=list(ROS_ARGUMENTS), signal_handler_options=SignalHandlerOptions.NO)
     except rclpy_implementation.RCLError as error:
-        raise StartRefused(f"ROS does not start: {error}", "see the lines above") from error
+        raise start_refused(error) from error
 
 
 def _summary(node: RunningNode) -> NodeSummary:

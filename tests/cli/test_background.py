@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -55,3 +58,31 @@ def test_a_log_folder_that_cannot_be_created_is_reported(
     with pytest.raises(CommandError, match="cannot write the log of the system to ") as raised:
         run_in_background("minimal", ["minimal"], 60.0)
     assert "set ROS_LOG_DIR to a writable folder" in raised.value.text()
+
+
+#: A user id without an account, as in a container.
+WITHOUT_HOME = """
+import os
+from composer.cli.support.process import run_in_background
+from composer.cli.support.errors import CommandError
+from composer.runtime.process import environment
+del os.environ["HOME"]
+os.environ.pop("ROS_LOG_DIR", None)
+os.environ.pop("ROS_HOME", None)
+os.setuid(4242)
+try:
+    run_in_background("minimal", ["minimal"], 60.0)
+except CommandError as error:
+    print(error.message)
+    print(error.hint)
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
+def test_without_a_folder_for_the_log_the_variables_are_named() -> None:
+    command = [sys.executable, "-c", WITHOUT_HOME]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=30)
+    assert done.stdout == (
+        "there is no folder for the log: neither ROS_LOG_DIR nor HOME is set, and user 4242 has no"
+        " home folder\nset ROS_LOG_DIR to a writable folder\n"
+    )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.support.errors import FAILED
+from composer.cli.support.errors import FAILED, CommandError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
 from composer.cli.support.output import as_json
 from composer.cli.support.ros import ros_session
@@ -117,6 +117,8 @@ def _check_live_graph(timeout: float) -> Iterator[CheckResult]:
             yield check_delivery(session)
             yield check_discovery(session, deadline)
             yield from check_graph(session, deadline)
+    except CommandError as problem:
+        yield error("middleware", problem.message, problem.hint or _RETRY)
     except (ImportError, RuntimeError) as problem:  # rclpy's own errors are RuntimeErrors
         yield error(
             "middleware",

@@ -111,7 +111,14 @@ def _log_path(system: str) -> Path:
     """Return a new file name in the ROS log folder."""
     from composer.runtime.process.environment import log_folder
 
-    folder = log_folder(os.environ) or Path.home() / ".ros" / "log"
+    try:
+        folder = log_folder(os.environ) or Path.home() / ".ros" / "log"
+    except RuntimeError as error:  # no HOME, and a user id without an account, as in containers
+        raise CommandError(
+            "there is no folder for the log: neither ROS_LOG_DIR nor HOME is set, and user"
+            f" {os.geteuid()} has no home folder",
+            hint="set ROS_LOG_DIR to a writable folder",
+        ) from error
     now = datetime.now().astimezone().strftime("%Y-%m-%d-%H-%M-%S")
     return folder / f"{system}-{now}-{os.getpid()}.log"
 
@@ -119,7 +126,7 @@ def _log_path(system: str) -> Path:
 def _new_file(path: Path) -> BinaryIO:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        return path.open("wb")
+        return path.open("xb")  # follows no symbolic link that is there already
     except OSError as problem:
         raise CommandError(
             f"cannot write the log of the system to '{path}': {problem.strerror}",

@@ -15,6 +15,7 @@ from uuid import uuid4
 
 from rclpy.context import Context
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.utilities import get_rmw_implementation_identifier
@@ -87,6 +88,8 @@ def unsupported_reason(context: Context | None = None) -> str | None:
         enable_rosout=False,
         start_parameter_services=False,
         use_global_arguments=False,
+        # rclpy would leave this service in the graph until the process ends.
+        parameter_overrides=[Parameter("start_type_description_service", value=False)],
     )
     try:
         _self_test(node)

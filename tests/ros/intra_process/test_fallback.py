@@ -11,10 +11,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from rclpy.context import Context
+from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Int64
 
-from composer.runtime.intra_process.ignore_local_publications import _Options, _Subscription
+from composer.runtime.intra_process.ignore_local_publications import (
+    _Options,
+    _Subscription,
+    unsupported_reason,
+)
 from tests.ros.support.commands import COMPOSE
 from tests.ros.support.in_process import Peer, wait_until
 from tests.ros.support.sequences import Sequences
@@ -182,3 +188,16 @@ def test_the_doctor_reports_it(middleware: str | None, tmp_path: Path) -> None:
         assert found["level"] == "note"
         assert found["message"].endswith(REASONS[middleware])
         assert "'delivery: dds'" in found["remedy"]
+
+
+def test_the_self_test_leaves_nothing_in_the_graph() -> None:
+    context = Context()
+    context.init([])
+    node = Node("watcher", context=context)
+    try:
+        assert unsupported_reason.__wrapped__(context) is None
+        found = [*node.get_service_names_and_types(), *node.get_topic_names_and_types()]
+        assert [name for name, _ in found if "trial" in name] == []
+    finally:
+        node.destroy_node()
+        context.try_shutdown()
