@@ -201,10 +201,13 @@ def names_by_node(session: Session, deadline: Deadline) -> dict[str, list[str] |
     }
     managers = proxies.nodes(PARAMETERS)
     proxies.close()
-    by_manager = {manager: listed.pop(manager, None) for manager in set(managers.values())}
-    return listed | {
-        node: _of_node(node, by_manager[manager]) for node, manager in managers.items()
+    own = {
+        manager: names and [name for name in names if not name.startswith("/")]
+        for manager in managers.values()
+        if (names := listed.get(manager)) is not None
     }
+    proxied = {node: _of_node(node, listed.get(manager)) for node, manager in managers.items()}
+    return listed | own | proxied
 
 
 def _of_node(node: str, listed: list[str] | None) -> list[str] | None:

@@ -135,16 +135,19 @@ class GraphObserver:
         self, found: dict[str, dict[str, Plain] | None]
     ) -> dict[str, dict[str, Plain] | None]:
         """Move the parameters that managers list for other nodes to these nodes."""
-        managers = self._proxies.nodes(PARAMETERS)
-        by_manager = {manager: found.pop(manager, None) for manager in set(managers.values())}
-        for node, manager in managers.items():
-            values, prefix = by_manager[manager], full_parameter_name(node, "")
-            found[node] = values and {
+        proxied: dict[str, dict[str, Plain] | None] = {}
+        for node, manager in self._proxies.nodes(PARAMETERS).items():
+            values, prefix = found.get(manager), full_parameter_name(node, "")
+            proxied[node] = values and {
                 name.removeprefix(prefix): value
                 for name, value in values.items()
                 if name.startswith(prefix)
             }
-        return found
+        own = {
+            node: values and {name: values[name] for name in values if not name.startswith("/")}
+            for node, values in found.items()
+        }
+        return own | proxied
 
     def _response_deadline(self, deadline: Deadline) -> Deadline:
         return Deadline(min(_RESPONSE_S, deadline.left_s))

@@ -37,12 +37,13 @@ from composer.runtime.executors.factory import log_exception
 from composer.runtime.executors.loop import Reply, unused_callback
 from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.other_instances import Instance, OtherInstances
-from composer.runtime.manager.proxy_services import ProxyServices
+from composer.runtime.manager.proxy_services import ProxyLifecycleService, ProxyParameterStore
 from composer.runtime.manager.status_messages import status_message
 from composer.runtime.metrics.diagnostics import Figures, to_message
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.node import RunningNode
 from composer.runtime.node.options import ProcessContext
+from composer.runtime.node.parameter_services import ParameterServices
 from composer.runtime.process.graph_socket import GraphSocket
 from composer.runtime.ros.manager_protocol import (
     CALLBACKS_QOS,
@@ -108,10 +109,12 @@ class ManagerNode:
             namespace=namespace,
             use_global_arguments=False,
             enable_rosout=False,
-            start_parameter_services=False,
-            parameter_overrides=[Parameter("start_type_description_service", value=False)],
+            start_parameter_services=False,  # see parameter_services.py
         )
         self._log = Log(self._node, LogLevel.INFO, host.write_log)
+        store = ProxyParameterStore(self._node, host.nodes)
+        ParameterServices(self._node, store, self._log.warn)
+        self._loop.add_node(self._node)
         simulated_time = SimTimeSource(self._node, self._loop, self._log.warn)
         self.process_context = ProcessContext(simulated_time, EventCounts(self._loop))
         self._clock = NodeTime(self._node, self._loop, simulated_time)
@@ -132,7 +135,7 @@ class ManagerNode:
             on_permanent=self._warn_of_instance,
         )
         if any(node.left_to_manager for node in status.snapshot().nodes):
-            ProxyServices(self._node, self._loop, host.nodes, self._publish)
+            ProxyLifecycleService(self._node, self._loop, host.nodes, self._publish)
         self._graph = GraphObserver(self._node, self._state.topic_name)
         self._graph_socket = GraphSocket(namespace, self._graph.view, self._on_graph_error)
         self._loop.start()

@@ -11,7 +11,7 @@ the standard types, and requests contain the name of the node:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from copy import copy
 from typing import Any
 
@@ -23,159 +23,128 @@ from rcl_interfaces.msg import (
     SetParametersResult,
 )
 from rcl_interfaces.msg import Parameter as ParameterMessage
-from rcl_interfaces.srv import (
-    DescribeParameters,
-    GetParameters,
-    GetParameterTypes,
-    ListParameters,
-    SetParameters,
-    SetParametersAtomically,
-)
-from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.loop import Reply, unused_callback
 from composer.runtime.node.node import RunningNode
+from composer.runtime.node.parameter_services import (
+    NodeParameterStore,
+    UnknownParameterError,
+    descriptor_of,
+    set_parameters,
+    value_of,
+)
 from composer.runtime.ros.manager_protocol import CHANGE_STATE, full_parameter_name
 
+#: Returns the nodes of the system by their full names.
+Nodes = Callable[[], Mapping[str, RunningNode]]
 
-class ProxyServices:
-    """The services for the nodes that ``nodes()`` returns by their full names."""
+
+class ProxyLifecycleService:
+    """The service ``change_state`` for the nodes that ``nodes()`` returns."""
 
     def __init__(
-        self,
-        node: Node,
-        loop: EventLoop,
-        nodes: Callable[[], Mapping[str, RunningNode]],
-        publish_states: Callable[[], None],
+        self, node: Node, loop: EventLoop, nodes: Nodes, publish_states: Callable[[], None]
     ) -> None:
-        """Add the services to ``node``; call ``publish_states`` after each response."""
-        self._node = node
+        """Add the service to ``node``; call ``publish_states`` after each response."""
         self._loop = loop
         self._nodes = nodes
         self._publish_states = publish_states
-        self._add_service(CHANGE_STATE, ChangeState, self._change_state)
-        self._add_service("list_parameters", ListParameters, self._list)
-        self._add_service("get_parameters", GetParameters, self._get)
-        self._add_service("get_parameter_types", GetParameterTypes, self._get_types)
-        self._add_service("describe_parameters", DescribeParameters, self._describe)
-        self._add_service("set_parameters", SetParameters, self._set)
-        self._add_service("set_parameters_atomically", SetParametersAtomically, self._set_all)
+        service = node.create_service(ChangeState, f"~/{CHANGE_STATE}", unused_callback)
+        loop.add_service(service, self._on_request)
 
-    def _add_service(
-        self, name: str, kind: Any, answer: Callable[[Any], Coroutine[Any, Any, Any]]
-    ) -> None:
-        async def reply_to(request: Any, reply: Reply) -> None:
-            try:
-                response = await answer(request)
-            except BaseException:
-                reply(kind.Response())
-                raise
-            reply(response)
-            self._publish_states()
+    def _on_request(self, request: Any, reply: Reply) -> None:
+        self._loop.run_task(self._change_state(request, reply))
 
-        def on_request(request: Any, reply: Reply) -> None:
-            self._loop.run_task(reply_to(request, reply))
-
-        service = self._node.create_service(kind, f"~/{name}", unused_callback)
-        self._loop.add_service(service, on_request)
-
-    async def _change_state(self, request: Any) -> Any:
+    async def _change_state(self, request: Any, reply: Reply) -> None:
         name, _, transition = request.transition.label.partition(" ")
         node = self._nodes().get(name)
-        if node is None:
-            return ChangeState.Response(success=False)
-        result = await node.loop.run_task(node.lifecycle.change(transition))
-        return ChangeState.Response(success=result.success)
+        success = False
+        try:
+            if node is not None:
+                result = await node.loop.run_task(node.lifecycle.change(transition))
+                success = result.success
+        finally:
+            reply(ChangeState.Response(success=success))
+        self._publish_states()
 
-    async def _list(self, request: Any) -> Any:
+
+class ProxyParameterStore(NodeParameterStore):
+    """The parameters of the manager, and those of the nodes that ``nodes()`` returns.
+
+    Unknown parameters of nodes are not set.
+    """
+
+    def __init__(self, manager: Node, nodes: Nodes) -> None:
+        super().__init__(manager)
+        self._nodes = nodes
+
+    async def list_names(self, prefixes: list[str], depth: int) -> ListParametersResult:
         """Return the parameters of the nodes in ``prefixes``, by default of all proxied nodes."""
-        prefixes = set(request.prefixes)
-        result = ListParametersResult()
+        requested = set(prefixes)
+        result = await super().list_names(prefixes, depth)
         for name, node in self._nodes().items():
-            if name in prefixes or not (prefixes or node.model.introspection.parameters):
-                names = await node.query(_parameter_names)
+            if name in requested or not (requested or node.model.introspection.parameters):
+                names = await node.query(lambda ros_node: ros_node.list_parameters([], 0).names)
                 result.prefixes.append(name)
                 result.names += [full_parameter_name(name, parameter) for parameter in names]
-        return ListParameters.Response(result=result)
+        return result
 
-    async def _get(self, request: Any) -> Any:
-        return GetParameters.Response(values=[await self._value(name) for name in request.names])
-
-    async def _get_types(self, request: Any) -> Any:
-        values = [await self._value(name) for name in request.names]
-        return GetParameterTypes.Response(types=[value.type for value in values])
-
-    async def _describe(self, request: Any) -> Any:
-        return DescribeParameters.Response(
-            descriptors=[await self._description(name) for name in request.names]
-        )
-
-    async def _set(self, request: Any) -> Any:
-        results = [await self._assign([change]) for change in request.parameters]
-        return SetParameters.Response(results=results)
-
-    async def _set_all(self, request: Any) -> Any:
-        return SetParametersAtomically.Response(result=await self._assign(request.parameters))
-
-    async def _value(self, name: str) -> ParameterValue:
+    async def value(self, name: str) -> ParameterValue:
+        """Return the value of a parameter."""
+        if not _is_of_node(name):
+            return await super().value(name)
         node, parameter = self._find(name)
         if node is None:
             return ParameterValue()
-        return await node.query(lambda ros_node: _parameter_value(ros_node, parameter))
+        try:
+            return await node.query(lambda ros_node: value_of(ros_node, parameter))
+        except UnknownParameterError:
+            return ParameterValue()
 
-    async def _description(self, name: str) -> ParameterDescriptor:
+    async def type_of(self, name: str) -> int:
+        """Return the type of a parameter."""
+        if not _is_of_node(name):
+            return await super().type_of(name)
+        return int((await self.value(name)).type)
+
+    async def descriptor(self, name: str) -> ParameterDescriptor:
+        """Return the descriptor of a parameter."""
+        if not _is_of_node(name):
+            return await super().descriptor(name)
         node, parameter = self._find(name)
-        if node is None:
+        try:
+            if node is None:
+                return ParameterDescriptor(name=name)
+            descriptor = copy(await node.query(lambda ros_node: descriptor_of(ros_node, parameter)))
+        except UnknownParameterError:
             return ParameterDescriptor(name=name)
-        descriptor = await node.query(lambda ros_node: _descriptor(ros_node, parameter))
-        descriptor = copy(descriptor)
         descriptor.name = name
         return descriptor
 
-    async def _assign(self, changes: list[ParameterMessage]) -> SetParametersResult:
+    async def set(self, changes: list[ParameterMessage]) -> SetParametersResult:
+        """Set all parameters or none; they must belong to one node."""
+        if not any(_is_of_node(change.name) for change in changes):
+            return await super().set(changes)
         names = {change.name.partition(".")[0] for change in changes}
         nodes = [self._nodes().get(name) for name in names]
         if len(nodes) != 1 or nodes[0] is None:
             shown = ", ".join(sorted(names))
             return SetParametersResult(
-                successful=False, reason=f"expected parameters of one node, not of {shown}"
+                successful=False, reason=f"expected parameters of one node, not of {shown:.500}"
             )
         own = [
             ParameterMessage(name=change.name.partition(".")[2], value=change.value)
             for change in changes
         ]
-        return await nodes[0].query(lambda ros_node: _set_parameters(ros_node, own))
+        return await nodes[0].query(lambda ros_node: set_parameters(ros_node, own))
 
     def _find(self, name: str) -> tuple[RunningNode | None, str]:
         node, _, parameter = name.partition(".")
         return self._nodes().get(node), parameter
 
 
-# rclpy answers parameter requests only in services that it creates itself. These functions return
-# the same results, for requests of other services.
-
-
-def _parameter_names(node: Node) -> list[str]:
-    return list(node.list_parameters([], 0).names)
-
-
-def _parameter_value(node: Node, name: str) -> ParameterValue:
-    return node.get_parameter_or(name, Parameter(name)).get_parameter_value()
-
-
-def _descriptor(node: Node, name: str) -> ParameterDescriptor:
-    try:
-        return node.describe_parameter(name)
-    except ParameterNotDeclaredException:
-        return ParameterDescriptor(name=name)
-
-
-def _set_parameters(node: Node, changes: Iterable[ParameterMessage]) -> SetParametersResult:
-    """Set all parameters or none."""
-    try:
-        return node.set_parameters_atomically(list(map(Parameter.from_parameter_msg, changes)))
-    except ParameterNotDeclaredException as error:
-        return SetParametersResult(successful=False, reason=str(error))
+def _is_of_node(name: str) -> bool:
+    """Return whether ``name`` begins with the full name of a node."""
+    return name.startswith("/")

@@ -37,6 +37,7 @@ from composer.runtime.node.behavior_loader import (
 from composer.runtime.node.entities import NodeEntities, RunningPort
 from composer.runtime.node.lifecycle import FINALIZED, Lifecycle, TransitionOutcome
 from composer.runtime.node.options import NodeOptions
+from composer.runtime.node.parameter_services import NodeParameterStore, ParameterServices
 from composer.runtime.node.parameters import NodeParameters, ParameterValues
 from composer.runtime.node.ros_node import make_ros_node
 
@@ -120,6 +121,8 @@ class RunningNode:
             self._ros, model.parameters, check=self._check_timers, changed=self._parameters_changed
         )
         self._context.names["parameters"] = parameters.values
+        if offers.parameters:
+            ParameterServices(self._ros, NodeParameterStore(self._ros), log.warn)
         self._keeps_entities = False
         loop.add_node(self._ros)
         self.lifecycle = Lifecycle(

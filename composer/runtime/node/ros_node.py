@@ -40,6 +40,6 @@ def make_ros_node(model: Node) -> RosNode:
         namespace=model.namespace.value,
         use_global_arguments=False,
         enable_rosout=False,
-        start_parameter_services=offers.parameters,
+        start_parameter_services=False,  # see parameter_services.py
         parameter_overrides=overrides,
     )

@@ -1,0 +1,136 @@
+"""Service types whose requests are limited before they become Python objects.
+
+rclpy converts a whole request while it holds the interpreter's lock: 50 000 parameters take two
+seconds, in which no node of the process runs. Here the size of the request is read from the C
+message that the middleware has filled, which takes a hundredth of that, and a request that is too
+large is not converted.
+
+rclpy finds the conversion in an attribute of the metaclass of the request; the types here have
+another one. This is rosidl_generator_py's interface, and the layout of its C structures.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    GetParameterTypes,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+from rclpy.type_support import check_is_valid_srv_type
+
+#: Names in one request; a response with so many values takes a few milliseconds.
+MAX_NAMES = 10_000
+#: Parameters to set, or prefixes to list, in one request.
+MAX_PARAMETERS = 1000
+#: Array items and characters of all values in one request or response.
+MAX_ITEMS = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class TooLarge:
+    """What is taken instead of a request that is too large."""
+
+    reason: str
+
+
+class _Sequence(ctypes.Structure):
+    """A string or a sequence of any type (rosidl_runtime_c)."""
+
+    _fields_ = [
+        ("data", ctypes.c_void_p),
+        ("size", ctypes.c_size_t),
+        ("capacity", ctypes.c_size_t),
+    ]
+
+
+class _Parameter(ctypes.Structure):
+    """rcl_interfaces/msg/Parameter with its value."""
+
+    _fields_ = [
+        ("name", _Sequence),
+        ("type", ctypes.c_uint8),
+        ("bool_value", ctypes.c_bool),
+        ("integer_value", ctypes.c_int64),
+        ("double_value", ctypes.c_double),
+        ("sequences", _Sequence * 6),  # a string, and an array of each of five types
+    ]
+
+
+#: Returns why the request at an address is too large, or None.
+_Check = Callable[[int], str | None]
+_Convert = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)
+
+_NEW_CAPSULE = ctypes.pythonapi.PyCapsule_New
+_NEW_CAPSULE.restype = ctypes.py_object
+_NEW_CAPSULE.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
+_POINTER_OF = ctypes.pythonapi.PyCapsule_GetPointer
+_POINTER_OF.restype = ctypes.c_void_p
+_POINTER_OF.argtypes = [ctypes.py_object, ctypes.c_char_p]
+#: The functions that rclpy calls; they must not be deallocated.
+_functions: list[Any] = []
+
+
+@cache
+def limited(service: Any) -> Any:
+    """Return ``service``, a type of rcl_interfaces, with limited requests.
+
+    A node that creates a server with the returned type takes a :class:`TooLarge` instead of a
+    request that is too large.
+    """
+    check = _CHECKS[service]
+    check_is_valid_srv_type(service)  # loads the type support
+    request = service.Request
+    metaclass: Any = type(request)
+    convert = _Convert(_POINTER_OF(metaclass._CONVERT_TO_PY, None))
+
+    def convert_limited(address: int) -> Any:
+        reason = check(address)
+        return convert(address) if reason is None else TooLarge(reason)
+
+    function = _Convert(convert_limited)
+    _functions.append(function)
+    capsule = _NEW_CAPSULE(ctypes.cast(function, ctypes.c_void_p), None, None)
+    limited_metaclass = type(metaclass.__name__, (metaclass,), {"_CONVERT_TO_PY": capsule})
+    limited_request = limited_metaclass(request.__name__, (request,), {"__slots__": ()})
+    return type(service)(service.__name__, (service,), {"Request": limited_request})
+
+
+def _check_names(address: int) -> str | None:
+    return _over(_Sequence.from_address(address).size, MAX_NAMES, "names")
+
+
+def _check_prefixes(address: int) -> str | None:
+    return _over(_Sequence.from_address(address).size, MAX_PARAMETERS, "prefixes")
+
+
+def _check_parameters(address: int) -> str | None:
+    sequence = _Sequence.from_address(address)
+    reason = _over(sequence.size, MAX_PARAMETERS, "parameters")
+    if reason is not None or not sequence.size:
+        return reason
+    parameters = (_Parameter * sequence.size).from_address(sequence.data)
+    items = sum(part.size for parameter in parameters for part in parameter.sequences)
+    return _over(items, MAX_ITEMS, "array items and characters")
+
+
+def _over(number: int, limit: int, what: str) -> str | None:
+    return f"{number} {what} in one request, at most {limit}" if number > limit else None
+
+
+_CHECKS: dict[Any, _Check] = {
+    GetParameters: _check_names,
+    GetParameterTypes: _check_names,
+    DescribeParameters: _check_names,
+    ListParameters: _check_prefixes,
+    SetParameters: _check_parameters,
+    SetParametersAtomically: _check_parameters,
+}

@@ -1,0 +1,150 @@
+"""Parameter services respond as rclpy's; large requests do not keep other callbacks waiting."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import (
+    GetParameters,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+from rclpy.parameter import Parameter as RosParameter
+
+from composer.runtime.ros import limited_requests
+from tests.ros.support.commands import hand_written
+from tests.ros.support.in_process import Peer, RunningSystem, running
+
+SYSTEM = """
+system: served
+nodes:
+  subject:
+    parameters:
+      speed: {type: double, default: 1.5, maximum: 5.0}
+      label: {type: string, default: here, read_only: true}
+      arm.joint.count: {type: integer, default: 3}
+  ticker: {behavior: ticker:Ticker, timers: {tick: {period_ms: 5}}}
+"""
+TICKER = """
+import time
+from composer.behavior import Behavior
+
+class Ticker(Behavior):
+    def on_activate(self):
+        self.last_s, self.longest_s, self.ticks = time.monotonic(), 0.0, 0
+
+    def on_tick(self):
+        now_s = time.monotonic()
+        self.longest_s = max(self.longest_s, now_s - self.last_s)
+        self.last_s = now_s
+        self.ticks += 1
+"""
+#: Far more than a slice, far less than the seconds that rclpy takes.
+LONGEST_S = 1.0
+
+
+@pytest.fixture(scope="module")
+def system(
+    tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int
+) -> Iterator[RunningSystem]:
+    with running(SYSTEM, tmp_path_factory.mktemp("served"), ticker=TICKER) as system:
+        yield system
+
+
+def test_a_huge_request_is_refused_and_holds_up_no_callback(system: RunningSystem) -> None:
+    ticker = system.behavior("ticker")
+    ticker.longest_s, before = 0.0, ticker.ticks
+    with hand_written("hand_written_huge_requests.py", "/subject") as process:
+        assert process.stdout is not None
+        answers = [json.loads(process.stdout.readline()) for _ in range(8)]
+    assert ticker.ticks > before
+    assert ticker.longest_s < LONGEST_S
+    items = "1500000 array items and characters in one request, at most 1000000"
+    assert answers == [
+        ["get_parameters", "0"],
+        ["get_parameter_types", "0"],
+        ["describe_parameters", "0"],
+        ["list_parameters", "0"],
+        ["set_parameters", "20000 parameters in one request, at most 1000"],
+        ["set_parameters_atomically", "20000 parameters in one request, at most 1000"],
+        ["set_parameters", items],
+        ["set_parameters", items],
+    ]
+    log = system.log_text()
+    assert "refused a request of 'get_parameters': 100000 names in one request, at most" in log
+
+
+def change(name: str, kind: int, **fields: Any) -> Parameter:
+    return Parameter(name=name, value=ParameterValue(type=kind, **fields))
+
+
+@pytest.mark.parametrize("kind", [10, 77, 255])
+def test_an_unknown_type_is_refused_with_a_reason(
+    system: RunningSystem, peer: Peer, kind: int
+) -> None:
+    changes = [change("speed", kind), change("speed", 3, double_value=4.5)]
+    request = SetParameters.Request(parameters=changes)
+    for node in ("/subject", "/served/manager"):
+        refused, other = peer.call(SetParameters, f"{node}/set_parameters", request).results
+        assert not refused.successful
+        assert f"parameter 'speed' has the unknown type {kind}" in refused.reason
+        assert other.successful is (node == "/subject")
+    together = SetParametersAtomically.Request(parameters=changes)
+    result = peer.call(SetParametersAtomically, "/subject/set_parameters_atomically", together)
+    assert f"unknown type {kind}" in result.result.reason
+
+
+def test_many_requested_values_are_limited(system: RunningSystem, peer: Peer) -> None:
+    """A request may name a long value many times."""
+    long = "x" * 1000
+    node = system.node("subject")._ros
+    node.declare_parameter("long", long)
+    response = peer.call(
+        GetParameters, "/subject/get_parameters", GetParameters.Request(names=["long"] * 1000)
+    )
+    assert [len(value.string_value) for value in response.values] == [1000] * 1000
+    response = peer.call(
+        GetParameters, "/subject/get_parameters", GetParameters.Request(names=["long"] * 1001)
+    )
+    assert not response.values
+    assert "more than 1000000 array items and characters in one response" in system.log_text()
+
+
+def test_the_layout_of_requests_is_known(peer: Peer) -> None:
+    """The size of a request is read from C structures of rosidl_generator_c."""
+    requests: list[Any] = []
+
+    def respond(request: Any, response: Any) -> Any:
+        requests.append(request)
+        return response
+
+    service = limited_requests.limited(SetParameters)
+    peer.node.create_service(service, "/laid_out", respond)
+    values = {
+        "string_value": "abc", "byte_array_value": [b"1"] * 5, "bool_array_value": [True] * 7,
+        "integer_array_value": [1] * 11, "double_array_value": [1.0] * 13,
+        "string_array_value": ["x"] * 17,
+    }  # fmt: skip
+    changes = [change("a", 3, **values), change("b", 4, string_value="y" * 19)]
+    request = SetParameters.Request(parameters=changes)
+    checked: list[int] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(limited_requests, "_over", lambda *given: checked.append(given[0]))
+        peer.call(SetParameters, "/laid_out", request)
+    assert checked == [2, 3 + 5 + 7 + 11 + 13 + 17 + 19]
+    assert requests[0] == request
+    assert RosParameter.from_parameter_msg(requests[0].parameters[1]).value == "y" * 19
+
+
+def test_the_manager_node_has_parameter_services(system: RunningSystem, peer: Peer) -> None:
+    listed = peer.call(ListParameters, "/served/manager/list_parameters").result
+    assert set(listed.names) == {"use_sim_time", "start_type_description_service"}
+    assert peer.set_parameter("/served/manager", "use_sim_time", False) == ""
+    names = GetParameters.Request(names=["use_sim_time"])
+    (value,) = peer.call(GetParameters, "/served/manager/get_parameters", names).values
+    assert (value.type, value.bool_value) == (1, False)

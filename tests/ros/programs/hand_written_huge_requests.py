@@ -1,0 +1,78 @@
+"""Sends requests of a size that no tool sends to the parameter services of a node.
+
+Prints ``ready``, then a line of JSON for each request: the service and what it responded. With
+``forever`` as second argument, it starts again after the last one.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import rclpy
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    GetParameterTypes,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+
+NAMES = 100_000
+PARAMETERS = 20_000
+DOUBLES = 1_500_000  # 12 MB
+
+
+def requests() -> Iterator[tuple[Any, str, dict[str, Any]]]:
+    names = ["speed"] * NAMES
+    changes = [
+        Parameter(name="speed", value=ParameterValue(type=3, double_value=1.0 + n / PARAMETERS))
+        for n in range(PARAMETERS)
+    ]
+    array = ParameterValue(type=8, double_array_value=[0.0] * DOUBLES)
+    text = ParameterValue(type=4, string_value="x" * DOUBLES)
+    yield GetParameters, "get_parameters", {"names": names}
+    yield GetParameterTypes, "get_parameter_types", {"names": names}
+    yield DescribeParameters, "describe_parameters", {"names": names}
+    yield ListParameters, "list_parameters", {"prefixes": names}
+    yield SetParameters, "set_parameters", {"parameters": changes}
+    yield SetParametersAtomically, "set_parameters_atomically", {"parameters": changes}
+    for value in (array, text):
+        yield SetParameters, "set_parameters", {"parameters": [Parameter(name="x", value=value)]}
+
+
+def outcome(response: Any) -> str:
+    if hasattr(response, "results"):
+        return "; ".join(result.reason for result in response.results)
+    if isinstance(response, SetParametersAtomically.Response):
+        return str(response.result.reason)
+    if isinstance(response, ListParameters.Response):
+        return str(len(response.result.names))
+    return str(len(next(getattr(response, name) for name in response.get_fields_and_field_types())))
+
+
+def main() -> None:
+    target, repeats = sys.argv[1], "forever" in sys.argv
+    rclpy.init()
+    node = rclpy.create_node("huge")
+    print("ready", flush=True)
+    prepared = [(kind, name, kind.Request(**fields)) for kind, name, fields in requests()]
+    while True:
+        for kind, name, request in prepared:
+            client = node.create_client(kind, f"{target}/{name}")
+            client.wait_for_service()
+            future = client.call_async(request)
+            rclpy.spin_until_future_complete(node, future, timeout_sec=10.0)
+            answer = outcome(future.result()) if future.done() else "no response"
+            print(json.dumps([name, answer]), flush=True)
+            node.destroy_client(client)
+        if not repeats:
+            return
+
+
+if __name__ == "__main__":
+    main()
