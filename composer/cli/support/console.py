@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import select
 import stat
 import sys
 import threading
@@ -42,6 +43,8 @@ class OutputQueue:
     def __init__(self, fd: int, max_waiting: int = _MAX_WAITING_CHARACTERS) -> None:
         """Write to a duplicate of ``fd``; let ``max_waiting`` characters wait."""
         self._fd = os.dup(fd)
+        self._writable = select.poll()
+        self._writable.register(self._fd, select.POLLOUT)
         self._max_waiting = max_waiting
         # Reentrant: garbage collection may run a finalizer that prints, at any allocation.
         self._lock = threading.RLock()
@@ -117,6 +120,8 @@ class OutputQueue:
         while data and not self._is_broken:
             try:
                 count = os.write(self._fd, data)
+            except BlockingIOError:  # a socket, see _do_not_block_c_code
+                self._writable.poll()
             except BrokenPipeError:
                 self._is_broken = True
             except OSError:  # such as a full disk
@@ -164,9 +169,10 @@ def queued_output() -> Iterator[None]:
     """
     before = sys.stdout, sys.stderr
     queues: list[OutputQueue] = []
+    sockets: list[int] = []
     try:
         sys.stdout, sys.stderr = _queued(*before, queues)
-        _do_not_block_c_code()
+        sockets += _do_not_block_c_code()
         os.register_at_fork(after_in_child=partial(_restore, *before))  # it has no thread
         yield
     finally:
@@ -175,6 +181,8 @@ def queued_output() -> Iterator[None]:
         _restore(*before)
         for queue in queues:
             queue.close()
+        for fd in sockets:
+            os.set_blocking(fd, True)
 
 
 def _queued(stdout: TextIO, stderr: TextIO, queues: list[OutputQueue]) -> tuple[TextIO, TextIO]:
@@ -201,16 +209,26 @@ def _restore(stdout: TextIO, stderr: TextIO) -> None:
         sys.stdout, sys.stderr = stdout, stderr
 
 
-def _do_not_block_c_code() -> None:
-    """Drop what rcl and the middleware print while a terminal or pipe accepts nothing.
+def _do_not_block_c_code() -> list[int]:
+    """Drop what rcl and the middleware print while nothing accepts it; return changed sockets.
 
     They print with the GIL or locks of the middleware held, which would stop all nodes.
     """
+    sockets: list[int] = []
     for fd in (1, 2):
-        with suppress(OSError):  # a socket, or the terminal of another user
-            if stat.S_ISFIFO(os.fstat(fd).st_mode) or os.isatty(fd):
-                flags = fcntl.fcntl(fd, fcntl.F_GETFL) | os.O_NONBLOCK | os.O_NOCTTY
-                # Open it again: the flag of the present one would affect other processes.
-                opened = os.open(f"/proc/self/fd/{fd}", flags)
-                os.dup2(opened, fd)
-                os.close(opened)
+        with suppress(OSError):  # the terminal of another user
+            mode = os.fstat(fd).st_mode
+            if stat.S_ISSOCK(mode) and os.get_blocking(fd):  # such as to systemd's journal
+                os.set_blocking(fd, False)
+                sockets.append(fd)
+            elif stat.S_ISFIFO(mode) or os.isatty(fd):
+                _open_again(fd, os.O_NONBLOCK | os.O_NOCTTY)
+    return sockets
+
+
+def _open_again(fd: int, more_flags: int) -> None:
+    """Replace ``fd`` by a new file description: flags of the present one affect other processes."""
+    flags = fcntl.fcntl(fd, fcntl.F_GETFL) | more_flags
+    opened = os.open(f"/proc/self/fd/{fd}", flags)
+    os.dup2(opened, fd)
+    os.close(opened)
