@@ -6,12 +6,10 @@ move at the same time. :mod:`composer.model.dependencies` defines the dependenci
 """
 
 from composer.plan.bringup import bring_up, start_causes, start_goals, tear_down
+from composer.plan.desired_state import DesiredState, Fault, FaultKind, Restart
 from composer.plan.reconciliation import (
     Decision,
-    DesiredState,
-    Fault,
-    FaultKind,
-    Restart,
+    blocked_nodes,
     decide,
     desired_states,
     reconcile,
@@ -28,6 +26,7 @@ __all__ = [
     "Restart",
     "Step",
     "TransitionName",
+    "blocked_nodes",
     "bring_up",
     "decide",
     "desired_states",

@@ -1,40 +1,21 @@
 """Decide how to handle failed nodes, and plan the transitions from observed to desired states.
 
 The desired state of a failed node is unconfigured, that of the nodes that depend on it at most
-inactive; all others keep theirs. The plan leads from the observed states to the desired ones
-(:func:`composer.plan.plan_transitions`). A restart releases a failed node after a backoff.
+inactive unless they are moved externally after it; all others keep theirs. The plan leads from the
+observed states to the desired ones (:func:`composer.plan.plan_transitions`). A restart releases a
+failed node after a backoff.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from enum import StrEnum
+from dataclasses import dataclass
 
 from composer.model import OnFailure, PrimaryState, System
 from composer.model.dependencies import DependencyEdge, dependency_edges, in_dependency_order
+from composer.plan.desired_state import DesiredState, Fault, FaultKind
 from composer.plan.steps import Plan, rank
 from composer.plan.transitions import plan_transitions
-
-
-class FaultKind(StrEnum):
-    """How the failure of a node was detected."""
-
-    TRANSITION = "transition"  # requested externally, ended in an error
-    STEP = "step"  # a step of a plan failed
-    SILENCE = "silence"
-    CALLBACK = "callback"  # took too long and was interrupted
-    ERRORS = "errors"  # too many of them
-    LOST = "lost"  # a callback does not return and cannot be interrupted
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """A failure of a node. ``node`` is its key in the system."""
-
-    node: str
-    kind: FaultKind
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,58 +30,6 @@ class Decision:
     reason: str
     wait_s: float = 0.0
     attempt: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Restart:
-    """A scheduled restart of a failed node; see :class:`Decision` for ``attempt``."""
-
-    node: str
-    attempt: int
-    due_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class DesiredState:
-    """The desired state of each node, by its key.
-
-    ``goals`` are the states requested for the nodes, ``down`` the reasons why failed nodes are kept
-    down anyway. ``scheduled`` are the restarts to come, ``restarts`` the times of earlier ones,
-    oldest first, in seconds of the caller's clock.
-    """
-
-    goals: Mapping[str, PrimaryState]
-    down: Mapping[str, str] = field(default_factory=dict)
-    restarts: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    scheduled: Mapping[str, Restart] = field(default_factory=dict)
-
-    @property
-    def next_restart(self) -> Restart | None:
-        """The scheduled restart that is due first."""
-        return min(self.scheduled.values(), key=lambda restart: restart.due_s, default=None)
-
-    def with_goals(self, goals: Mapping[str, PrimaryState]) -> DesiredState:
-        """Return a copy with new goals for some of the nodes."""
-        return replace(self, goals={**self.goals, **goals})
-
-    def fail(self, fault: Fault) -> DesiredState:
-        """Return a copy that keeps the node of ``fault`` down."""
-        return replace(self, down={**self.down, fault.node: fault.text})
-
-    def schedule(self, restart: Restart) -> DesiredState:
-        """Return a copy with a restart of a node that is kept down."""
-        return replace(self, scheduled={**self.scheduled, restart.node: restart})
-
-    def restart(self, node: str, at_s: float) -> DesiredState:
-        """Return a copy that releases the node and counts one more restart."""
-        restarts = {**self.restarts, node: (*self.restarts.get(node, ()), at_s)}
-        return replace(self.release(node), restarts=restarts)
-
-    def release(self, node: str) -> DesiredState:
-        """Return a copy that no longer keeps the node down, without a restart to come."""
-        down = {name: reason for name, reason in self.down.items() if name != node}
-        scheduled = {name: item for name, item in self.scheduled.items() if name != node}
-        return replace(self, down=down, scheduled=scheduled)
 
 
 def decide(system: System, desired: DesiredState, fault: Fault, now_s: float) -> Decision | None:
@@ -136,16 +65,20 @@ def desired_states(system: System, desired: DesiredState) -> Mapping[str, Primar
 
 
 def blocked_nodes(system: System, desired: DesiredState) -> Mapping[str, str]:
-    """Return the nodes that cannot be active, each with the failed node that it depends on."""
+    """Return the nodes that must not be active, each with the failed node that it depends on.
+
+    A node that an external transition has moved since the failure is not among them.
+    """
     blocked: dict[str, str] = {}
     for name, needs in _needs(system):
         for edge in needs:
             if name in desired.down or name in blocked:
                 break
-            if edge.on in desired.down:
-                blocked[name] = edge.on
-            elif edge.on in blocked and edge.state is PrimaryState.ACTIVE:
-                blocked[name] = blocked[edge.on]  # blocked nodes stay inactive themselves
+            # Blocked nodes stay inactive themselves.
+            is_blocked = edge.on in blocked and edge.state is PrimaryState.ACTIVE
+            failed = blocked[edge.on] if is_blocked else edge.on
+            if failed in desired.down and desired.failed_after_move_of(name, failed):
+                blocked[name] = failed
     return blocked
 
 
@@ -170,13 +103,16 @@ def _reachable(
 ) -> Mapping[str, PrimaryState]:
     """Return the goals without those that would activate a node before what it depends on.
 
-    A dependency that a user keeps down takes no node down, but no node is activated without it.
+    A dependency that a user keeps down takes no node down, but no node is activated without it, nor
+    before one without a state, which is in a transition or has failed.
     """
     reachable = dict(goals)
     for name, needs in _needs(system):
-        if name not in states or reachable.get(name) is not PrimaryState.ACTIVE:
-            continue
-        if any(rank(reachable.get(edge.on, edge.state)) < rank(edge.state) for edge in needs):
+        if name not in states:
+            reachable[name] = PrimaryState.UNCONFIGURED
+        elif reachable.get(name) is PrimaryState.ACTIVE and any(
+            rank(reachable.get(edge.on, edge.state)) < rank(edge.state) for edge in needs
+        ):
             reachable[name] = max(states[name], PrimaryState.INACTIVE, key=rank)
     return reachable
 

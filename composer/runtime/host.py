@@ -200,11 +200,7 @@ class Host:
 
     def _make_listener(self, node: Node) -> NodeListener:
         return SupervisionListener(
-            node,
-            self._node_set.moving.__contains__,
-            self._main_queue,
-            self._status,
-            self._reporter,
+            node, self._supervisor.shared, self._main_queue, self._status, self._reporter
         )
 
     def _create(self, process: ProcessContext) -> bool:
@@ -222,7 +218,7 @@ class Host:
         return True
 
     def _bring_up_and_supervise(self) -> None:
-        monitor = HealthMonitor(self._node_set, self._main_queue.put)
+        monitor = HealthMonitor(self._node_set, self._supervisor.shared, self._main_queue.put)
         monitor.start()
         try:
             if self._bring_up():
@@ -232,12 +228,13 @@ class Host:
             monitor.stop()
 
     def _bring_up(self) -> bool:
-        failed = self._supervisor.bring_up(self._up, self._options.bring_up_within_s)
+        serial = self._supervisor.desired.serial
+        failed = self._supervisor.bring_up(self._up, serial, self._options.bring_up_within_s)
         if failed is not None:
             self._fail(f"{failed.partition(':')[0]} failed")
         if self._main_queue.stopping:
             return False
-        self._supervisor.set_goals(self._node_set.states())
+        self._supervisor.set_goals(self._node_set.states(), serial)
         self._status.set_activity("running")
         self._reporter.report(
             events.BroughtUp(

@@ -10,7 +10,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol, TypeAlias
 
@@ -36,6 +35,7 @@ from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Reply, unused_callback
 from composer.runtime.executors.tasks import within
 from composer.runtime.metrics.repeat_limit import RepeatLimit
+from composer.runtime.node.outcome import TransitionOutcome
 
 _NAMES = {
     Transition.TRANSITION_CONFIGURE: "configure",
@@ -46,8 +46,6 @@ _NAMES = {
     Transition.TRANSITION_INACTIVE_SHUTDOWN: "shutdown",
     Transition.TRANSITION_ACTIVE_SHUTDOWN: "shutdown",
 }
-#: The label of the state that a node cannot leave.
-FINALIZED = "finalized"
 _Work: TypeAlias = Callable[[], Coroutine[Any, Any, None]]
 _LABEL_LENGTH = 80
 _SUCCESS, _FAILURE, _ERROR = "transition_success", "transition_failure", "transition_error"
@@ -69,16 +67,6 @@ class Hooks(Protocol):
         """Adapt to the primary state that a transition ended in."""
 
 
-@dataclass(frozen=True, slots=True)
-class TransitionOutcome:
-    """How a requested transition ended, in which state, and why it did not succeed."""
-
-    transition: str
-    state: str
-    success: bool
-    reason: str = ""
-
-
 class TransitionTimeout(Exception):
     """An asynchronous handler of a transition did not finish in time."""
 
@@ -87,7 +75,7 @@ class Lifecycle:
     """The state machine of one node, its services and its ``transition_event`` topic.
 
     It runs one transition at a time. During a transition, ``change_state`` requests fail, while
-    :meth:`change` waits.
+    :meth:`change` and :meth:`run_step` wait.
     """
 
     def __init__(
@@ -153,10 +141,25 @@ class Lifecycle:
         }
 
     async def change(self, transition: str) -> TransitionOutcome:
-        """Run ``transition`` as soon as no other one runs. Raises nothing."""
+        """Run an external ``transition`` as soon as no other one runs. Raises nothing."""
         while (current := self._acquire()) is not None:
             await current
-        return await self._run(transition)
+        return await self._run(transition, external=True)
+
+    async def run_step(self, transition: str, is_outdated: Callable[[], bool]) -> TransitionOutcome:
+        """Run the ``transition`` of a plan as soon as no other one runs. Raises nothing.
+
+        If ``is_outdated()`` then, do not run it: an external transition came first.
+        """
+        while (current := self._acquire()) is not None:
+            await current
+        if is_outdated():
+            self._release()
+            reason = "an external transition came first"
+            return TransitionOutcome(
+                transition, self.state, success=False, reason=reason, external=False, outdated=True
+            )
+        return await self._run(transition, external=False)
 
     def fail_request(self) -> None:
         """Answer the pending ``change_state`` request: its transition hangs. Thread-safe."""
@@ -184,10 +187,10 @@ class Lifecycle:
         if current is not None:
             current.set_result(None)
 
-    async def _run(self, transition: str) -> TransitionOutcome:
+    async def _run(self, transition: str, *, external: bool) -> TransitionOutcome:
         """Run a transition; the state machine has been acquired, and is released at the end."""
         try:
-            return await self._transition(transition)
+            return await self._transition(transition, external=external)
         except Cancelled:
             raise
         except BaseException as error:
@@ -199,7 +202,7 @@ class Lifecycle:
         finally:
             self._release()
 
-    async def _transition(self, transition: str) -> TransitionOutcome:
+    async def _transition(self, transition: str, *, external: bool) -> TransitionOutcome:
         start = self.state
         transition_id = self.available.get(transition)
         if transition_id is None:
@@ -216,7 +219,9 @@ class Lifecycle:
         else:
             self._machine.trigger_transition_by_label(_SUCCESS, True)
         reason = "" if cause is None else describe(cause)
-        result = TransitionOutcome(transition, self.state, success=cause is None, reason=reason)
+        result = TransitionOutcome(
+            transition, self.state, success=cause is None, reason=reason, external=external
+        )
         self._hooks.on_transition_end(result)
         return result
 
@@ -300,7 +305,7 @@ class Lifecycle:
 
     async def _answer_change_state(self, transition: str, reply: Reply) -> None:
         self._pending_reply.append(reply)
-        result = await self._run(transition)
+        result = await self._run(transition, external=True)
         self._answer(success=result.success)
 
     def _answer(self, *, success: bool) -> None:

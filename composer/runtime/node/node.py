@@ -35,8 +35,9 @@ from composer.runtime.node.behavior_loader import (
     named_ports,
 )
 from composer.runtime.node.entities import NodeEntities, RunningPort
-from composer.runtime.node.lifecycle import FINALIZED, Lifecycle, TransitionOutcome
+from composer.runtime.node.lifecycle import Lifecycle
 from composer.runtime.node.options import NodeOptions
+from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.node.parameter_services import NodeParameterStore, ParameterServices
 from composer.runtime.node.parameters import NodeParameters, ParameterValues
 from composer.runtime.node.ros_node import make_ros_node

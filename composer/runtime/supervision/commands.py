@@ -8,14 +8,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
 
 from composer.model import PrimaryState, System
-from composer.plan import plan_transitions, start_causes, start_goals
-from composer.runtime.supervision.node_set import CreationFailed, NodeSet
+from composer.plan import blocked_nodes, plan_transitions, start_causes, start_goals
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
+
+if TYPE_CHECKING:  # this module and its tests need no ROS
+    from composer.runtime.supervision.node_set import NodeSet
 
 _ACTIVITIES = {
     "startup": ("starting", "running"),
@@ -39,54 +43,64 @@ class Commands:
         doing, done = _ACTIVITIES[name]
         before = self.status.without_nodes.activity
         self.status.set_activity(doing)
-        actions: dict[str, Callable[[], str | None]] = {
+        actions: dict[str, Callable[[int], str | None]] = {
             "startup": self._start_up,
             "pause": self._pause,
             "resume": self._resume,
             "reset": self._reset,
         }
-        problem = actions[name]()
+        problem = actions[name](self.supervisor.desired.serial)
         self.status.set_activity(done if problem is None else before)
         if problem is not None:
             return False, f"{problem}; {self.status.snapshot().summary}"
         return True, self.status.snapshot().summary
 
-    def _start_up(self) -> str | None:
-        problem = self._recreate()
-        return problem or self._bring_up(dict(self._start_goals()), forget_failures=True)
+    # The actions move no node that has been moved externally since the serial number ``since``.
 
-    def _resume(self) -> str | None:
+    def _start_up(self, since: int) -> str | None:
+        problem = self._recreate(since)
+        return problem or self._bring_up(self._start_goals().keys(), since, forget_failures=True)
+
+    def _resume(self, since: int) -> str | None:
+        """Nodes that depend on a failed one come up after it."""
+        blocked = blocked_nodes(self.system, self.supervisor.desired)
         states = self.node_set.states()
-        goals = self._start_goals()
-        inactive = [name for name, state in states.items() if state is PrimaryState.INACTIVE]
-        return self._bring_up({name: goals[name] for name in inactive})
+        inactive = {name for name, at in states.items() if at is PrimaryState.INACTIVE}
+        problem = self._bring_up(inactive - blocked.keys(), since)
+        if problem is None:
+            goals = self._start_goals()
+            later = {name: goals[name] for name in inactive & blocked.keys()}
+            self.supervisor.set_goals(later, since)
+        return problem
 
-    def _pause(self) -> str | None:
+    def _pause(self, since: int) -> str | None:
         low = (PrimaryState.UNCONFIGURED, PrimaryState.INACTIVE)
-        goals = self.supervisor.goals
-        return self._lower(
-            {name: goal if goal in low else PrimaryState.INACTIVE for name, goal in goals.items()},
-            "the system is paused",
-        )
+        goals = {
+            name: goal if goal in low else PrimaryState.INACTIVE
+            for name, goal in self.supervisor.desired.goals.items()
+        }
+        return self._lower(goals, since, "the system is paused")
 
-    def _reset(self) -> str | None:
+    def _reset(self, since: int) -> str | None:
+        self.supervisor.set_goals({}, since, forget_failures=True)
         goals = dict.fromkeys(self.node_set.nodes, PrimaryState.UNCONFIGURED)
-        self.supervisor.set_goals({}, forget_failures=True)
-        return self._lower(goals, "the system is reset") or self._recreate()
+        return self._lower(goals, since, "the system is reset") or self._recreate(since)
 
     def _bring_up(
-        self, goals: dict[str, PrimaryState], *, forget_failures: bool = False
+        self, names: Collection[str], since: int, *, forget_failures: bool = False
     ) -> str | None:
+        start_goals = self._start_goals()
+        goals = {name: start_goals[name] for name in names}
         causes = start_causes(self.system, PrimaryState.ACTIVE)
         plan = plan_transitions(self.system, self.node_set.states(), goals, causes)
-        problem = self.supervisor.bring_up(plan)
+        problem = self.supervisor.bring_up(plan, since)
         if problem is not None:
             return f"{problem}; rolled back"
-        self.supervisor.set_goals(goals, forget_failures=forget_failures)
+        self.supervisor.set_goals(goals, since, forget_failures=forget_failures)
         return self._unreached(goals)
 
-    def _lower(self, goals: Mapping[str, PrimaryState], cause: str) -> str | None:
-        self.supervisor.set_goals(goals)
+    def _lower(self, goals: Mapping[str, PrimaryState], since: int, cause: str) -> str | None:
+        self.supervisor.set_goals(goals, since)
         failures = self.supervisor.reconcile(cause)
         return str(failures[0]) if failures else None
 
@@ -102,11 +116,10 @@ class Commands:
     def _start_goals(self) -> Mapping[str, PrimaryState]:
         return start_goals(self.system, PrimaryState.ACTIVE)
 
-    def _recreate(self) -> str | None:
+    def _recreate(self, since: int) -> str | None:
         """Create finalized nodes again; return why one cannot be created."""
-        for name in self.node_set.nodes:
-            try:
-                self.node_set.recreate(name)
-            except CreationFailed as error:
-                return f"{error.node}: {error}"
+        for name, node in tuple(self.node_set.nodes.items()):
+            problem = self.node_set.recreate(name, partial(self.supervisor.has_moved, name, since))
+            if problem is not None:
+                return f"{node.full_name}: {problem}"
         return None

@@ -15,6 +15,7 @@ from composer.runtime.node.node import RunningNode
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.runtime.supervision.main_queue import CallbackHanging, LoopRecovered, NodeEvent
 from composer.runtime.supervision.node_set import NodeSet
+from composer.runtime.supervision.shared_desired_state import SharedDesiredState
 
 _SHORTEST_PERIOD_S = 0.005
 _LONGEST_PERIOD_S = 1.0
@@ -43,8 +44,12 @@ class _ObservedCallback:
 class HealthMonitor:
     """A thread that checks the nodes of a node set periodically and reports failures."""
 
-    def __init__(self, node_set: NodeSet, report: Callable[[NodeEvent], None]) -> None:
+    def __init__(
+        self, node_set: NodeSet, desired: SharedDesiredState, report: Callable[[NodeEvent], None]
+    ) -> None:
         self._node_set = node_set
+        self._desired = desired
+        self._serial = 0  # of the desired state before the check
         self._report = report
         self._end = threading.Event()
         self._callbacks: dict[FrameType, _ObservedCallback] = {}  # by their calls
@@ -73,6 +78,7 @@ class HealthMonitor:
     def _run(self) -> None:
         while not self._end.wait(self._period_s):
             now_s = time.monotonic()
+            self._serial = self._desired.value.serial
             self._check_callbacks(now_s)
             self._check_hung_loops(now_s)
             if self._system_is_up:
@@ -86,7 +92,7 @@ class HealthMonitor:
             if self._node_set.nodes[name].loop.name not in blocked:
                 text = silence.check(now_s)
                 if text is not None:
-                    self._report(Fault(name, FaultKind.SILENCE, text))
+                    self._report(Fault(name, FaultKind.SILENCE, text, self._serial))
 
     # --- callbacks
 
@@ -145,7 +151,8 @@ class HealthMonitor:
             callback.interrupt()
         elif not observed.is_lost and now_s - observed.interrupted_s > _RETURNS_WITHIN_S:
             observed.is_lost = True
-            self._report(Fault(node, FaultKind.LOST, f"{callback.name} does not return"))
+            text = f"{callback.name} does not return"
+            self._report(Fault(node, FaultKind.LOST, text, self._serial))
 
     def _on_return(self, observed: _ObservedCallback) -> None:
         """Report the end of a callback that was interrupted."""
@@ -153,7 +160,7 @@ class HealthMonitor:
             return
         if not (observed.is_lost or observed.callback.in_transition):
             text = f"{observed.callback.name} took longer than {1000.0 * observed.limit_s:g} ms"
-            self._report(Fault(observed.node, FaultKind.CALLBACK, text))
+            self._report(Fault(observed.node, FaultKind.CALLBACK, text, self._serial))
 
     def _check_hung_loops(self, now_s: float) -> None:
         """Report hung loops that run again, at each check until the supervisor has handled it."""

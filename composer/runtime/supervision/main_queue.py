@@ -21,11 +21,11 @@ _SAME_REQUEST_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class ExternalTransition:
-    """A transition that was not part of a plan. ``node`` is a key, ``state`` a label."""
+class NodeMoved:
+    """A node has moved, and no plan waits for it. ``node`` is a key, ``cause`` what moved it."""
 
     node: str
-    state: str
+    cause: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Command:
     answer: Callable[[bool, str], None]
 
 
-NodeEvent: TypeAlias = Fault | ExternalTransition | CallbackHanging | LoopRecovered
+NodeEvent: TypeAlias = Fault | NodeMoved | CallbackHanging | LoopRecovered
 Item: TypeAlias = NodeEvent | Command
 
 

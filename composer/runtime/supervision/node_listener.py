@@ -2,62 +2,69 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from composer.model import LogLevel, Node, PrimaryState
 from composer.plan import Fault, FaultKind
-from composer.runtime.node.lifecycle import FINALIZED, TransitionOutcome
+from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.supervision import events
-from composer.runtime.supervision.main_queue import ExternalTransition, Item, MainQueue
+from composer.runtime.supervision.main_queue import Item, MainQueue, NodeMoved
+from composer.runtime.supervision.shared_desired_state import SharedDesiredState
 from composer.runtime.supervision.status import Status
 
-#: The state that each transition ends in if it succeeds.
+#: The state that each transition ends in if it succeeds, and the goal that it sets.
 _GOALS = {
-    "configure": PrimaryState.INACTIVE,
-    "activate": PrimaryState.ACTIVE,
-    "deactivate": PrimaryState.INACTIVE,
-    "cleanup": PrimaryState.UNCONFIGURED,
-    "shutdown": FINALIZED,
+    "configure": (PrimaryState.INACTIVE, PrimaryState.INACTIVE),
+    "activate": (PrimaryState.ACTIVE, PrimaryState.ACTIVE),
+    "deactivate": (PrimaryState.INACTIVE, PrimaryState.INACTIVE),
+    "cleanup": (PrimaryState.UNCONFIGURED, PrimaryState.UNCONFIGURED),
+    "shutdown": (FINALIZED, PrimaryState.UNCONFIGURED),
 }
 _DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
 
 
 class SupervisionListener:
-    """Reports one node's transitions and errors to the status, the user and the main queue.
+    """Reports one node's transitions and errors to the status, the user and the supervisor.
 
-    Faults and external transitions go to the main queue. A transition of a plan does not: the plan
-    executor waits for its result.
+    The state that an external transition ends in becomes the desired one, before the node answers
+    the request or starts another transition. The main queue receives it too, because other nodes
+    may have to move. The plan executor waits for the result of a step.
     """
 
     def __init__(
         self,
         node: Node,
-        is_moving: Callable[[str], bool],
+        desired: SharedDesiredState,
         main_queue: MainQueue[Item],
         status: Status,
         reporter: events.Reporter,
     ) -> None:
-        """``is_moving(node)`` returns whether a plan moves the node now."""
         self._name = node.name.value
         self._full_name = node.full_name
-        self._is_moving = is_moving
+        self._desired = desired
         self._main_queue = main_queue
         self._status = status
         self._reporter = reporter
 
     def on_transition_end(self, result: TransitionOutcome) -> None:
-        """Report the new state."""
+        """Report the new state; record an external transition first."""
+        item = self._record(result) if result.external else None
         at_s = self._reporter.elapsed_s
         transition, state = result.transition, result.state
         self._status.set_state(self._name, state)
         self._reporter.report(events.StateChanged(at_s, self._full_name, transition, state))
-        if self._is_moving(self._name):
-            return
-        if state == _GOALS[transition]:
-            self._main_queue.put(ExternalTransition(self._name, state))
-        elif state in _DOWN:
-            text = f"{transition} ended in an error: {result.reason}"
-            self._main_queue.put(Fault(self._name, FaultKind.TRANSITION, text))
+        if item is not None:
+            self._main_queue.put(item)
+
+    def _record(self, result: TransitionOutcome) -> Item:
+        """Record an external transition; return the item for the supervisor."""
+        name = self._name
+        goal_state, goal = _GOALS[result.transition]
+        if result.state == goal_state:
+            self._desired.update(lambda desired: desired.move(name, goal))
+        elif result.state in _DOWN:
+            text = f"{result.transition} ended in an error: {result.reason}"
+            serial = self._desired.update(lambda desired: desired.break_down(name)).serial
+            return Fault(name, FaultKind.TRANSITION, text, serial)
+        return NodeMoved(name, f"external transition of {self._full_name}")
 
     def on_error(self, callback: str, text: str) -> None:
         """Report an error of user code."""
@@ -67,7 +74,8 @@ class SupervisionListener:
 
     def on_error_limit(self, text: str) -> None:
         """Report that the node has exceeded its ``max_errors``."""
-        self._main_queue.put(Fault(self._name, FaultKind.ERRORS, text))
+        serial = self._desired.value.serial
+        self._main_queue.put(Fault(self._name, FaultKind.ERRORS, text, serial))
 
     def write_log(self, level: LogLevel, logger: str, message: str) -> None:
         """Report a line of the log."""

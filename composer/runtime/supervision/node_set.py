@@ -26,10 +26,11 @@ from composer.runtime.intra_process.eligibility import shared_channels
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, chain_figures, figures
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node.lifecycle import FINALIZED
 from composer.runtime.node.node import NodeListener, RunningNode
 from composer.runtime.node.options import NodeOptions, ProcessContext
+from composer.runtime.node.outcome import FINALIZED
 from composer.runtime.node.parameters import ParameterError
+from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.source import Located
 
 _PRIMARY_STATES = {state.value: state for state in PrimaryState}
@@ -83,10 +84,6 @@ class NodeSet:
         self.loops: dict[str, Loop] = {}
         #: The loops with a callback that does not return; their nodes cannot do anything.
         self.hung: set[str] = set()
-        #: The nodes that a plan moves now, by their keys.
-        self.moving: set[str] = set()
-        #: The states that the main thread expects nodes in, by their keys. See settled().
-        self.expected: dict[str, str] = {}
         self._keeps_entities = False
         #: What Linux or the middleware does not allow, each with a hint.
         self.warnings: list[str] = []
@@ -133,17 +130,6 @@ class NodeSet:
             if state in _PRIMARY_STATES
         }
 
-    def settled(self) -> Mapping[str, PrimaryState]:
-        """Return the states of the nodes that are in their expected state.
-
-        For the others, an event is in the main queue that has not been handled yet.
-        """
-        return {
-            name: state
-            for name, state in self.states().items()
-            if self.expected.get(name, state.value) == state.value
-        }
-
     def callbacks(self) -> tuple[CallbackFigures, ...]:
         """Return the timings of the callbacks of all nodes so far."""
         return tuple(
@@ -160,24 +146,29 @@ class NodeSet:
         """Return whether the node's loop hangs, so that the node cannot do anything."""
         return self.nodes[name].loop.name in self.hung
 
+    def running_callbacks(self, name: str) -> list[RunningCallback]:
+        """Return the callbacks that keep the threads of the node's loop busy, one per thread."""
+        return [innermost for innermost, *_ in running_callbacks(self.nodes[name].loop)]
+
     def active(self) -> int:
         """Return the number of active nodes."""
         return sum(node.state == PrimaryState.ACTIVE.value for node in self.nodes.values())
 
-    def recreate(self, name: str) -> None:
+    def recreate(self, name: str, is_outdated: Callable[[], bool]) -> str | None:
         """Replace a finalized node by a new one: no transition leaves *finalized*.
 
-        Raises CreationFailed.
+        If ``is_outdated()`` on the loop of the node, do nothing. Return why the node cannot be
+        created, or None.
         """
         old = self.nodes[name]
         if old.state != FINALIZED:
-            return
+            return None
         try:
-            self.nodes[name] = old.loop.run(partial(self._replace, old), _RECREATED_WITHIN_S)
-            self.expected[name] = PrimaryState.UNCONFIGURED
+            replaced = partial(self._replace, old, is_outdated)
+            self.nodes[name] = old.loop.run(replaced, _RECREATED_WITHIN_S)
         except Exception as error:
-            reason = f"cannot be created again: {describe(error)}"
-            raise CreationFailed(old.full_name, reason) from error
+            return f"cannot be created again: {describe(error)}"
+        return None
 
     def keep_entities(self) -> None:
         """Do not destroy entities from now on: the end of the process does."""
@@ -213,7 +204,9 @@ class NodeSet:
                 self.nodes[name].destroy()
         return complete
 
-    def _replace(self, old: RunningNode) -> RunningNode:
+    def _replace(self, old: RunningNode, is_outdated: Callable[[], bool]) -> RunningNode:
+        if is_outdated():
+            return old
         old.destroy()
         return self._make(old.model, old)
 

@@ -6,13 +6,17 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING
 
 from composer.plan import Plan, Step
 from composer.runtime.executors.futures import Future
-from composer.runtime.node.lifecycle import TransitionOutcome
-from composer.runtime.supervision.interruption import running_callbacks
-from composer.runtime.supervision.main_queue import Item, MainQueue
-from composer.runtime.supervision.node_set import NodeSet
+from composer.runtime.node.outcome import TransitionOutcome
+from composer.runtime.supervision.main_queue import Item, MainQueue, NodeMoved
+from composer.runtime.supervision.shared_desired_state import SharedDesiredState
+
+if TYPE_CHECKING:  # this module and its tests need no ROS
+    from composer.runtime.supervision.node_set import NodeSet
 
 #: A transition times out by itself; only a callback that does not return takes this much longer.
 _STUCK_AFTER_S = 1.0
@@ -25,7 +29,8 @@ class StepFailed:
     """A step that failed, and the state that the node is in.
 
     ``stuck`` is true if the step was abandoned, or a callback was interrupted that blocked it;
-    ``stack`` is where that callback was.
+    ``stack`` is where that callback was. ``outdated`` is true if it was not run because an external
+    transition came first.
     """
 
     step: Step
@@ -33,6 +38,7 @@ class StepFailed:
     state: str
     stuck: bool = False
     stack: str = ""
+    outdated: bool = False
 
     def __str__(self) -> str:
         return f"{self.step.full_name}: {self.text}"
@@ -51,12 +57,16 @@ class ExecutionOptions:
     steps start in the order of the plan. If ``stoppable``, a request to stop the system ends the
     plan. Steps that have not ended at ``end_s`` (monotonic) have failed; no step gets longer than
     ``step_limit_s``.
+
+    ``serial`` is that of the desired state that the plan is based on. Nodes that have been moved
+    externally since then are not moved; None moves them as well.
     """
 
     best_effort: bool = False
     stoppable: bool = True
     end_s: float = math.inf
     step_limit_s: float = math.inf
+    serial: int | None = None
 
 
 @dataclass(slots=True)
@@ -126,11 +136,13 @@ class PlanExecutor:
     def __init__(
         self,
         node_set: NodeSet,
+        desired: SharedDesiredState,
         main_queue: MainQueue[Item],
         report_failure: Callable[[StepFailed], None],
     ) -> None:
         """Call ``report_failure`` for each failed step as soon as it has failed, or is stuck."""
         self._node_set = node_set
+        self._desired = desired
         self._main_queue = main_queue
         self._report_failure = report_failure
 
@@ -165,7 +177,6 @@ class PlanExecutor:
             for item in tuple(phase.running):
                 if self._has_ended(item):
                     self._end(item, phase)
-        self._node_set.moving.clear()
 
     def _update_start_times(self, running: list[_RunningStep]) -> None:
         """Restart the time limit of each step with the last transition that its loop started."""
@@ -194,29 +205,26 @@ class PlanExecutor:
             phase.done.add(step.number)
             return
         limit_s = min(self._node_set.timeout_s(step.node) + _STUCK_AFTER_S, options.step_limit_s)
-        self._node_set.moving.add(step.node)
-        future = node.loop.run_task(node.lifecycle.change(step.transition))
+        is_outdated = partial(self._is_outdated, step.node, options.serial)
+        future = node.loop.run_task(node.lifecycle.run_step(step.transition, is_outdated))
         future.add_done_callback(lambda _: self._main_queue.wakeup.wake())
         name = node.loop.name
         phase.running.append(_RunningStep(step, name, future, now_s, limit_s, options.end_s))
 
+    def _is_outdated(self, node: str, serial: int | None) -> bool:
+        return serial is not None and self._desired.value.has_moved(node, serial)
+
     def _end(self, item: _RunningStep, phase: _Phase) -> None:
         phase.running.remove(item)
         phase.done.add(item.step.number)
-        self._node_set.moving.discard(item.step.node)
-        self._update_expected_state(item)
         failure = self._failure(item)
-        if failure is not None:
+        if not item.future.done():
+            moved = NodeMoved(item.step.node, f"late end of '{item.step.transition}'")
+            item.future.add_done_callback(lambda _: self._main_queue.put(moved))
+        if failure is not None and not (failure.outdated and phase.options.best_effort):
             phase.failures.append(failure)
             if not item.is_reported:
                 self._report_failure(failure)
-
-    def _update_expected_state(self, item: _RunningStep) -> None:
-        """Expect the node in the state that the step ended in; in none while the step runs."""
-        if item.future.done() and not item.future.cancelled():
-            self._node_set.expected[item.step.node] = item.future.result().state
-        else:
-            self._node_set.expected.pop(item.step.node, None)
 
     def _failure(self, item: _RunningStep) -> StepFailed | None:
         """Return why a step failed that is done or out of time."""
@@ -236,7 +244,14 @@ class PlanExecutor:
         if result.success and not stack:
             return None
         reason = result.reason or "blocked by another callback for too long"
-        return StepFailed(item.step, reason, result.state, stuck=bool(stack), stack=stack)
+        return StepFailed(
+            item.step,
+            reason,
+            result.state,
+            stuck=bool(stack),
+            stack=stack,
+            outdated=result.outdated,
+        )
 
     def _unblock(self, item: _RunningStep) -> str:
         """Interrupt the callback that a step hangs in or waits for; return the stack of it.
@@ -246,7 +261,7 @@ class PlanExecutor:
         node = self._node_set.nodes[item.step.node]
         if self._node_set.is_lost(item.step.node):
             return node.loop.current_stack()
-        running = [innermost for innermost, *_ in running_callbacks(node.loop)]
+        running = self._node_set.running_callbacks(item.step.node)
         own = [callback for callback in running if callback.node((node,)) is node]
         if not own and time.monotonic() < item.late_s:
             return ""

@@ -1,7 +1,8 @@
 """Keeps a system in its desired state: handles faults, external transitions and restarts.
 
 :mod:`composer.plan` decides what to do. The supervisor does it, on the main thread, one event at a
-time, and owns the desired state and the clock of the restarts that are part of it.
+time, and owns the clock of the restarts. Nodes record external transitions in the desired state
+themselves, so every plan is based on all of them (see :mod:`.shared_desired_state`).
 """
 
 from __future__ import annotations
@@ -10,9 +11,10 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 from composer.model import OnFailure, PrimaryState, System
-from composer.model.dependencies import dependents
 from composer.plan import (
     Decision,
     DesiredState,
@@ -26,7 +28,7 @@ from composer.plan import (
     plan_transitions,
     reconcile,
 )
-from composer.runtime.node.lifecycle import FINALIZED
+from composer.runtime.node.outcome import FINALIZED
 from composer.runtime.supervision.events import (
     NodeFailed,
     NodeTransitionFailed,
@@ -39,18 +41,20 @@ from composer.runtime.supervision.events import (
 from composer.runtime.supervision.main_queue import (
     CallbackHanging,
     Command,
-    ExternalTransition,
     Item,
     LoopRecovered,
     MainQueue,
+    NodeEvent,
+    NodeMoved,
 )
-from composer.runtime.supervision.node_set import CreationFailed, NodeSet
 from composer.runtime.supervision.plan_executor import ExecutionOptions, PlanExecutor, StepFailed
+from composer.runtime.supervision.shared_desired_state import SharedDesiredState
 from composer.runtime.supervision.status import Status
 
-_PRIMARY_STATES = {state.value: state for state in PrimaryState}
+if TYPE_CHECKING:  # this module and its tests need no ROS
+    from composer.runtime.supervision.node_set import NodeSet
+
 _DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
-_BEST_EFFORT = ExecutionOptions(best_effort=True)
 
 
 class Supervisor:
@@ -66,63 +70,84 @@ class Supervisor:
     ) -> None:
         self._system = system
         self._node_set = node_set
+        #: Also changed by the nodes, which record external transitions.
+        self.shared = SharedDesiredState()
         self._main_queue = main_queue
         self._status = status
         self._reporter = reporter
-        self._plan_executor = PlanExecutor(node_set, main_queue, self._report_failed_step)
-        self._desired = DesiredState(dict.fromkeys(node_set.nodes, PrimaryState.UNCONFIGURED))
+        self._plan_executor = PlanExecutor(
+            node_set, self.shared, main_queue, self._report_failed_step
+        )
         self._abandoned: dict[str, set[str]] = {}  # by hung loop: the nodes that did not fail
 
     @property
-    def goals(self) -> Mapping[str, PrimaryState]:
-        """The desired states of the nodes, by their keys."""
-        return self._desired.goals
+    def desired(self) -> DesiredState:
+        """The desired state now."""
+        return self.shared.value
 
     @property
     def has_failed_nodes(self) -> bool:
         """Whether a node is held down, or ended the system."""
-        return bool(self._desired.down)
+        return bool(self.desired.down)
+
+    def has_moved(self, node: str, since: int) -> bool:
+        """Return whether an external transition has moved the node since a serial number."""
+        return self.desired.has_moved(node, since)
 
     # --- the whole system
 
     def set_goals(
-        self, goals: Mapping[str, PrimaryState], *, forget_failures: bool = False
+        self, goals: Mapping[str, PrimaryState], since: int, *, forget_failures: bool = False
     ) -> None:
-        """Change the desired states of some nodes."""
-        self._desired = self._desired.with_goals(goals)
-        if forget_failures:
-            self._desired = DesiredState(self._desired.goals)
+        """Change the goals of nodes, except of those moved externally since a serial number."""
+
+        def change(desired: DesiredState) -> DesiredState:
+            kept = desired.forget_failures() if forget_failures else desired
+            return kept.with_goals(goals, since)
+
+        self.shared.update(change)
         self._publish_desired()
 
-    def bring_up(self, plan: Plan, within_s: float = math.inf) -> str | None:
-        """Execute a plan, all or nothing; return why it failed and was rolled back, or None."""
+    def bring_up(self, plan: Plan, since: int, within_s: float = math.inf) -> str | None:
+        """Execute a plan, all or nothing; return why it failed and was rolled back, or None.
+
+        ``since`` is the serial number of the desired state that the plan is based on.
+        """
         before = self._node_set.states()
         end_s = time.monotonic() + within_s
-        failures = self._plan_executor.execute(plan, ExecutionOptions(end_s=end_s))
+        failures = self._plan_executor.execute(plan, ExecutionOptions(end_s=end_s, serial=since))
         if not failures:
             return None
         step, reason = failures[0].step, failures[0].text
         if time.monotonic() >= end_s:
             reason = f"{step.transition} failed: bring-up timed out after {within_s:g} s"
-        self._roll_back(before, step.full_name, reason)
+        self._roll_back(before, since, step.full_name, reason)
         return f"{step.full_name}: {reason}"
 
     def reconcile(self, cause: str) -> tuple[StepFailed, ...]:
         """Take every node to its desired state; failures on the way become faults."""
-        return self._reconcile(self._desired, self._node_set.states(), cause)
+        desired = self.desired  # first: states that are newer outdate the steps of their nodes
+        return self._reconcile(desired, self._node_set.states(), cause)
 
     def _reconcile_settled(self, cause: str = "") -> tuple[StepFailed, ...]:
-        """Reconcile, but without nodes that have an event in the queue: that is handled first."""
-        return self._reconcile(self._desired, self._node_set.settled(), cause)
+        """Reconcile, but without nodes with a fault in the queue: that is handled first."""
+        desired = self.desired
+        states = self._node_set.states()
+        settled = {name: at for name, at in states.items() if name not in desired.unhandled}
+        return self._reconcile(desired, settled, cause)
 
     def _reconcile(
         self, desired: DesiredState, states: Mapping[str, PrimaryState], cause: str
     ) -> tuple[StepFailed, ...]:
         plan = reconcile(self._system, desired, states, cause)
-        failures = self._plan_executor.execute(plan, _BEST_EFFORT)
+        options = ExecutionOptions(best_effort=True, serial=desired.serial)
+        failures = self._plan_executor.execute(plan, options)
         for failure in failures:
-            if failure.step.node not in self._desired.down:
-                self._main_queue.put(Fault(failure.step.node, FaultKind.STEP, failure.text))
+            name = failure.step.node
+            if name not in self.desired.down:
+                fault = Fault(name, FaultKind.STEP, failure.text, self.desired.serial)
+                self.shared.update(partial(DesiredState.await_fault, fault=fault))
+                self._main_queue.put(fault)
         self._publish_desired()
         return failures
 
@@ -133,12 +158,16 @@ class Supervisor:
         )
         return not self._plan_executor.execute(plan, options)
 
-    def _roll_back(self, before: Mapping[str, PrimaryState], node: str, reason: str) -> None:
+    def _roll_back(
+        self, before: Mapping[str, PrimaryState], since: int, node: str, reason: str
+    ) -> None:
         report = self._reporter.report
         report(RollingBack(self._reporter.elapsed_s, node, reason))
         causes = dict.fromkeys(self._node_set.nodes, f"{node} failed")
-        plan = plan_transitions(self._system, self._node_set.states(), before, causes)
-        self._plan_executor.execute(plan, _BEST_EFFORT)
+        desired = self.desired
+        kept = {name: at for name, at in before.items() if not desired.has_moved(name, since)}
+        plan = plan_transitions(self._system, self._node_set.states(), kept, causes)
+        self._plan_executor.execute(plan, ExecutionOptions(best_effort=True, serial=since))
         undone = tuple(dict.fromkeys(step.full_name for step in plan.steps))
         report(RolledBack(self._reporter.elapsed_s, undone))
 
@@ -147,31 +176,41 @@ class Supervisor:
     def run(self, run_command: Callable[[Command], None], end_s: float = math.inf) -> None:
         """Handle events and due restarts until a stop is requested, or until ``end_s``."""
         while not self._main_queue.stopping and time.monotonic() < end_s:
-            restart = self._desired.next_restart
+            restart = self.desired.next_restart
             if restart is not None and time.monotonic() >= restart.due_s:
-                self._restart(restart)
+                self.restart(restart)
                 continue
             due_s = math.inf if restart is None else restart.due_s
-            match self._main_queue.get(min(end_s, due_s)):
-                case Fault() as fault:
-                    self._on_fault(fault)
-                case ExternalTransition() as transition:
-                    self._on_external_transition(transition)
-                case CallbackHanging() as hanging:
-                    self._on_callback_hanging(hanging)
-                case LoopRecovered() as recovered:
-                    self._on_loop_recovered(recovered)
-                case Command() as command:
-                    run_command(command)
+            item = self._main_queue.get(min(end_s, due_s))
+            if isinstance(item, Command):
+                run_command(item)
+            elif item is not None:
+                self.handle(item)
 
-    def _restart(self, restart: Restart) -> None:
+    def handle(self, event: NodeEvent) -> None:
+        """Handle one event."""
+        match event:
+            case Fault() as fault:
+                self._on_fault(fault)
+            case NodeMoved(cause=cause):
+                self._reconcile_settled(cause)
+            case CallbackHanging() as hanging:
+                self._on_callback_hanging(hanging)
+            case LoopRecovered() as recovered:
+                self._on_loop_recovered(recovered)
+
+    def restart(self, restart: Restart) -> None:
+        """Restart a failed node, unless an external transition comes first."""
         name = restart.node
-        self._desired = self._desired.restart(name, time.monotonic())
+        serial = self.desired.serial
+        if self.desired.scheduled.get(name) != restart:
+            return
+        desired = self.shared.update(lambda now: now.restart(name, time.monotonic()))
         self._status.count_restart(name)
-        try:
-            self._node_set.recreate(name)
-        except CreationFailed as error:
-            self._on_fault(Fault(name, FaultKind.TRANSITION, str(error)))
+        is_outdated = partial(self.has_moved, name, serial)
+        problem = self._node_set.recreate(name, is_outdated)
+        if problem is not None:
+            self._on_fault(Fault(name, FaultKind.TRANSITION, problem, desired.serial))
             return
         full_name = self._node_set.nodes[name].full_name
         failures = self._reconcile_settled(f"restart {restart.attempt} of {full_name}")
@@ -180,49 +219,34 @@ class Supervisor:
 
     def _on_fault(self, fault: Fault) -> None:
         """Take a failed node down, and restart it, isolate it, or end the system."""
-        node = self._node_set.nodes[fault.node]
-        self._node_set.expected[fault.node] = node.state
-        decision = decide(self._system, self._desired, fault, time.monotonic())
-        if decision is None or self._is_outdated(fault):
+        name = fault.node
+        node = self._node_set.nodes[name]
+        decision = decide(self._system, self.desired, fault, time.monotonic())
+        is_new = decision is not None and not self._is_outdated(fault)
+        desired = self.shared.update(lambda now: now.fail(fault) if is_new else now.ignore(fault))
+        if decision is None or not is_new or name not in desired.down:
             return
-        self._status.set_error(fault.node, fault.text)
+        self._status.set_error(name, fault.text)
         consequence = _consequence(decision)
         self._reporter.report(
             NodeFailed(self._reporter.elapsed_s, node.full_name, fault.text, consequence)
         )
-        self._desired = self._desired.fail(fault)
         if fault.kind is FaultKind.LOST:
             node.lifecycle.fail_request()
-            self._abandon_loop(fault.node)
+            self._abandon_loop(name)
         if decision.action is OnFailure.SHUTDOWN:
             self._publish_desired()
             self._main_queue.request_stop(f"{node.full_name} failed: {decision.reason}")
             return
         self._reconcile_settled()
-        self._shut_down_unless_down(fault.node)
-        if self._node_set.is_lost(fault.node) and fault.kind is not FaultKind.LOST:
-            self._desired = self._desired.release(fault.node)
+        self._shut_down_unless_down(name)
+        if self._node_set.is_lost(name) and fault.kind is not FaultKind.LOST:
+            self.shared.update(lambda now: now.release(name))
             self._on_fault(replace(fault, kind=FaultKind.LOST))
         elif decision.action is OnFailure.RESTART:
             due_s = time.monotonic() + decision.wait_s
-            restart = Restart(fault.node, decision.attempt, due_s)
-            self._desired = self._desired.schedule(restart)
-
-    def _on_external_transition(self, transition: ExternalTransition) -> None:
-        """Accept the new state of a node as the desired one, and adapt its dependents.
-
-        Other nodes are not moved: their external transitions may still be in the queue.
-        """
-        name = transition.node
-        if self._node_set.nodes[name].state != transition.state:
-            return  # outdated: another event follows
-        self._node_set.expected[name] = transition.state
-        states = self._node_set.states()
-        state = _PRIMARY_STATES.get(transition.state, PrimaryState.UNCONFIGURED)
-        self._desired = self._desired.release(name).with_goals({name: state})
-        moved = dependents(self._system, name)
-        unmoved = {other: at for other, at in states.items() if other not in moved}
-        self._reconcile(self._desired.with_goals(unmoved), states, f"external transition of {name}")
+            restart = Restart(name, decision.attempt, due_s)
+            self.shared.update(lambda now: now.schedule(restart))
 
     def _on_callback_hanging(self, hanging: CallbackHanging) -> None:
         """Report a callback that takes too long; the health monitor interrupts it."""
@@ -236,11 +260,11 @@ class Supervisor:
             return
         self._node_set.hung.discard(recovered.loop)
         for name in self._abandoned.pop(recovered.loop, ()):
-            self._desired = self._desired.release(name)
+            self.shared.update(partial(DesiredState.release, node=name))
         self._reconcile_settled(f"executor '{recovered.loop}' runs again")
 
     def _is_outdated(self, fault: Fault) -> bool:
-        """Return whether a transition has changed the node's state since it failed."""
+        """Return whether the node has left the state in which it failed."""
         state = self._node_set.nodes[fault.node].state
         match fault.kind:
             case FaultKind.TRANSITION:
@@ -257,19 +281,22 @@ class Supervisor:
         full_name = self._node_set.nodes[hanging].full_name
         abandoned = self._abandoned.setdefault(loop, set())
         for name, node in self._node_set.nodes.items():
-            if node.loop.name == loop and name not in self._desired.down:
+            if node.loop.name == loop and name not in self.desired.down:
                 abandoned.add(name)
                 text = f"its executor hangs in {full_name}"
-                self._desired = self._desired.fail(Fault(name, FaultKind.LOST, text))
+                fault = Fault(name, FaultKind.LOST, text, self.desired.serial)
+                self.shared.update(partial(DesiredState.fail, fault=fault))
                 self._status.set_error(name, text)
 
     def _shut_down_unless_down(self, name: str) -> None:
         """Shut down a failed node that could not be cleaned up, unless it was moved externally."""
-        node = self._node_set.nodes[name]
-        down = PrimaryState.UNCONFIGURED
-        if self._node_set.settled().get(name, down) is not down:
-            step = Step(1, "shutdown", name, node.full_name, "cannot be cleaned up")
-            self._plan_executor.execute(Plan((step,)), _BEST_EFFORT)
+        desired = self.desired
+        at = self._node_set.states().get(name, PrimaryState.UNCONFIGURED)
+        if name in desired.down and at is not PrimaryState.UNCONFIGURED:
+            full_name = self._node_set.nodes[name].full_name
+            step = Step(1, "shutdown", name, full_name, "cannot be cleaned up")
+            options = ExecutionOptions(best_effort=True, serial=desired.serial)
+            self._plan_executor.execute(Plan((step,)), options)
 
     def _report_failed_step(self, failure: StepFailed) -> None:
         step = failure.step
@@ -284,9 +311,10 @@ class Supervisor:
             )
 
     def _publish_desired(self) -> None:
-        goals = desired_states(self._system, self._desired)
+        desired = self.desired
+        goals = desired_states(self._system, desired)
         states = {name: state.value for name, state in goals.items()}
-        self._status.set_desired(states, self._desired.down)
+        self._status.set_desired(states, desired.down)
 
 
 def _consequence(decision: Decision) -> str:

@@ -43,7 +43,7 @@ def states(letters: str) -> dict[str, PrimaryState]:
 
 
 def fault(node: str, kind: FaultKind = FaultKind.SILENCE) -> Fault:
-    return Fault(node, kind, "silent for 300 ms")
+    return Fault(node, kind, "silent for 300 ms", serial=0)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,178 @@
+"""The desired state of a system: goals, failed nodes, and restarts.
+
+Everything that changes it has a place in one order, given by serial numbers: external transitions
+and failures increase :attr:`DesiredState.serial`. A plan, and a fault, carry the serial number of
+the desired state that they are based on. If the node of a step or of a fault has been moved
+externally after that, the step or the fault is outdated: the later of two changes of a node wins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import TypeVar
+
+from composer.model import PrimaryState
+
+T = TypeVar("T")
+
+
+class FaultKind(StrEnum):
+    """How the failure of a node was detected."""
+
+    TRANSITION = "transition"  # requested externally, ended in an error
+    STEP = "step"  # a step of a plan failed
+    SILENCE = "silence"
+    CALLBACK = "callback"  # took too long and was interrupted
+    ERRORS = "errors"  # too many of them
+    LOST = "lost"  # a callback does not return and cannot be interrupted
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A failure of a node. ``node`` is its key; ``serial`` that of the desired state at the time.
+
+    A fault is outdated once an external transition has moved the node.
+    """
+
+    node: str
+    kind: FaultKind
+    text: str
+    serial: int
+
+
+@dataclass(frozen=True, slots=True)
+class Restart:
+    """A scheduled restart of a failed node; see :class:`.Decision` for ``attempt``."""
+
+    node: str
+    attempt: int
+    due_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class DesiredState:
+    """The desired state of each node, by its key.
+
+    ``goals`` are the states requested for the nodes, ``down`` the reasons why failed nodes are kept
+    down anyway. ``scheduled`` are the restarts to come, ``restarts`` the times of earlier ones,
+    oldest first, in seconds of the caller's clock. ``unhandled`` are the nodes with a failed
+    transition whose fault has not been handled, with the serial number of the fault.
+
+    ``serial`` is the number of the last external transition or failure; ``moved`` and ``failed``
+    are the numbers of the last external transition of each node, and of the failure that keeps it
+    down.
+    """
+
+    goals: Mapping[str, PrimaryState]
+    down: Mapping[str, str] = field(default_factory=dict)
+    restarts: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    scheduled: Mapping[str, Restart] = field(default_factory=dict)
+    unhandled: Mapping[str, int] = field(default_factory=dict)
+    serial: int = 0
+    moved: Mapping[str, int] = field(default_factory=dict)
+    failed: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def next_restart(self) -> Restart | None:
+        """The scheduled restart that is due first."""
+        return min(self.scheduled.values(), key=lambda restart: restart.due_s, default=None)
+
+    def has_moved(self, node: str, since: int) -> bool:
+        """Return whether an external transition has moved the node since a serial number."""
+        return self.moved.get(node, 0) > since
+
+    def failed_after_move_of(self, node: str, failed: str) -> bool:
+        """Return whether ``failed`` has failed since ``node`` was last moved externally."""
+        return self.failed.get(failed, 0) >= self.moved.get(node, 0)
+
+    def with_goals(
+        self, goals: Mapping[str, PrimaryState], since: int | None = None
+    ) -> DesiredState:
+        """Return a copy with new goals for some of the nodes.
+
+        ``since`` is the serial number at which the goals were requested: nodes that have been moved
+        externally after that keep theirs.
+        """
+        since = self.serial if since is None else since
+        new = {name: goal for name, goal in goals.items() if not self.has_moved(name, since)}
+        return replace(self, goals={**self.goals, **new})
+
+    def move(self, node: str, state: PrimaryState) -> DesiredState:
+        """Return a copy after an external transition: the new state is the goal of the node.
+
+        It is no longer kept down.
+        """
+        moved = self.release(node).with_goals({node: state})
+        return replace(
+            moved,
+            unhandled=_without(self.unhandled, node),
+            serial=self.serial + 1,
+            moved={**self.moved, node: self.serial + 1},
+        )
+
+    def break_down(self, node: str) -> DesiredState:
+        """Return a copy after an external transition that ended in an error: a fault follows."""
+        serial = self.serial + 1
+        return replace(
+            self,
+            unhandled={**self.unhandled, node: serial},
+            serial=serial,
+            moved={**self.moved, node: serial},
+        )
+
+    def await_fault(self, fault: Fault) -> DesiredState:
+        """Return a copy in which no plan moves the node of ``fault`` until it is handled."""
+        return replace(self, unhandled={**self.unhandled, fault.node: fault.serial})
+
+    def ignore(self, fault: Fault) -> DesiredState:
+        """Return a copy in which ``fault`` has been handled; a later one of the node may remain."""
+        if self.unhandled.get(fault.node, 0) > fault.serial:
+            return self
+        return replace(self, unhandled=_without(self.unhandled, fault.node))
+
+    def fail(self, fault: Fault) -> DesiredState:
+        """Return a copy that keeps the node of ``fault`` down, unless the fault is outdated."""
+        node = fault.node
+        handled = self.ignore(fault)
+        if self.is_outdated(fault):
+            return handled
+        return replace(
+            handled,
+            down={**self.down, node: fault.text},
+            serial=self.serial + 1,
+            failed={**self.failed, node: self.serial + 1},
+        )
+
+    def is_outdated(self, fault: Fault) -> bool:
+        """Return whether an external transition has moved the node since the fault.
+
+        A node that cannot be interrupted does not get better by that.
+        """
+        return fault.kind is not FaultKind.LOST and self.has_moved(fault.node, fault.serial)
+
+    def schedule(self, restart: Restart) -> DesiredState:
+        """Return a copy with a restart of a node, if the node is kept down."""
+        if restart.node not in self.down:
+            return self
+        return replace(self, scheduled={**self.scheduled, restart.node: restart})
+
+    def restart(self, node: str, at_s: float) -> DesiredState:
+        """Return a copy that releases the node and counts one more restart."""
+        restarts = {**self.restarts, node: (*self.restarts.get(node, ()), at_s)}
+        return replace(self.release(node), restarts=restarts)
+
+    def release(self, node: str) -> DesiredState:
+        """Return a copy that no longer keeps the node down, without a restart to come."""
+        return replace(
+            self, down=_without(self.down, node), scheduled=_without(self.scheduled, node)
+        )
+
+    def forget_failures(self) -> DesiredState:
+        """Return a copy without failures and restarts."""
+        return replace(self, down={}, restarts={}, scheduled={})
+
+
+def _without(items: Mapping[str, T], name: str) -> Mapping[str, T]:
+    return {key: item for key, item in items.items() if key != name}

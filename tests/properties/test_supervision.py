@@ -1,0 +1,357 @@
+"""External transitions, faults and plans in any order: the supervisor undoes nothing.
+
+The supervisor, the plan executor and the listeners are the real ones. The nodes are simulated,
+without ROS and threads: wherever another thread could run, some external requests come first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
+
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from composer.model import Node, PrimaryState, System
+from composer.model.dependencies import dependency_edges, in_dependency_order
+from composer.model.dependencies import dependents as dependents_of
+from composer.plan import Fault, FaultKind, bring_up, reconcile
+from composer.runtime.executors.futures import Future
+from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
+from composer.runtime.supervision.commands import Commands
+from composer.runtime.supervision.events import Reporter
+from composer.runtime.supervision.main_queue import Item, MainQueue, NodeEvent
+from composer.runtime.supervision.node_listener import SupervisionListener
+from composer.runtime.supervision.status import Status
+from composer.runtime.supervision.supervisor import Supervisor
+from tests.examples import examples
+from tests.unit.support.resolving import system_of
+
+if TYPE_CHECKING:
+    from composer.runtime.supervision.node_set import NodeSet
+
+ROBOT = """
+system: robot
+lifecycle:
+  on_failure: restart
+  restart: {max_attempts: 1000, backoff_ms: 1}
+nodes:
+  logger: {lifecycle: {depends_on: {planner: inactive}}}
+  motor: {lifecycle: {depends_on: [planner]}}
+  planner: {lifecycle: {depends_on: [sensor], on_failure: isolate}}
+  sensor: {}
+"""
+NAMES = ("sensor", "planner", "motor", "logger")
+GOALS = {
+    "configure": "inactive",
+    "activate": "active",
+    "deactivate": "inactive",
+    "cleanup": "unconfigured",
+    "shutdown": FINALIZED,
+}
+TRANSITIONS = {
+    "unconfigured": ("configure", "configure", "shutdown"),
+    "inactive": ("activate", "cleanup", "shutdown"),
+    "active": ("deactivate", "deactivate", "shutdown"),
+}
+STATES = {state.value: state for state in PrimaryState}
+
+
+@dataclass(frozen=True)
+class Request:
+    """Begin a transition of a node, or end the one that runs; ``choice`` selects it."""
+
+    node: str
+    choice: int
+    ends_at_once: bool
+    ending: str  # of the transition: success, failure or error
+
+
+#: What happens at the places where another thread could run, one after the other.
+Script: TypeAlias = list[Request | None]
+REQUESTS = st.builds(
+    Request,
+    node=st.sampled_from(NAMES),
+    choice=st.sampled_from((0, 0, 0, 0, 1, 1, 2)),  # seldom a shutdown
+    ends_at_once=st.sampled_from((True, True, False)),
+    ending=st.sampled_from(("success", "success", "success", "failure", "error")),
+)
+SCRIPTS = st.lists(st.none() | REQUESTS, max_size=12)
+
+
+class SimulatedNode:
+    """The state machine of a node, and its loop."""
+
+    name = "default"  # of the loop
+    transition_started_s = 0.0
+
+    def __init__(self, model: Node, world: World, listener: SupervisionListener) -> None:
+        self.full_name = model.full_name
+        self.state = "unconfigured"
+        self.loop = self.lifecycle = self
+        self.breaks = False
+        self._running = ""  # the external transition that runs
+        self._start = ""
+        self._name = model.name.value
+        self._world = world
+        self._listener = listener
+
+    @property
+    def available(self) -> tuple[str, ...]:
+        return TRANSITIONS.get(self.state, ())
+
+    @property
+    def is_moving(self) -> bool:
+        return bool(self._running)
+
+    def run_task(self, work: Coroutine[Any, Any, TransitionOutcome]) -> Future[TransitionOutcome]:
+        future: Future[TransitionOutcome] = Future()
+        try:
+            work.send(None)
+        except StopIteration as end:
+            future.set_result(end.value)
+        return future
+
+    async def run_step(self, transition: str, is_outdated: Callable[[], bool]) -> TransitionOutcome:
+        """Wait for an external transition, then run the step as the lifecycle does."""
+        self._world.interleave()
+        self.end("success")
+        if is_outdated():
+            return TransitionOutcome(transition, self.state, False, external=False, outdated=True)
+        if transition not in self.available:
+            return TransitionOutcome(transition, self.state, False, "refused", external=False)
+        self._world.on_step(self._name, transition)
+        self._running, self._start = transition, self.state
+        outcome = self._finish("error" if self.breaks else "success", external=False)
+        self.breaks = False
+        self._world.interleave()
+        return outcome
+
+    def request(self, request: Request) -> None:
+        """Run, begin or end an external transition."""
+        if self._running:
+            self.end(request.ending)
+        elif self.available:
+            self._running = self.available[request.choice]
+            self._start, self.state = self.state, f"{self._running} runs"
+            if request.ends_at_once:
+                self.end(request.ending)
+
+    def end(self, ending: str) -> None:
+        """End the external transition that runs, if any."""
+        if self._running:
+            self._finish(ending, external=True)
+
+    def _finish(self, ending: str, *, external: bool) -> TransitionOutcome:
+        transition, self._running = self._running, ""
+        ends = {"success": GOALS[transition], "failure": self._start, "error": "unconfigured"}
+        self.state = ends[ending]
+        is_success = ending == "success"
+        outcome = TransitionOutcome(transition, self.state, is_success, ending, external=external)
+        self._world.on_end(self._name, outcome)
+        self._listener.on_transition_end(outcome)
+        return outcome
+
+
+class World:
+    """A node set of simulated nodes, and what the test knows about them."""
+
+    def __init__(self, system: System) -> None:
+        self._system = system
+        self.nodes: dict[str, SimulatedNode] = {}
+        self.hung: frozenset[str] = frozenset()
+        self._script: Iterator[Request | None] = iter(())
+        self._clock = 0
+        self.moved_at = dict.fromkeys(NAMES, 0)
+        #: The nodes that the supervisor may move: it had a reason since they were moved externally.
+        self.may_move = set(NAMES)
+        #: The states that external transitions ended in, of the other nodes.
+        self.left_in: dict[str, str] = {}
+
+    # --- what happens
+
+    def play(self, script: Script) -> None:
+        self._script = iter(script)
+
+    def interleave(self) -> None:
+        request = next(self._script, None)
+        if request is not None:
+            self.nodes[request.node].request(request)
+
+    def on_step(self, name: str, transition: str) -> None:
+        assert name in self.may_move, f"'{transition}' of {name} undoes an external transition"
+
+    def on_end(self, name: str, outcome: TransitionOutcome) -> None:
+        if not outcome.external or outcome.reason == "failure":
+            return
+        self._clock += 1
+        self.moved_at[name] = self._clock
+        self.may_move.discard(name)
+        self.left_in.pop(name, None)
+        if outcome.state == GOALS[outcome.transition]:
+            self.left_in[name] = outcome.state
+
+    def allow(self, *names: str) -> None:
+        """Allow moves of nodes and of those that depend on them."""
+        for name in names:
+            affected = {name, *dependents_of(self._system, name)}
+            self.may_move |= affected
+            for other in affected:
+                self.left_in.pop(other, None)
+
+    @property
+    def now(self) -> int:
+        return self._clock
+
+    # --- the node set
+
+    def states(self) -> Mapping[str, PrimaryState]:
+        found = {}
+        for name, node in self.nodes.items():
+            self.interleave()
+            if node.state in STATES:
+                found[name] = STATES[node.state]
+        return found
+
+    def is_lost(self, _: str) -> bool:
+        return False
+
+    def timeout_s(self, _: str) -> float:
+        return 10.0
+
+    def recreate(self, name: str, is_outdated: Callable[[], bool]) -> str | None:
+        self.interleave()
+        node = self.nodes[name]
+        if node.state == FINALIZED and not is_outdated():
+            node.state = "unconfigured"
+        return None
+
+
+class NotedQueue(MainQueue[Item]):
+    """A queue that notes when each fault was noticed."""
+
+    def __init__(self, world: World) -> None:
+        super().__init__()
+        self._world = world
+        self.length = 0
+        self.noticed: dict[int, int] = {}
+
+    def get(self, until_s: float = 0.0) -> Item | None:
+        self.length -= 1
+        return super().get(until_s)
+
+    def put(self, item: Item) -> None:
+        self.length += 1
+        self.noticed.setdefault(id(item), self._world.now)
+        super().put(item)
+
+
+class Supervision(RuleBasedStateMachine):
+    """Requests, faults, commands and what the supervisor does about them, in any order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.system = SYSTEM
+        self.world = World(self.system)
+        self.queue = NotedQueue(self.world)
+        reporter = Reporter(None)
+        status = Status(self.system, in_dependency_order(SYSTEM, dependency_edges(SYSTEM)))
+        node_set = cast("NodeSet", self.world)
+        self.supervisor = Supervisor(self.system, node_set, self.queue, status, reporter)
+        self.commands = Commands(self.system, node_set, self.supervisor, status)
+        for model in self.system.nodes:
+            listener = SupervisionListener(
+                model, self.supervisor.shared, self.queue, status, reporter
+            )
+            self.world.nodes[model.name.value] = SimulatedNode(model, self.world, listener)
+        assert self.supervisor.bring_up(bring_up(self.system), 0) is None
+        self.supervisor.set_goals(self.world.states(), 0)
+        self.world.may_move.clear()
+        self.handled: list[NodeEvent] = []  # keeps their ids unique
+        self.is_reconciled = True
+
+    @property
+    def active(self) -> list[str]:
+        return [name for name, node in self.world.nodes.items() if node.state == "active"]
+
+    def is_outdated(self, fault: Fault) -> bool:
+        return self.queue.noticed[id(fault)] < self.world.moved_at[fault.node]
+
+    def handle(self) -> None:
+        event = cast("NodeEvent", self.queue.get())
+        self.handled.append(event)
+        self.is_reconciled = True
+        if isinstance(event, Fault) and not self.is_outdated(event):
+            self.world.allow(event.node)
+        self.supervisor.handle(event)
+
+    @rule(request=REQUESTS)
+    def request_a_transition(self, request: Request) -> None:
+        self.world.nodes[request.node].request(request)
+
+    @precondition(lambda self: self.active)
+    @rule(index=st.integers(0, 11), request=st.none() | REQUESTS)
+    def detect_silence(self, index: int, request: Request | None) -> None:
+        """The health monitor reports a fault; a request may come first."""
+        name = self.active[index % len(self.active)]
+        serial = self.supervisor.desired.serial
+        fault = Fault(name, FaultKind.SILENCE, "silent", serial)
+        self.queue.noticed[id(fault)] = self.world.now
+        if request is not None:
+            self.world.nodes[request.node].request(request)
+        self.queue.put(fault)
+
+    @rule(name=st.sampled_from(NAMES))
+    def break_the_next_step(self, name: str) -> None:
+        self.world.nodes[name].breaks = True
+
+    @precondition(lambda self: self.queue.length)
+    @rule(script=SCRIPTS)
+    def handle_an_event(self, script: Script) -> None:
+        self.world.play(script)
+        self.handle()
+
+    @rule()
+    def handle_all_events(self) -> None:
+        self.world.play([])
+        while self.queue.length:
+            self.handle()
+
+    @precondition(lambda self: self.supervisor.desired.next_restart is not None)
+    @rule(script=SCRIPTS)
+    def restart_a_node(self, script: Script) -> None:
+        restart = self.supervisor.desired.next_restart
+        assert restart is not None
+        self.world.allow(restart.node)
+        self.world.play(script)
+        self.supervisor.restart(restart)
+
+    @rule(name=st.sampled_from(("startup", "startup", "pause", "resume", "reset")), script=SCRIPTS)
+    def command(self, name: str, script: Script) -> None:
+        self.world.allow(*NAMES)
+        self.world.play(script)
+        self.is_reconciled, _ = self.commands.run(name)
+
+    @invariant()
+    def external_transitions_last(self) -> None:
+        """A node is where the last external transition left it, unless there was a reason since."""
+        for name, state in self.world.left_in.items():
+            node = self.world.nodes[name]
+            assert node.is_moving or node.state == state, name
+
+    @invariant()
+    def nothing_is_left_to_do(self) -> None:
+        """Once all events are handled, every node is in its desired state."""
+        if not self.queue.length and self.is_reconciled:
+            desired = self.supervisor.desired
+            assert not desired.unhandled
+            assert desired.scheduled.keys() <= desired.down.keys()
+            self.world.play([])
+            plan = reconcile(self.system, desired, self.world.states(), "")
+            assert not [step for step in plan.steps if not self.world.nodes[step.node].is_moving]
+
+
+SYSTEM = system_of(ROBOT)
+TestSupervision = Supervision.TestCase
+TestSupervision.settings = examples(100)

@@ -1,0 +1,114 @@
+"""External lifecycle managers move nodes without pauses, and the supervisor undoes nothing."""
+
+from __future__ import annotations
+
+import itertools
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+import pytest
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.qos import QoSProfile
+
+from tests.ros.support.in_process import Peer, wait_until
+from tests.ros.support.system_process import RunningSystem
+
+SYSTEM = "systems/pipeline.yaml"
+SENSOR = "/perception/sensor_simulator"
+PLANNER = "/planning/planner"
+MOTOR = "/control/motor_controller"
+UP, DOWN = ("configure", "activate"), ("deactivate", "cleanup")
+
+
+class LifecycleManager:
+    """A client that moves some nodes, each request right after the response to the last one."""
+
+    def __init__(self, peer: Peer, nodes: tuple[str, ...], count: int) -> None:
+        self.failed: list[str] = []
+        self.done = 0
+        self._count = count
+        down = [(node, transition) for transition in DOWN for node in reversed(nodes)]
+        up = [(node, transition) for transition in UP for node in nodes]
+        self._requests = itertools.cycle([*down, *up])
+        ros_node = peer.join(f"manager_of_{nodes[-1].replace('/', '_')}")
+        self._clients = {
+            node: ros_node.create_client(
+                ChangeState, f"{node}/change_state", qos_profile=QoSProfile(depth=1000)
+            )
+            for node in nodes
+        }
+        for client in self._clients.values():
+            wait_until(client.service_is_ready)
+
+    def send(self) -> None:
+        node, label = next(self._requests)
+        request = ChangeState.Request(transition=Transition(label=label))
+        future = self._clients[node].call_async(request)
+        future.add_done_callback(lambda answer: self._on_response(f"{node} {label}", answer))
+
+    def _on_response(self, requested: str, future: Any) -> None:
+        self.done += 1
+        if not future.result().success:
+            self.failed.append(f"{requested}, request {self.done}")
+        if self.done < self._count:
+            self.send()
+
+
+def has_progress(managers: Sequence[LifecycleManager], done: int) -> bool:
+    return sum(manager.done for manager in managers) > done
+
+
+@contextmanager
+def busy_processors(count: int) -> Iterator[None]:
+    """Keep processors busy with other processes."""
+    program = [sys.executable, "-c", "while True: pass"]
+    processes = [subprocess.Popen(program) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.parametrize(
+    "managed",
+    [
+        pytest.param([(SENSOR, PLANNER, MOTOR)], id="one manager"),
+        pytest.param([(SENSOR, PLANNER), (MOTOR,)], id="two managers"),
+    ],
+)
+@pytest.mark.parametrize(
+    "count",
+    [
+        pytest.param(
+            20_000,
+            marks=[pytest.mark.soak, pytest.mark.timeout(1800)],
+        )
+    ],
+)
+def test_no_external_transition_is_undone(
+    peer: Peer, managed: list[tuple[str, ...]], count: int
+) -> None:
+    with RunningSystem(SYSTEM) as system, busy_processors(2):
+        system.wait_for("3 of 3 nodes active")
+        managers = [LifecycleManager(peer, nodes, count // len(managed)) for nodes in managed]
+        started = len(system.lines)
+        for manager in managers:
+            manager.send()
+        while any(manager.done < count // len(managed) for manager in managers):
+            done = sum(manager.done for manager in managers)
+            wait_until(partial(has_progress, managers, done), "a response")
+        assert system.stop()[0] == 0
+    failed = [text for manager in managers for text in manager.failed]
+    lines = system.lines[started:]
+    stopping = next(place for place, line in enumerate(lines) if "shutting down:" in line)
+    moved = [line for line in lines[:stopping] if "[compose] /" in line]
+    print(f"{count} transitions, {len(failed)} failed, {len(moved)} changes of state")
+    assert not failed
+    assert len(moved) == count, "the supervisor has moved a node"
