@@ -17,6 +17,7 @@ from composer.interfaces.definitions import (
     Message,
     MessageConstant,
     Service,
+    parts,
 )
 from composer.interfaces.index import Interfaces, InvalidDefinition
 from composer.interfaces.parser import DefinitionError, parse_definition, split_name
@@ -37,5 +38,6 @@ __all__ = [
     "MessageConstant",
     "Service",
     "parse_definition",
+    "parts",
     "split_name",
 ]

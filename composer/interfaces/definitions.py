@@ -120,3 +120,18 @@ class Action:
 
 
 Interface: TypeAlias = "Message | Service | Action"
+
+
+def parts(interface: Interface) -> dict[str, Message]:
+    """Return the messages of an interface, by ``request``, ``response``, ``goal`` and so on."""
+    match interface:
+        case Service():
+            return {"request": interface.request, "response": interface.response}
+        case Action():
+            return {
+                "goal": interface.goal,
+                "result": interface.result,
+                "feedback": interface.feedback,
+            }
+        case _:
+            return {"message": interface}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from composer.diagnostics import nearest, shown, suggestion
-from composer.interfaces.definitions import Action, Interface, Message, Service
+from composer.interfaces.definitions import Action, Interface, Message, Service, parts
 from composer.interfaces.parser import DefinitionError, parse_definition, split_name
 from composer.interfaces.share_json import read_description
 from composer.interfaces.sources import (
@@ -84,6 +84,11 @@ class Interfaces:
         found = self._look_up(name)
         return found if isinstance(found, InvalidDefinition) else None
 
+    def text(self, name: str) -> str | None:
+        """Return the definition as it is written; None if it is only known as a description."""
+        definition = self._definition(name)
+        return None if definition is None or definition.is_json else definition.text
+
     def outdated(self, name: str) -> str | None:
         """Return the interface that has to be built again before ``name`` can be used, or None.
 
@@ -96,7 +101,8 @@ class Interfaces:
             if self._differs(current):
                 return current
             found = self.find(current) if self._is_of_project(current) else None
-            inner = {field.type.name for part in _parts(found) for field in part.fields} - seen
+            messages = () if found is None else parts(found).values()
+            inner = {field.type.name for part in messages for field in part.fields} - seen
             seen |= inner
             pending += sorted(inner)
         return None
@@ -139,14 +145,17 @@ class Interfaces:
         return self._found[name]
 
     def _read(self, name: str) -> Interface | InvalidDefinition | None:
+        definition = self._definition(name)
+        if definition is None:
+            return None
+        parsed = _parse(name, definition)
+        return self._check_fields(parsed, definition) or parsed
+
+    def _definition(self, name: str) -> Definition | None:
         if split_name(name) is None:
             return None
-        for source in self._sources:
-            definition = source.read(name)
-            if definition is not None:
-                parsed = _parse(name, definition)
-                return self._check_fields(parsed, definition) or parsed
-        return None
+        definitions = (source.read(name) for source in self._sources)
+        return next((found for found in definitions if found is not None), None)
 
     def _check_fields(
         self, interface: Interface | InvalidDefinition, definition: Definition
@@ -157,7 +166,7 @@ class Interfaces:
         """
         if isinstance(interface, InvalidDefinition) or not self._is_of_project(interface.name):
             return None
-        for field in (field for part in _parts(interface) for field in part.fields):
+        for field in (field for part in parts(interface).values() for field in part.fields):
             if field.type.is_primitive or self._may_exist(field.type.name):
                 continue
             written = re.search(rf"(?m)^.*\s{re.escape(field.name)}\b", definition.text)
@@ -172,19 +181,6 @@ class Interfaces:
         if name.partition("/")[0] not in self._packages:
             return True
         return any(source.read(name) is not None for source in self._sources)
-
-
-def _parts(interface: Interface | None) -> tuple[Message, ...]:
-    """Return the messages that an interface is made of."""
-    match interface:
-        case Message():
-            return (interface,)
-        case Service():
-            return (interface.request, interface.response)
-        case Action():
-            return (interface.goal, interface.result, interface.feedback)
-        case None:
-            return ()
 
 
 def _parse(name: str, definition: Definition) -> Interface | InvalidDefinition:

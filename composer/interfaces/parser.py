@@ -42,7 +42,8 @@ _FIELD_NAME = re.compile(r"(?!.*__)(?!.*_$)[a-z][a-z0-9_]*", re.ASCII)
 _CONSTANT_NAME = re.compile(r"(?!.*__)(?!.*_$)[A-Z][A-Z0-9_]*", re.ASCII)
 _QUOTED = re.compile(r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\"""")
 _UNQUOTED = re.compile(r"""[^,'"]+|[,'"]""")
-_SEPARATOR = "---"
+#: The line between the parts of a service or an action.
+SEPARATOR = "---"
 _MAX_DIGITS = 100  # of an integer
 _QUOTES = ("'", '"')
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
@@ -78,7 +79,7 @@ def parse_definition(name: str, text: str) -> Interface:
     if len(parts) != expected:
         line = len(text.splitlines()) or 1
         message = (
-            f"a .{folder} file has {expected - 1} lines with '{_SEPARATOR}', not {len(parts) - 1}"
+            f"a .{folder} file has {expected - 1} lines with '{SEPARATOR}', not {len(parts) - 1}"
         )
         raise DefinitionError(message, line)
     match parts:
@@ -101,9 +102,17 @@ def parse_definition(name: str, text: str) -> Interface:
             raise AssertionError(folder)
 
 
+def parse_line(content: str, name: str) -> Field | MessageConstant | None:
+    """Return the member that a line without comments defines in the interface ``name``, or None."""
+    try:
+        return _member(content, name.partition("/")[0])
+    except ValueError:
+        return None
+
+
 def without_comments(text: str) -> str:
     """Return the definition without comments and empty lines."""
-    return ("\n" + _SEPARATOR + "\n").join(
+    return ("\n" + SEPARATOR + "\n").join(
         "\n".join(" ".join(line.split(None, 1)) for _, line in lines) for lines in _parts(text)
     )
 
@@ -113,7 +122,7 @@ def _parts(text: str) -> list[_Lines]:
     parts: list[_Lines] = [[]]
     for number, line in enumerate(text.splitlines(), start=1):
         content = line.partition("#")[0].replace("\t", " ").strip()
-        if content == _SEPARATOR:
+        if content == SEPARATOR:
             parts.append([])
         elif content:
             parts[-1].append((number, content))

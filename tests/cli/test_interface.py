@@ -1,33 +1,81 @@
 from __future__ import annotations
 
+import io
 import json
+
+import pytest
+import yaml
 
 from tests.cli.compose import compose
 
 
 def test_nested_messages_are_expanded() -> None:
-    done = compose("interface", "show", "geometry_msgs/msg/PointStamped")
+    done = compose("interface", "show", "geometry_msgs/msg/PointStamped", "--no-comments")
     assert done.code == 0
     assert done.out.splitlines() == [
-        "std_msgs/msg/Header header",
-        "  builtin_interfaces/msg/Time stamp",
-        "    int32 sec",
-        "    uint32 nanosec",
-        "  string frame_id",
-        "geometry_msgs/msg/Point point",
-        "  float64 x",
-        "  float64 y",
-        "  float64 z",
+        "std_msgs/Header header",
+        "\tbuiltin_interfaces/Time stamp",
+        "\t\tint32 sec",
+        "\t\tuint32 nanosec",
+        "\tstring frame_id",
+        "Point point",
+        "\tfloat64 x",
+        "\tfloat64 y",
+        "\tfloat64 z",
     ]
+
+
+def test_comments_are_all_shown_or_none() -> None:
+    done = compose("interface", "show", "std_msgs/msg/Header", "--no-comments", "--all-comments")
+    assert done.code == 2
+    commented = compose("interface", "show", "std_msgs/msg/Header").out
+    assert commented.startswith("# ")
+    assert len(compose("interface", "show", "std_msgs/msg/Header", "--all-comments").out) > len(
+        commented
+    )
+
+
+def test_the_type_is_read_from_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("std_msgs/msg/Empty\n"))
+    assert compose("interface", "show", "-", "--json").code == 0
+
+
+def test_packages_and_their_types_are_listed() -> None:
+    assert {"std_msgs", "std_srvs"} <= set(compose("interface", "packages").out.split())
+    with_actions = compose("interface", "packages", "--only-actions").out.split()
+    assert "composer_interfaces" in with_actions
+    assert "std_msgs" not in with_actions
+    types = compose("interface", "package", "composer_interfaces").out.split()
+    assert types == [
+        "composer_interfaces/srv/PlanTrajectory",
+        "composer_interfaces/action/Navigate",
+    ]
+    actions = compose("interface", "package", "composer_interfaces", "-a", "--json").out
+    assert json.loads(actions) == ["composer_interfaces/action/Navigate"]
+    wrong = compose("interface", "package", "std_msg")
+    assert wrong.code == 1
+    assert "did you mean 'std_msgs'?" in wrong.err
+
+
+def test_a_prototype_has_all_fields() -> None:
+    twist = compose("interface", "proto", "geometry_msgs/msg/Twist").out
+    vector = "  x: 0.0\n  y: 0.0\n  z: 0.0\n"
+    assert twist == f'"linear:\n{vector}angular:\n{vector}"\n'
+    request = compose("interface", "proto", "std_srvs/srv/SetBool", "--no-quotes").out
+    assert yaml.safe_load(request) == {"data": False}
+    cell = json.loads(compose("interface", "proto", "nav_msgs/msg/Odometry", "--json").out)
+    assert cell["header"]["frame_id"] == ""
+    assert cell["pose"]["covariance"] == [0.0] * 36
+    assert cell["pose"]["pose"]["orientation"]["w"] == 1.0
 
 
 def test_flat_does_not_expand_nested_messages() -> None:
     done = compose("interface", "show", "geometry_msgs/msg/PointStamped", "--flat")
-    assert done.out == "std_msgs/msg/Header header\ngeometry_msgs/msg/Point point\n"
+    assert done.out.endswith("\nstd_msgs/Header header\nPoint point\n")
 
 
 def test_services_actions_and_constants_are_shown() -> None:
-    shown = compose("interface", "show", "std_srvs/srv/SetBool").out
+    shown = compose("interface", "show", "std_srvs/srv/SetBool", "--no-comments").out
     assert shown == "bool data\n---\nbool success\nstring message\n"
     action = compose("interface", "show", "composer_interfaces/action/Navigate", "--flat").out
     assert action.count("---\n") == 2

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from composer.cli.support.completion import complete_type
-from composer.cli.support.errors import CommandError
+from composer.cli.support.completion import complete_interface_package, complete_type
+from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import Json, examples
-from composer.cli.support.output import as_json
+from composer.cli.support.output import as_json, as_yaml
 from composer.cli.support.terminal import lines, write
 
 if TYPE_CHECKING:
-    from composer.interfaces import Interfaces, Message
+    from composer.interfaces import Interface, Interfaces, Message
 
 app = typer.Typer(
     help="""Show message, service and action types.
@@ -23,7 +25,9 @@ app = typer.Typer(
     is not needed.
     """,
     epilog=examples(
-        "compose interface list --only-srvs", "compose interface show nav_msgs/msg/Odometry"
+        "compose interface list --only-srvs",
+        "compose interface show nav_msgs/msg/Odometry",
+        "compose interface proto geometry_msgs/msg/Twist",
     ),
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -35,31 +39,60 @@ Type = Annotated[
         metavar="TYPE", help="Such as std_msgs/msg/String.", autocompletion=complete_type
     ),
 ]
+OnlyMessages = Annotated[bool, typer.Option("--only-msgs", "-m", help="Only messages.")]
+OnlyServices = Annotated[bool, typer.Option("--only-srvs", "-s", help="Only services.")]
+OnlyActions = Annotated[bool, typer.Option("--only-actions", "-a", help="Only actions.")]
 
 
 @app.command("list", epilog=examples("compose interface list", "compose interface list -s"))
 def list_interfaces(
     *,
-    only_messages: Annotated[
-        bool, typer.Option("--only-msgs", "-m", help="List messages.")
-    ] = False,
-    only_services: Annotated[
-        bool, typer.Option("--only-srvs", "-s", help="List services.")
-    ] = False,
-    only_actions: Annotated[
-        bool, typer.Option("--only-actions", "-a", help="List actions.")
-    ] = False,
+    only_messages: OnlyMessages = False,
+    only_services: OnlyServices = False,
+    only_actions: OnlyActions = False,
     json: Json = False,
 ) -> None:
     """List the known types."""
-    only = {"msg": only_messages, "srv": only_services, "action": only_actions}
+    _print(_names(_interfaces(), only_messages, only_services, only_actions), json)
+
+
+@app.command("packages", epilog=examples("compose interface packages --only-actions"))
+def list_packages(
+    *,
+    only_messages: OnlyMessages = False,
+    only_services: OnlyServices = False,
+    only_actions: OnlyActions = False,
+    json: Json = False,
+) -> None:
+    """List the packages that define types."""
+    from composer.interfaces.listing import packages
+
+    _print(packages(_names(_interfaces(), only_messages, only_services, only_actions)), json)
+
+
+@app.command("package", epilog=examples("compose interface package std_srvs"))
+def list_package(
+    package: Annotated[
+        str, typer.Argument(metavar="PACKAGE", autocompletion=complete_interface_package)
+    ],
+    *,
+    only_messages: OnlyMessages = False,
+    only_services: OnlyServices = False,
+    only_actions: OnlyActions = False,
+    json: Json = False,
+) -> None:
+    """List the types of a package."""
+    from composer.diagnostics import suggestion
+    from composer.interfaces.listing import packages
+
     interfaces = _interfaces()
-    folders = [folder for folder, chosen in only.items() if chosen or not any(only.values())]
-    names = [name for folder in folders for name in interfaces.names(folder)]
-    if json:
-        write(as_json(names, indent=2))
-    elif names:
-        write(lines(names))
+    known = packages(_names(interfaces))
+    if package not in known:
+        raise CommandError(
+            f"there is no package '{package}' with types", hint=suggestion(package, known)
+        )
+    names = _names(interfaces, only_messages, only_services, only_actions)
+    _print([name for name in names if name.startswith(f"{package}/")], json)
 
 
 @app.command(
@@ -67,34 +100,75 @@ def list_interfaces(
     epilog=examples(
         "compose interface show nav_msgs/msg/Odometry",
         "compose interface show composer_interfaces/action/Navigate --flat",
+        "compose topic type /sensor_data | compose interface show -",
     ),
 )
 def show(
-    name: Type,
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="TYPE",
+            help="Such as std_msgs/msg/String; - reads it from standard input.",
+            autocompletion=complete_type,
+        ),
+    ],
     *,
+    all_comments: Annotated[
+        bool, typer.Option("--all-comments", help="Show the comments of nested messages too.")
+    ] = False,
+    no_comments: Annotated[
+        bool, typer.Option("--no-comments", help="Show no comments and no empty lines.")
+    ] = False,
     flat: Annotated[bool, typer.Option("--flat", help="Do not expand nested messages.")] = False,
     json: Json = False,
 ) -> None:
     """Print the definition of a type.
 
-    Nested messages are expanded and indented.
+    Nested messages are expanded and indented, without their comments.
     """
-    from composer.interfaces.index import similar_interface
+    if all_comments and no_comments:
+        raise UsageError("only one of --all-comments and --no-comments can be used")
+    from composer.interfaces import parts
+    from composer.interfaces.listing import ListingOptions, listing
+
+    wanted = sys.stdin.readline().strip() if name == "-" else name
+    interfaces = _interfaces()
+    found = _find(interfaces, wanted)
+    if json:
+        data = {title: _as_data(part) for title, part in parts(found).items()}
+        write(as_json({"name": wanted, **data}, indent=2))
+        return
+    options = ListingOptions(not no_comments, all_comments, nested=not flat)
+    write("\n".join(listing(wanted, interfaces, options)))
+
+
+@app.command(
+    "proto",
+    epilog=examples(
+        "compose interface proto geometry_msgs/msg/Twist",
+        "compose interface proto std_srvs/srv/SetBool --no-quotes",
+    ),
+)
+def proto(
+    name: Type,
+    *,
+    no_quotes: Annotated[
+        bool, typer.Option("--no-quotes", help="Do not print quotes around the YAML.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Print a message, request or goal with default values, as YAML."""
+    from composer.interfaces import parts
+    from composer.interfaces.listing import prototype
 
     interfaces = _interfaces()
-    found = interfaces.find(name)
-    problem = interfaces.problem(name)
-    if problem is not None:
-        raise CommandError(str(problem), hint=f"see {problem.place}")
-    if found is None:
-        known = [item for folder in ("msg", "srv", "action") for item in interfaces.names(folder)]
-        raise CommandError(f"there is no type '{name}'", hint=similar_interface(name, known))
+    message = next(iter(parts(_find(interfaces, name)).values()))
+    value = prototype(message, interfaces)
     if json:
-        parts = {title: _as_data(part) for title, part in _parts(found).items()}
-        write(as_json({"name": name, **parts}, indent=2))
+        write(as_json(value, indent=2))
         return
-    parts_shown = (_lines_of(part, interfaces, flat) for part in _parts(found).values())
-    write("\n---\n".join(parts_shown))
+    text = f"{as_yaml(value)}\n"
+    write(text if no_quotes else f'"{text}"')
 
 
 def _interfaces() -> Interfaces:
@@ -105,16 +179,38 @@ def _interfaces() -> Interfaces:
     return Interfaces.load(interface_folders(Project.at(Path.cwd())))
 
 
-def _parts(found: Any) -> dict[str, Message]:
-    from composer.interfaces import Action, Service
+def _names(
+    interfaces: Interfaces,
+    only_messages: bool = False,
+    only_services: bool = False,
+    only_actions: bool = False,
+) -> list[str]:
+    """Return the names of all types, or of those kinds that are chosen."""
+    only = {"msg": only_messages, "srv": only_services, "action": only_actions}
+    folders = [folder for folder, chosen in only.items() if chosen or not any(only.values())]
+    return [name for folder in folders for name in interfaces.names(folder)]
 
-    match found:
-        case Service():
-            return {"request": found.request, "response": found.response}
-        case Action():
-            return {"goal": found.goal, "result": found.result, "feedback": found.feedback}
-        case _:
-            return {"message": found}
+
+def _print(names: Sequence[str], json: bool) -> None:
+    if json:
+        write(as_json(list(names), indent=2))
+    elif names:
+        write(lines(names))
+
+
+def _find(interfaces: Interfaces, name: str) -> Interface:
+    """Return an interface. Raises CommandError."""
+    from composer.interfaces.index import similar_interface
+
+    found = interfaces.find(name)
+    problem = interfaces.problem(name)
+    if problem is not None:
+        raise CommandError(str(problem), hint=f"see {problem.place}")
+    if found is None:
+        raise CommandError(
+            f"there is no type '{name}'", hint=similar_interface(name, _names(interfaces))
+        )
+    return found
 
 
 def _as_data(message: Message) -> dict[str, Any]:
@@ -129,16 +225,3 @@ def _as_data(message: Message) -> dict[str, Any]:
             for item in message.constants
         ],
     }
-
-
-def _lines_of(message: Message, interfaces: Interfaces, flat: bool, indent: str = "") -> str:
-    from composer.interfaces import Message
-
-    shown = [f"{indent}{item.type} {item.name}={item.value}" for item in message.constants]
-    for field in message.fields:
-        default = "" if field.default is None else f" {field.default}"
-        shown.append(f"{indent}{field.type} {field.name}{default}")
-        inner = None if flat or field.type.is_primitive else interfaces.find(field.type.name)
-        if isinstance(inner, Message) and inner.fields:
-            shown.append(_lines_of(inner, interfaces, flat, indent + "  "))
-    return "\n".join(shown)

@@ -89,6 +89,14 @@ def complete_type(incomplete: str) -> list[str]:
     return _types(incomplete, "msg", "srv", "action")
 
 
+@silent
+def complete_interface_package(incomplete: str) -> list[str]:
+    """Complete the name of a package with message, service or action types."""
+    from composer.interfaces import Interfaces
+
+    return _starting_with(incomplete, sorted(Interfaces.load().packages()))
+
+
 def _types(incomplete: str, *folders: str) -> list[str]:
     from composer.interfaces import Interfaces
 

@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.interfaces import Interfaces, parts
+from composer.interfaces.listing import ListingOptions, listing, packages, prototype
+
+OUTER = """\
+# outside
+
+Inner[2] inner  # below
+string name 'a'
+int8 LIMIT=1
+"""
+INNER = """\
+# inside
+
+int32 x 3  # of it
+bool[] flags
+"""
+
+
+@pytest.fixture
+def interfaces(tmp_path: Path) -> Interfaces:
+    (tmp_path / "msg").mkdir()
+    (tmp_path / "srv").mkdir()
+    (tmp_path / "package.xml").write_text("<package><name>my_msgs</name></package>")
+    (tmp_path / "msg" / "Inner.msg").write_text(INNER)
+    (tmp_path / "msg" / "Outer.msg").write_text(OUTER)
+    (tmp_path / "srv" / "Ask.srv").write_text("Inner what\n---\n# why\nbool ok\n")
+    return Interfaces.load([tmp_path])
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (
+            ListingOptions(),
+            "# outside\n\nInner[2] inner  # below\n\tint32 x 3\n\tbool[] flags\nstring name 'a'\n"
+            "int8 LIMIT=1",
+        ),
+        (
+            ListingOptions(comments=False),
+            "Inner[2] inner\n\tint32 x 3\n\tbool[] flags\nstring name 'a'\nint8 LIMIT=1",
+        ),
+        (
+            ListingOptions(nested_comments=True),
+            "# outside\n\nInner[2] inner  # below\n\t# inside\n\n\tint32 x 3  # of it\n"
+            "\tbool[] flags\nstring name 'a'\nint8 LIMIT=1",
+        ),
+        (ListingOptions(nested=False), OUTER.rstrip()),
+    ],
+)
+def test_comments_and_nested_messages(
+    interfaces: Interfaces, options: ListingOptions, expected: str
+) -> None:
+    assert "\n".join(listing("my_msgs/msg/Outer", interfaces, options)) == expected
+
+
+def test_services_keep_their_separator(interfaces: Interfaces) -> None:
+    shown = list(listing("my_msgs/srv/Ask", interfaces, ListingOptions()))
+    assert shown == ["Inner what", "\tint32 x 3", "\tbool[] flags", "---", "# why", "bool ok"]
+
+
+def test_a_definition_without_text_is_written_from_its_description(
+    interfaces: Interfaces, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(interfaces, "text", lambda _: None)
+    assert list(listing("my_msgs/msg/Outer", interfaces, ListingOptions())) == [
+        "int8 LIMIT=1",
+        "my_msgs/msg/Inner[2] inner",
+        "\tint32 x 3",
+        "\tbool[] flags",
+        "string name a",
+    ]
+
+
+def test_a_prototype_has_the_defaults(interfaces: Interfaces) -> None:
+    outer = interfaces.message("my_msgs/msg/Outer")
+    assert outer is not None
+    inner = {"x": 3, "flags": []}
+    assert prototype(outer, interfaces) == {"inner": [inner, inner], "name": "a"}
+    ask = interfaces.find("my_msgs/srv/Ask")
+    assert ask is not None
+    assert list(parts(ask)) == ["request", "response"]
+
+
+def test_a_message_that_contains_itself_is_expanded_once(tmp_path: Path) -> None:
+    (tmp_path / "msg").mkdir()
+    (tmp_path / "package.xml").write_text("<package><name>my_msgs</name></package>")
+    (tmp_path / "msg" / "Tree.msg").write_text("Leaf leaf\n")
+    (tmp_path / "msg" / "Leaf.msg").write_text("Tree tree\n")
+    interfaces = Interfaces.load([tmp_path])
+    shown = list(listing("my_msgs/msg/Tree", interfaces, ListingOptions()))
+    assert shown == ["Leaf leaf", "\tTree tree"]
+    tree = interfaces.message("my_msgs/msg/Tree")
+    assert tree is not None
+    assert prototype(tree, interfaces) == {"leaf": {"tree": {}}}
+
+
+def test_packages_are_sorted_and_listed_once() -> None:
+    assert packages(["b/msg/X", "a/srv/Y", "b/msg/Z"]) == ("a", "b")
