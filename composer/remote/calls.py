@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +14,7 @@ from rclpy.action.client import ActionClient, ClientGoalHandle
 from rclpy.task import Future
 
 from composer.remote.graph_names import type_mismatch_hint
-from composer.remote.requests import call_once
+from composer.remote.requests import ServiceCaller
 from composer.remote.session import Deadline, NoResponseError, RosError, Session
 from composer.remote.values import class_of, compile_content
 
@@ -41,18 +43,37 @@ class FinishedGoal:
     result: Any
 
 
-def call_service(
-    session: Session, deadline: Deadline, name: str, type_name: str, request: str
-) -> Any:
-    """Return the response to a request in YAML. Raises InvalidValueError, NoResponseError."""
-    service = class_of(type_name, "service")
-    message = compile_content(request, service.Request, "the request")({})
-    try:
-        return call_once(session, service, name, message, deadline)
-    except NoResponseError as error:
-        raise NoResponseError(
-            str(error), type_mismatch_hint(session, "service", name, type_name)
-        ) from error
+@dataclass(frozen=True, slots=True)
+class ServiceRequest:
+    """A request, as YAML, for a service. With ``rate_hz`` it is sent again and again."""
+
+    name: str
+    type_name: str
+    request: str
+    rate_hz: float | None = None
+
+
+def call_service(session: Session, deadline: Deadline, request: ServiceRequest) -> Iterator[Any]:
+    """Yield the response to a request, or the responses to repeated ones.
+
+    The deadline is for the first response; each later one has as much time. Raises
+    InvalidValueError, NoResponseError.
+    """
+    service = class_of(request.type_name, "service")
+    message = compile_content(request.request, service.Request, "the request")({})
+    with closing(ServiceCaller(session, retry_after_s=math.inf)) as caller:
+        next_s = time.monotonic()
+        while True:
+            try:
+                yield caller.call(service, request.name, message, deadline)
+            except NoResponseError as error:
+                hint = type_mismatch_hint(session, "service", request.name, request.type_name)
+                raise NoResponseError(str(error), hint) from error
+            if request.rate_hz is None:
+                return
+            next_s = max(next_s + 1.0 / request.rate_hz, time.monotonic())
+            session.spin_until(next_s)
+            deadline = Deadline(deadline.timeout_s)
 
 
 class _ActionClient(ActionClient):

@@ -136,6 +136,19 @@ class ParameterClient:
             raise ParameterRejectedError(f"{self.node} rejected " + "; ".join(rejected))
         return {item.name: plain_value(item.value) for item in messages}
 
+    def delete(self, name: str) -> None:
+        """Delete a parameter. Raises UnknownParameterError, ParameterRejectedError.
+
+        Nodes delete only parameters that they declared without a fixed type.
+        """
+        self._check_known([name])
+        (qualified,) = self._qualified([name])
+        request = SetParameters.Request(parameters=[ParameterMessage(name=qualified)])
+        (result,) = self._call(call_once, SetParameters, "set_parameters", request).results
+        if not result.successful:
+            reason = result.reason or "no reason given"
+            raise ParameterRejectedError(f"{self.node} did not delete {name}: {reason}")
+
     def load(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Set the parameters of a file, except for read-only ones that have the value already.
 
@@ -182,12 +195,14 @@ class ParameterClient:
             ) from error
 
 
-def names_by_node(session: Session, deadline: Deadline) -> dict[str, list[str] | None]:
+def names_by_node(
+    session: Session, deadline: Deadline, *, hidden: bool = False
+) -> dict[str, list[str] | None]:
     """Return the parameter names of all nodes, None for nodes that did not respond in time."""
     # Nodes without parameter services are left out.
     services = {
         name: name.removesuffix(_LIST_SERVICE)
-        for name, _ in GraphNames(session, deadline).names("service")
+        for name, _ in GraphNames(session, deadline).names("service", hidden=hidden)
         if name.endswith(_LIST_SERVICE)
     }
     proxies = Proxies(session)

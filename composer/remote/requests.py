@@ -58,6 +58,15 @@ class ServiceCaller:
             for call in calls.values():
                 call.cancel()
 
+    def call(self, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
+        """Return the response of one service. Raises NoResponseError."""
+        response = self.call_all(service, {name: request}, deadline)[name]
+        if response is None:
+            raise NoResponseError(
+                f"service '{name}' did not respond within {deadline.timeout_s:g} s"
+            )
+        return response
+
     def _client(self, service: Any, name: str) -> Client:
         if name not in self._clients:
             self._clients[name] = self._session.node.create_client(service, name)
@@ -77,7 +86,7 @@ def call_with_retries(
 ) -> Any:
     """Return the response to a request that changes nothing. Raises NoResponseError."""
     with closing(ServiceCaller(session)) as caller:
-        return _only_response(caller, service, name, request, deadline)
+        return caller.call(service, name, request, deadline)
 
 
 def call_once(session: Session, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
@@ -86,16 +95,7 @@ def call_once(session: Session, service: Any, name: str, request: Any, deadline:
     Raises NoResponseError; the server may have handled the request nevertheless.
     """
     with closing(ServiceCaller(session, retry_after_s=math.inf)) as caller:
-        return _only_response(caller, service, name, request, deadline)
-
-
-def _only_response(
-    caller: ServiceCaller, service: Any, name: str, request: Any, deadline: Deadline
-) -> Any:
-    response = caller.call_all(service, {name: request}, deadline)[name]
-    if response is None:
-        raise NoResponseError(f"service '{name}' did not respond within {deadline.timeout_s:g} s")
-    return response
+        return caller.call(service, name, request, deadline)
 
 
 class _PendingCall:

@@ -148,6 +148,12 @@ class Session:
         """Wait briefly for an event, not beyond the deadline."""
         self._executor.spin_once(timeout_sec=min(_SPIN_S, deadline.left_s))
 
+    def spin_until(self, at_s: float) -> None:
+        """Handle events until a time of time.monotonic."""
+        pause = Deadline(at_s - time.monotonic())
+        while not pause.passed:
+            self.spin_once(pause)
+
     def wait_for(self, poll: Callable[[], T | None], deadline: Deadline) -> T | None:
         """Return the first result of ``poll`` that is not None; None at the deadline."""
         while True:

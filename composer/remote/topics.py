@@ -165,7 +165,7 @@ def publish(session: Session, deadline: Deadline, publication: Publication) -> I
             count += 1
             next_s += 1.0 / publication.rate_hz
             if publication.times is None or count < publication.times:
-                _spin_until(session, next_s)
+                session.spin_until(next_s)
         if not publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGED_WITHIN_S)):
             raise _not_acknowledged_error(publication.topic)
     finally:
@@ -197,9 +197,3 @@ def _not_acknowledged_error(topic: str) -> NotAcknowledgedError:
         "messages may be lost: a subscriber may be stopped, busy or gone, or the network may drop"
         f" packets; 'compose topic info -v {topic}' lists the subscriptions",
     )
-
-
-def _spin_until(session: Session, at_s: float) -> None:
-    pause = Deadline(at_s - time.monotonic())
-    while not pause.passed:
-        session.spin_once(pause)

@@ -1,11 +1,16 @@
 from __future__ import annotations
 
+import io
+
 import pytest
 import yaml
 
 from composer.cli.commands.topic.message_format import truncated
+from composer.cli.support.errors import UsageError
+from composer.cli.support.options import yaml_or_stdin
 from composer.cli.support.output import as_yaml
 from composer.cli.support.terminal import columns
+from tests.cli.compose import compose
 
 
 @pytest.mark.parametrize("value", [1.5, "text", "ends with...", True, None, [1, 2], {"a": ["b"]}])
@@ -27,3 +32,29 @@ def test_columns_are_aligned_and_numbers_right_aligned() -> None:
         "node          sent\n/a/long/name     7\n/b             123"
     )
     assert columns([("a", "b"), ("cc", "")]) == "a   b\ncc"
+
+
+def test_yaml_is_an_argument_or_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("data: hello\n"))
+    assert yaml_or_stdin(None, stdin=False) == "{}"
+    assert yaml_or_stdin("{x: 1}", stdin=False) == "{x: 1}"
+    assert yaml_or_stdin(None, stdin=True) == "data: hello\n"
+    with pytest.raises(UsageError, match="not both"):
+        yaml_or_stdin("{x: 1}", stdin=True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        ("topic echo /x --field transforms[x].header", "is not a path of fields and indices"),
+        ("topic echo /x --raw --field data", "--raw cannot be used with --field"),
+        ("topic echo /x --raw --json", "--raw cannot be used with --field"),
+        ("topic find String", "a type has three parts"),
+        ("topic pub /x std_msgs/msg/String {} --stdin", "not both"),
+        ("service call /x std_srvs/srv/Trigger {} --stdin", "not both"),
+    ],
+)
+def test_options_that_exclude_each_other(arguments: str, problem: str) -> None:
+    done = compose(*arguments.split())
+    assert done.code == 2
+    assert problem in done.err

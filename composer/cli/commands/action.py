@@ -11,19 +11,21 @@ from typing import Annotated, Any
 import typer
 
 from composer.cli.commands.service import split_values
-from composer.cli.support.completion import complete_action
+from composer.cli.support.completion import complete_action, complete_action_type
 from composer.cli.support.errors import FAILED
 from composer.cli.support.options import (
     DEFAULT_TIMEOUT_S,
-    Count,
+    CountActions,
     Json,
     ShowTypes,
+    Stdin,
     Timeout,
     examples,
     finite,
+    yaml_or_stdin,
 )
-from composer.cli.support.output import as_json, as_yaml, print_names
-from composer.cli.support.ros import graph_names, ros_session
+from composer.cli.support.output import as_json, as_yaml, print_found, print_names, print_types
+from composer.cli.support.ros import graph_names, names_of_type, ros_session, types_of
 from composer.cli.support.terminal import lines, say, write
 
 app = typer.Typer(
@@ -44,13 +46,32 @@ Action = Annotated[str, typer.Argument(metavar="ACTION", autocompletion=complete
 def list_actions(
     *,
     types: ShowTypes = False,
-    count: Count = False,
+    count: CountActions = False,
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """List actions."""
     actions = graph_names("compose action", "action", timeout)
     print_names("action", actions, types=types, count=count, json=json)
+
+
+@app.command("type", epilog=examples("compose action type /navigate"))
+def type_of(action: Action, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
+    """Print the type of an action."""
+    print_types(types_of("compose action", "action", action, timeout), json=json)
+
+
+@app.command("find", epilog=examples("compose action find composer_interfaces/action/Navigate"))
+def find(
+    type_name: Annotated[str, typer.Argument(metavar="TYPE", autocompletion=complete_action_type)],
+    *,
+    count: CountActions = False,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """List the actions of a type."""
+    names = names_of_type("compose action", "action", type_name, timeout)
+    print_found("action", type_name, names, count=count, json=json)
 
 
 @app.command("info", epilog=examples("compose action info /navigate"))
@@ -82,6 +103,7 @@ def send_goal(
         ),
     ] = None,
     *,
+    stdin: Stdin = False,
     feedback: Annotated[bool, typer.Option("--feedback", "-f", help="Print feedback.")] = False,
     json: Json = False,
     result_timeout: Annotated[
@@ -104,7 +126,8 @@ def send_goal(
 
     Exit code 1 unless the goal succeeds.
     """
-    type_name, goal = split_values(values or [])
+    type_name, text = split_values(values or [])
+    goal = yaml_or_stdin(text, stdin)
     with ros_session("compose action", timeout) as (session, deadline):
         from composer.remote.calls import GoalRequest
         from composer.remote.calls import send_goal as send

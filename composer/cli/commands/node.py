@@ -8,7 +8,15 @@ from typing import Annotated
 import typer
 
 from composer.cli.support.completion import complete_node
-from composer.cli.support.options import DEFAULT_TIMEOUT_S, Count, Hidden, Json, Timeout, examples
+from composer.cli.support.options import (
+    DEFAULT_TIMEOUT_S,
+    AllNodes,
+    CountNodes,
+    Hidden,
+    Json,
+    Timeout,
+    examples,
+)
 from composer.cli.support.output import as_json, say_none_found
 from composer.cli.support.ros import graph_names, ros_session
 from composer.cli.support.terminal import columns, lines, write
@@ -33,8 +41,8 @@ _SECTIONS = (
 @app.command("list", epilog=examples("compose node list", "compose node list --json"))
 def list_nodes(
     *,
-    hidden: Hidden = False,
-    count: Count = False,
+    hidden: AllNodes = False,
+    count: CountNodes = False,
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:

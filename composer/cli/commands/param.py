@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +12,7 @@ import typer
 
 from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, HiddenNodes, Json, Timeout, examples
 from composer.cli.support.output import as_json, as_yaml, say_none_found
 from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import columns, lines, say, say_raw, use_color, write
@@ -64,26 +64,45 @@ def list_parameters(
         ),
     ] = None,
     *,
+    types: Annotated[bool, typer.Option("--param-type", help="Print the types as well.")] = False,
+    hidden: HiddenNodes = False,
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """List the parameters of a node or of all nodes."""
     if node is None:
-        _list_all(json, timeout)
+        _list_all(timeout, types=types, hidden=hidden, json=json)
         return
     with _parameters(node, timeout) as parameters:
-        names = parameters.names()
+        names = _listed(parameters, parameters.names(), types=types, json=json)
     if json:
-        write(as_json(list(names), indent=2))
+        write(as_json(names, indent=2))
     elif names:
         write(lines(names))
 
 
-def _list_all(json: bool, timeout: float) -> None:
-    with ros_session("compose param", timeout) as (session, deadline):
-        from composer.remote.parameters import names_by_node
+def _listed(
+    parameters: ParameterClient, names: Sequence[str], *, types: bool, json: bool
+) -> list[Any]:
+    """Return the names as they are printed: text, or objects if the JSON has types."""
+    if not types:
+        return list(names)
+    described = parameters.describe(names)
+    if json:
+        return [{"name": item.name, "type": item.type} for item in described]
+    return [f"{item.name} (type: {item.type})" for item in described]
 
-        found = names_by_node(session, deadline)
+
+def _list_all(timeout: float, *, types: bool, hidden: bool, json: bool) -> None:
+    with ros_session("compose param", timeout) as (session, deadline):
+        from composer.remote.parameters import ParameterClient, names_by_node
+
+        found: dict[str, list[Any] | None] = dict(names_by_node(session, deadline, hidden=hidden))
+        if types:
+            for node, known in found.items():
+                if known is not None:
+                    client = ParameterClient(session, deadline, node)
+                    found[node] = _listed(client, known, types=True, json=json)
     if json:
         write(as_json(found, indent=2))
         return
@@ -125,6 +144,23 @@ def set_value(
         (described,) = parameters.describe([name])
         values_set = parameters.set({name: value if described.type == "string" else _yaml(value)})
     _print_values(parameters.node, values_set, json)
+
+
+@app.command("delete", epilog=examples("compose param delete planner max_velocity"))
+def delete(
+    node: Node, name: Name, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
+) -> None:
+    """Delete a parameter.
+
+    Exit code 1 if the node rejects that: only a parameter that was declared without a type can be
+    deleted.
+    """
+    with _parameters(node, timeout) as parameters:
+        parameters.delete(name)
+    if json:
+        write(as_json({"node": parameters.node, "deleted": name}))
+    else:
+        write("Deleted parameter successfully")
 
 
 @app.command("describe", epilog=examples("compose param describe planner max_velocity"))

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from composer.cli.support.completion import complete_service
+from composer.cli.support.completion import complete_service, complete_service_type
 from composer.cli.support.options import (
     DEFAULT_TIMEOUT_S,
-    Count,
-    Hidden,
+    CountServices,
+    HiddenServices,
     Json,
     ShowTypes,
+    Stdin,
     Timeout,
     examples,
+    finite,
+    yaml_or_stdin,
 )
-from composer.cli.support.output import as_json, as_yaml, print_names
-from composer.cli.support.ros import graph_names, ros_session, types_of
-from composer.cli.support.terminal import lines, write
+from composer.cli.support.output import as_json, as_yaml, print_found, print_names, print_types
+from composer.cli.support.ros import graph_names, names_of_type, ros_session, types_of
+from composer.cli.support.terminal import write
 
 app = typer.Typer(
     help="List and call services.",
@@ -38,8 +41,8 @@ Service = Annotated[str, typer.Argument(metavar="SERVICE", autocompletion=comple
 def list_services(
     *,
     types: ShowTypes = False,
-    count: Count = False,
-    hidden: Hidden = False,
+    count: CountServices = False,
+    hidden: HiddenServices = False,
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
@@ -52,7 +55,21 @@ def list_services(
 def type_of(service: Service, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
     """Print the type of a service."""
     types = types_of("compose service", "service", service, timeout)
-    write(as_json(list(types), indent=2) if json else lines(types))
+    print_types(types, json=json)
+
+
+@app.command("find", epilog=examples("compose service find std_srvs/srv/Trigger"))
+def find(
+    type_name: Annotated[str, typer.Argument(metavar="TYPE", autocompletion=complete_service_type)],
+    *,
+    count: CountServices = False,
+    hidden: HiddenServices = False,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """List the services of a type."""
+    names = names_of_type("compose service", "service", type_name, timeout, hidden=hidden)
+    print_found("service", type_name, names, count=count, json=json)
 
 
 @app.command(
@@ -74,32 +91,58 @@ def call(
         ),
     ] = None,
     *,
+    stdin: Stdin = False,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            "--rate",
+            "-r",
+            min=0.001,
+            callback=finite,
+            metavar="HZ",
+            help="Repeat the call until Ctrl-C, this often per second.",
+            show_default=False,
+        ),
+    ] = None,
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Call a service and print the response."""
-    type_name, request = split_values(values or [])
+    """Call a service and print the response.
+
+    --timeout limits the wait for each response.
+    """
+    type_name, text = split_values(values or [])
+    request = yaml_or_stdin(text, stdin)
     with ros_session("compose service", timeout) as (session, deadline):
-        from composer.remote.calls import call_service
+        from composer.remote.calls import ServiceRequest, call_service
         from composer.remote.graph_names import GraphNames
         from composer.remote.name_matching import full_name
         from composer.remote.values import to_plain
 
         name = full_name("service", service)
         found = type_name or GraphNames(session, deadline).only_type("service", name)
-        response = to_plain(call_service(session, deadline, name, found, request))
-    write(as_json(response, indent=2) if json else as_yaml(response))
+        call_request = ServiceRequest(name, found, request, rate)
+        for response in call_service(session, deadline, call_request):
+            _print_response(to_plain(response), json=json, is_last=rate is None)
 
 
-def split_values(values: list[str]) -> tuple[str | None, str]:
-    """Return the type, if given, and the YAML. Raises UsageError."""
+def _print_response(response: Any, *, json: bool, is_last: bool) -> None:
+    """Print one response; repeated ones are JSON lines or YAML documents."""
+    if json:
+        write(as_json(response, indent=2 if is_last else None))
+    else:
+        write(as_yaml(response) if is_last else f"{as_yaml(response)}\n---")
+
+
+def split_values(values: list[str]) -> tuple[str | None, str | None]:
+    """Return the type and the YAML, None where not given. Raises UsageError."""
     from composer.cli.support.errors import UsageError
 
     match values:
         case []:
-            return None, "{}"
+            return None, None
         case [text] if "/" in text and not text.lstrip().startswith("{"):
-            return text, "{}"
+            return text, None
         case [text]:
             return None, text
         case [type_name, text]:

@@ -84,6 +84,18 @@ def complete_message_type(incomplete: str) -> list[str]:
 
 
 @silent
+def complete_service_type(incomplete: str) -> list[str]:
+    """Complete a service type."""
+    return _types(incomplete, "srv")
+
+
+@silent
+def complete_action_type(incomplete: str) -> list[str]:
+    """Complete an action type."""
+    return _types(incomplete, "action")
+
+
+@silent
 def complete_type(incomplete: str) -> list[str]:
     """Complete a message, service or action type."""
     return _types(incomplete, "msg", "srv", "action")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
 import typer
+
+from composer.cli.support.errors import UsageError
 
 #: About thirty years, in seconds: longer times overflow the clocks of the operating system.
 _LARGEST = 1e9
@@ -23,12 +26,26 @@ def examples(*lines: str) -> str:
 
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Count = Annotated[bool, typer.Option("--count", "-c", help="Print only the number of names.")]
-ShowTypes = Annotated[bool, typer.Option("--show-types", "-t", help="Print the types as well.")]
-Hidden = Annotated[
-    bool,
-    typer.Option("--include-hidden", "-a", help="Include names that start with an underscore."),
+
+# The options of lists, spelled as in ros2 and, shorter, the same for all lists.
+_COUNT_HELP = "Print only the number of names."
+_HIDDEN_HELP = "Include names that start with an underscore."
+CountNodes = Annotated[bool, typer.Option("--count-nodes", "--count", "-c", help=_COUNT_HELP)]
+CountTopics = Annotated[bool, typer.Option("--count-topics", "--count", "-c", help=_COUNT_HELP)]
+CountServices = Annotated[bool, typer.Option("--count-services", "--count", "-c", help=_COUNT_HELP)]
+CountActions = Annotated[bool, typer.Option("--count-actions", "--count", "-c", help=_COUNT_HELP)]
+AllNodes = Annotated[bool, typer.Option("--all", "--include-hidden", "-a", help=_HIDDEN_HELP)]
+HiddenNodes = Annotated[
+    bool, typer.Option("--include-hidden-nodes", "--include-hidden", "-a", help=_HIDDEN_HELP)
 ]
+HiddenTopics = Annotated[
+    bool, typer.Option("--include-hidden-topics", "--include-hidden", "-a", help=_HIDDEN_HELP)
+]
+HiddenServices = Annotated[
+    bool, typer.Option("--include-hidden-services", "--include-hidden", "-a", help=_HIDDEN_HELP)
+]
+ShowTypes = Annotated[bool, typer.Option("--show-types", "-t", help="Print the types as well.")]
+Hidden = Annotated[bool, typer.Option("--include-hidden", "-a", help=_HIDDEN_HELP)]
 
 #: The time limit of a command for everything that it waits for.
 Timeout = Annotated[
@@ -53,3 +70,14 @@ Namespace = Annotated[
         show_default=False,
     ),
 ]
+
+Stdin = Annotated[bool, typer.Option("--stdin", help="Read the YAML from standard input.")]
+
+
+def yaml_or_stdin(text: str | None, stdin: bool) -> str:
+    """Return the YAML of an argument, of standard input, or an empty map. Raises UsageError."""
+    if not stdin:
+        return "{}" if text is None else text
+    if text is not None:
+        raise UsageError("the YAML is given as an argument or with --stdin, not both")
+    return sys.stdin.read()

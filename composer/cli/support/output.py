@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from composer.characters import escape_json, is_safe
-from composer.cli.support.terminal import columns, say, write
+from composer.cli.support.terminal import columns, lines, say, write
 
 
 def as_yaml(value: Any, *, one_line: bool = False) -> str:
@@ -48,6 +48,25 @@ def print_names(
         write(columns(rows))
     else:
         say_none_found(kind)
+
+
+def print_found(
+    kind: str, type_name: str, names: Sequence[str], *, count: bool, json: bool
+) -> None:
+    """Print the names that have a type, or their number."""
+    if count:
+        write(str(len(names)))
+    elif json:
+        write(as_json(list(names), indent=2))
+    elif names:
+        write(lines(names))
+    else:
+        say(f"no {kind} has the type {type_name}")
+
+
+def print_types(types: Sequence[str], *, json: bool) -> None:
+    """Print the types of a name, one per line."""
+    write(as_json(list(types), indent=2) if json else lines(types))
 
 
 def say_none_found(kind: str) -> None:

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.cli.support.errors import CommandError
+from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.terminal import keep_stdout_for_data, say
 
 if TYPE_CHECKING:
@@ -117,6 +117,21 @@ def types_of(command: str, kind: str, name: str, timeout_s: float) -> tuple[str,
         from composer.remote.graph_names import GraphNames
 
         return GraphNames(session, deadline).types(kind, name)
+
+
+def names_of_type(
+    command: str, kind: str, type_name: str, timeout_s: float, *, hidden: bool = False
+) -> tuple[str, ...]:
+    """Return the names of all topics, services or actions with a type. Raises UsageError."""
+    from composer.interfaces import split_name
+
+    if split_name(type_name) is None:
+        raise UsageError(
+            f"'{type_name}' is not a type",
+            hint="a type has three parts, such as std_msgs/msg/String",
+        )
+    known = graph_names(command, kind, timeout_s, hidden=hidden)
+    return tuple(name for name, types in known if type_name in types)
 
 
 def _warn_of_skipped(session: Session) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
@@ -16,11 +16,16 @@ UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 
 @dataclass(frozen=True, slots=True)
 class EndpointInfo:
-    """A publisher or a subscription of a node."""
+    """A publisher or a subscription of a node. ``gid`` and ``type_hash`` are spelled as in ros2.
+
+    Endpoints that differ only in these two are equal.
+    """
 
     node: str
     type: str
     qos: QosProfile
+    gid: str = field(default="", compare=False)
+    type_hash: str = field(default="", compare=False)
 
     @property
     def is_nameless(self) -> bool:
@@ -59,4 +64,10 @@ def _endpoints(infos: list[TopicEndpointInfo]) -> tuple[EndpointInfo, ...]:
 
 def _endpoint(info: TopicEndpointInfo) -> EndpointInfo:
     node = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-    return EndpointInfo(node, info.topic_type, discovered_profile(info.qos_profile))
+    return EndpointInfo(
+        node,
+        info.topic_type,
+        discovered_profile(info.qos_profile),
+        gid=".".join(f"{byte:02x}" for byte in info.endpoint_gid),
+        type_hash=str(info.topic_type_hash),
+    )

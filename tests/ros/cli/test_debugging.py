@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import threading
 import time
@@ -66,6 +67,9 @@ def test_topic_info() -> None:
     found = json.loads(listed(("/lab/talker",), "topic", "info", "/lab/text", "--json"))
     assert found["types"] == ["std_msgs/msg/String"]
     assert found["subscriptions"] == []
+    (publisher,) = found["publishers"]
+    assert re.fullmatch(r"([0-9a-f]{2}\.){15}[0-9a-f]{2}", publisher.pop("gid"))
+    assert re.fullmatch(r"RIHS01_[0-9a-f]{64}", publisher.pop("type_hash"))
     assert found["publishers"] == [
         {
             "node": "/lab/talker",

@@ -14,6 +14,7 @@ from tests.ros.support.commands import (
     PATIENCE_S,
     compose,
     error,
+    errors,
     finished,
     listed,
     output_of,
@@ -120,6 +121,26 @@ def test_rejected_parameters_are_reported_with_the_reason() -> None:
     )
     assert "did you mean 'speed'?" in error("param", "set", "talker", "sped", "1")
     assert "did you mean '/lab/talker'?" in error("param", "list", "taker")
+
+
+def test_a_parameter_without_a_fixed_type_is_deleted() -> None:
+    deleted = output_of("param", "delete", "talker", "note")
+    assert deleted == "Deleted parameter successfully\n"
+    refused, unknown = errors(
+        ("param", "delete", "talker", "speed"), ("param", "delete", "talker", "note")
+    )
+    assert "/lab/talker did not delete speed: " in refused
+    assert "/lab/talker has no parameter 'note'" in unknown
+
+
+def test_a_call_is_repeated_until_ctrl_c() -> None:
+    process = start("service", "call", "/lab/add", "{data: true}", "-r", "20", "--json")
+    assert process.stdout is not None
+    responses = [json.loads(process.stdout.readline()) for _ in range(3)]
+    assert responses == [{"success": True, "message": "switched"}] * 3
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 130
 
 
 def test_a_parameter_is_described() -> None:

@@ -17,6 +17,7 @@ from composer.cli.commands.topic.receiving import (
     message_timeout_s,
     topic_timeout_s,
 )
+from composer.cli.support.errors import UsageError
 from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import write
 
@@ -63,6 +64,9 @@ def echo(
             callback=_path,
         ),
     ] = None,
+    raw: Annotated[
+        bool, typer.Option("--raw", help="Print the serialized messages, as Python bytes.")
+    ] = False,
     condition: Filter = None,
     message_format: MessageFormat,
     qos: QosOptions,
@@ -74,6 +78,10 @@ def echo(
     Use the --qos-... options to override it.
     """
     message_filter = MessageFilter(condition)
+    if raw and (field is not None or condition is not None or message_format.is_one_line):
+        raise UsageError(
+            "--raw cannot be used with --field, --filter, --json, --csv or --flow-style"
+        )
     with ros_session("compose topic", topic_timeout_s(timeout), carries_messages=True) as (
         session,
         deadline,
@@ -86,13 +94,16 @@ def echo(
         name = full_name("topic", topic)
         found = type_name or topics.type_of(name)
         profile = qos.applied_to(topics.compatible_qos(name))
-        with TopicSubscription(session, name, found, profile) as subscription:
+        with TopicSubscription(session, name, found, profile, raw=raw) as subscription:
             left = 1 if once else count
             for message in _messages(subscription, message_timeout_s(timeout)):
                 if not message_filter.matches(message):
                     continue
-                plain = to_plain(message if field is None else part(message, field))
-                write(message_format.text(plain))
+                if raw:
+                    write(f"{message!r}\n---")
+                else:
+                    plain = to_plain(message if field is None else part(message, field))
+                    write(message_format.text(plain))
                 left = None if left is None else left - 1
                 if left == 0:
                     return

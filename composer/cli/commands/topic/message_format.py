@@ -49,6 +49,11 @@ class MessageFormat:
         if self.json + self.csv + self.flow_style > 1:
             raise UsageError("only one of --json, --csv and --flow-style can be used")
 
+    @property
+    def is_one_line(self) -> bool:
+        """Whether a format was chosen that prints each message on one line."""
+        return self.json or self.csv or self.flow_style
+
     def text(self, plain: Any) -> str:
         """Return a message, or a part of one, as text. JSON and CSV are never truncated."""
         shown = without(str, plain) if self.no_str else plain

@@ -9,7 +9,14 @@ import typer
 from composer.cli.commands.topic.qos_options import QosOptions, qos_options
 from composer.cli.commands.topic.receiving import Topic
 from composer.cli.support.completion import complete_message_type
-from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, finite
+from composer.cli.support.options import (
+    DEFAULT_TIMEOUT_S,
+    Json,
+    Stdin,
+    Timeout,
+    finite,
+    yaml_or_stdin,
+)
 from composer.cli.support.output import as_json
 from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import say, write
@@ -27,14 +34,15 @@ def pub(
         ),
     ],
     content: Annotated[
-        str,
+        str | None,
         typer.Argument(
             metavar="[VALUES]",
             help="The fields as YAML; {expressions} can use count and now.",
             show_default=False,
         ),
-    ] = "{}",
+    ] = None,
     *,
+    stdin: Stdin = False,
     rate: Annotated[
         float,
         typer.Option(
@@ -81,6 +89,7 @@ def pub(
     from composer.qos import PRESETS
 
     limit = 1 if once else times
+    text = yaml_or_stdin(content, stdin)
     with ros_session("compose topic", timeout, carries_messages=True) as (session, deadline):
         from composer.remote.name_matching import full_name
         from composer.remote.topics import NotAcknowledgedError, Publication, publish
@@ -89,7 +98,7 @@ def pub(
         publication = Publication(
             topic=full_name("topic", topic),
             type_name=type_name,
-            build=compile_content(content, class_of(type_name), "the message"),
+            build=compile_content(text, class_of(type_name), "the message"),
             qos=qos.applied_to(PRESETS["command"]),
             rate_hz=rate,
             times=limit,
