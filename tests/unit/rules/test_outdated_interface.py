@@ -14,7 +14,7 @@ system: demo
 nodes:
   hand:
     publishers: {grip: {type: arm_interfaces/msg/Grip, qos: command, external: true}}
-    subscriptions: {wish: {type: arm_interfaces/msg/Grip, qos: command, external: true, log: x}}
+    subscriptions: {want: {type: arm_interfaces/msg/Grip, qos: command, external: true, log: x}}
 """
 
 
