@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections import defaultdict, deque
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from functools import partial
@@ -38,6 +40,8 @@ _TRIGGER_TYPE = "std_srvs/srv/Trigger"
 _SERVICE = f"/{NAME}/{IS_ACTIVE}"
 #: Fast DDS discovers a participant at once or within 3 s; managers report every second.
 DISCOVERY_S = 3.5
+#: Managers send a new report when the subscription has received the latched one.
+_FRESH_WITHIN_S = 0.2
 #: How long to wait for the last messages of a process that has ended.
 _LAST_MESSAGES_S = 0.1
 
@@ -54,6 +58,7 @@ class Systems:
         self._with_callbacks = callbacks
         self._states: dict[str, SystemReport] = {}
         self._callbacks: dict[str, CallbackReport] = {}
+        self._arrivals_s: defaultdict[str, deque[float]] = defaultdict(lambda: deque(maxlen=2))
         self._subscriptions: dict[str, list[Subscription]] = {}
 
     def discover(self) -> tuple[str, ...]:
@@ -117,6 +122,7 @@ class Systems:
         """Return the reports that arrive before the deadline, None for the other systems."""
         requested = sorted(names)
         self._wait_for_reports(requested, deadline)
+        self._session.wait_for(lambda: all(map(self._is_fresh, requested)) or None, deadline)
         return {name: self._report(name) if name in self._states else None for name in requested}
 
     def newer(self, name: str, than_s: float) -> SystemReport | None:
@@ -175,6 +181,15 @@ class Systems:
     def _has_reported(self, name: str) -> bool:
         return name in self._states and (not self._with_callbacks or name in self._callbacks)
 
+    def _is_fresh(self, name: str) -> bool:
+        """Return whether a latched report, which may be old, was followed by a new one."""
+        arrivals_s = self._arrivals_s.get(name, ())
+        return (
+            len(arrivals_s) > 1
+            or not arrivals_s
+            or time.monotonic() > arrivals_s[0] + _FRESH_WITHIN_S
+        )
+
     def _report(self, name: str) -> SystemReport:
         report = self._states[name]
         found = self._callbacks.get(name)
@@ -207,6 +222,8 @@ class Systems:
         full_topic = f"{name}/{NAME}/{topic}"
 
         def on_message(message: DiagnosticArray) -> None:
+            if topic == STATE_TOPIC:
+                self._arrivals_s[name].append(time.monotonic())
             try:
                 reports[name] = parse(message)
             except InvalidReportError as error:

@@ -19,6 +19,7 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.duration import Duration
 from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -61,6 +62,10 @@ _DIAGNOSTICS = "/diagnostics"
 _PERIOD_S = 1.0
 #: Changes within this time, as in a bring-up, become one message.
 _BATCH_S = 0.05
+#: A stopped process does not keep others from getting the status.
+_ACKNOWLEDGED_WITHIN_S = 0.5
+_ACKNOWLEDGMENT_PERIOD_S = 0.02
+_AT_ONCE = Duration()
 _ENDS_WITHIN_S = 0.2
 _RESPONSES_ARRIVE_WITHIN_S = 0.15
 
@@ -103,6 +108,7 @@ class ManagerNode:
         self._host = host
         self._started_s = time.monotonic()
         self._loop = EventLoop(NAME, log_exception)
+        self._is_waiting = False  # for subscriptions that do not have the last message yet
         self._publish_due = threading.Lock()  # held while a message with changes is due
         self._node = Node(
             NAME,
@@ -150,7 +156,7 @@ class ManagerNode:
         """
         self._graph_socket.close(_ENDS_WITHIN_S)
         self._status.on_change(lambda: None)
-        self._loop.call_soon(self._publish)
+        self._loop.call_soon(self._publish_now)
         if linger:
             time.sleep(_RESPONSES_ARRIVE_WITHIN_S)
         self._loop.stop(_ENDS_WITHIN_S)
@@ -236,6 +242,23 @@ class ManagerNode:
         return time.monotonic() - self._started_s
 
     def _publish(self) -> None:
+        """Publish the status once all subscriptions have the last one.
+
+        A message that replaces it earlier would be reported as lost by ``ros2 topic echo``.
+        """
+        if self._is_waiting:
+            return
+        self._is_waiting = True
+        self._publish_by(time.monotonic() + _ACKNOWLEDGED_WITHIN_S)
+
+    def _publish_by(self, end_s: float) -> None:
+        if time.monotonic() < end_s and not self._state.wait_for_all_acked(_AT_ONCE):
+            self._loop.call_later(_ACKNOWLEDGMENT_PERIOD_S, partial(self._publish_by, end_s))
+            return
+        self._is_waiting = False
+        self._publish_now()
+
+    def _publish_now(self) -> None:
         message = status_message(self._status.snapshot(), self._uptime_s, self._host.chains())
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._state.publish(message)

@@ -19,7 +19,7 @@ STATE_TOPIC = "state"
 #: Transient local: a late joiner gets the last message at once.
 STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 CALLBACKS_TOPIC = "callbacks"
-CALLBACKS_QOS = QoSProfile(depth=1)
+CALLBACKS_QOS = QoSProfile(depth=10)
 
 
 def full_parameter_name(node: str, parameter: str) -> str:

@@ -17,6 +17,7 @@ from composer.runtime.process import StartRefused
 from composer.runtime.ros.manager_protocol import STATE_QOS
 from composer.runtime.supervision.events import RolledBack, RollingBack, StateChanged
 from composer.runtime.supervision.status import NodeStatus, SystemStatus
+from tests.ros.support.commands import hand_written
 from tests.ros.support.in_process import Peer, RunningSystem, running, system_of, wait_until
 
 ROBOT = """
@@ -276,3 +277,13 @@ def test_the_length_of_reported_texts_is_limited() -> None:
     for part in status_message(status, 0.0, ()).status:
         assert len(part.message) < 600
         assert all(len(item.value) < 600 for item in part.values)
+
+
+def test_no_published_status_is_lost(tmp_path: Path) -> None:
+    """``ros2 topic echo`` reports a message that another one replaces before it is received."""
+    with (
+        running(ROBOT, tmp_path, planner=PLANNER),
+        hand_written("hand_written_echo.py", "/fleet/robot/manager/state") as process,
+    ):
+        assert process.stdout is not None
+        assert process.stdout.readline() == "0\n"
