@@ -10,8 +10,8 @@ import tokenize
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from composer.ownership import TrustedUsers
 from composer.project import Project
-from composer.project.ownership import TrustedUsers
 from composer.source import Span
 
 MAXIMUM_BYTES = 250_000

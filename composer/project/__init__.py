@@ -6,7 +6,7 @@ folder, else above the nearest ``interfaces`` folder, or the folder itself. File
 project are never read, not even through symbolic links.
 
 The search ends where it finds something that belongs to another user: see
-:mod:`composer.project.ownership`.
+:mod:`composer.ownership`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from composer.diagnostics import Diagnostic, shown
-from composer.project.ownership import SAFE_FOLDERS_VARIABLE, TrustedUsers
+from composer.ownership import SAFE_FOLDERS_VARIABLE, TrustedUsers
 from composer.project.rules import FOREIGN_OWNER
 from composer.project.settings import Settings, read_settings
 from composer.project.sources import SETTINGS_FILE, SettingsSource, find_settings

@@ -103,7 +103,7 @@ def _own_system(name: str, path: Path, example: Path | None) -> Path:
 
     Raises UsageError if it belongs to another user, whose file must be named explicitly.
     """
-    from composer.project.ownership import TrustedUsers
+    from composer.ownership import TrustedUsers
     from composer.source import shown_path
 
     shown = shown_path(path)

@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import MutableMapping
 from pathlib import Path
 
+from composer.ownership import TrustedUsers
+
 _PROFILE = Path(__file__).with_name("fast_dds.xml")
 _PROFILE_FOR_LARGE_SYSTEMS = Path(__file__).with_name("fast_dds_large.xml")
 _PROFILE_FOR_COMMANDS = Path(__file__).with_name("fast_dds_commands.xml")
@@ -24,17 +26,24 @@ _UDP = "UDPv4"
 _RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 #: Variables that the profile for localhost does not replace.
 _OTHER_RANGE_VARIABLES = ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
-#: Fast DDS reads it from the current folder.
+#: Fast DDS reads it from the current folder, also if there is a profile.
 _USER_FILE = "DEFAULT_FASTRTPS_PROFILES.xml"
+_SKIP_USER_FILE_VARIABLE = "SKIP_DEFAULT_XML_FILE"
 
 
 def use_discovery_profile(environment: MutableMapping[str, str], folder: Path = Path()) -> None:
     """Select the default profile, unless the user has configured the discovery of Fast DDS.
 
-    ``folder`` is the current folder.
+    ``folder`` is the current folder. A configuration in it that belongs to another user is ignored:
+    it could send all messages to another computer.
     """
+    user_file = folder / _USER_FILE
+    if TrustedUsers.starting_at(folder).other_owner(user_file) is not None:
+        environment[_SKIP_USER_FILE_VARIABLE] = "1"
     variables = (_VARIABLE, _OTHER_VARIABLE, _SERVER_VARIABLE)
-    if any(map(environment.get, variables)) or (folder / _USER_FILE).exists():
+    if any(map(environment.get, variables)):
+        return
+    if user_file.exists() and not environment.get(_SKIP_USER_FILE_VARIABLE):
         return
     environment[_VARIABLE] = str(_PROFILE)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -38,3 +40,13 @@ def test_parameters_are_read_only_attributes_and_follow_changes() -> None:
     with pytest.raises(AttributeError, match="'max_velocity' cannot be deleted"):
         del parameters.max_velocity
     assert values == {"max_velocity": 0.5, "a.b": 2}
+
+
+def test_a_behavior_does_not_shadow_the_standard_library(tmp_path: Path) -> None:
+    tmp_path.joinpath("signal.py").write_text("class Light:\n    pass\n", encoding="utf-8")
+    span = Span(SourceFile("system.yaml", ""), 1, 1, 1)
+    before = list(sys.path)
+    found = behavior_class(BehaviorReference(Located("signal:Light", span), tmp_path))
+    assert found.__name__ == "Light"
+    assert sys.modules["signal"] is signal
+    assert sys.path == before

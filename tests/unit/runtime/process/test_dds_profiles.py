@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
@@ -41,6 +42,17 @@ def test_a_profile_in_the_current_folder_is_kept(tmp_path: Path) -> None:
     environment: dict[str, str] = {}
     use_discovery_profile(environment, tmp_path)
     assert environment == {}
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
+def test_a_profile_of_another_user_in_the_current_folder_is_skipped(tmp_path: Path) -> None:
+    profile = tmp_path / "DEFAULT_FASTRTPS_PROFILES.xml"
+    profile.touch()
+    os.chown(profile, 65534, 65534)
+    environment: dict[str, str] = {}
+    use_discovery_profile(environment, tmp_path)
+    assert environment["SKIP_DEFAULT_XML_FILE"] == "1"
+    assert Path(environment["FASTRTPS_DEFAULT_PROFILES_FILE"]).name == "fast_dds.xml"
 
 
 def test_the_profile_for_large_systems_has_the_settings_of_writers_only(tmp_path: Path) -> None:
