@@ -89,9 +89,10 @@ def read_parameter_document(path: Path, shown: str) -> tuple[Mapping | None, lis
     stopped = _build(builder, source)
     if stopped is not None:
         return None, stopped
-    if builder.root is None:
+    tree = builder.merged()
+    if tree is None:
         return Mapping((), Span(source, 1, 1)), builder.diagnostics
-    return _root(builder.root, builder.diagnostics, source, "begin with the name of a node")
+    return _root(tree, builder.diagnostics, source, "begin with the name of a node")
 
 
 def _build(builder: TreeBuilder, source: SourceFile) -> list[Diagnostic] | None:

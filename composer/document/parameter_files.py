@@ -19,6 +19,7 @@ from composer.document.characters import check_value
 from composer.document.limits import MAX_NUMBER_LENGTH
 from composer.document.scalars import NumberRefused
 from composer.document.spans import scalar_span, span_at
+from composer.source import SourceFile
 from composer.tree import Mapping, Scalar, ScalarValue, Tree
 
 _TRUE = frozenset(["Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"])
@@ -96,6 +97,10 @@ class ParameterFileBuilder(TreeBuilder):
     ``!!str`` are ignored. Documents follow each other as if they were one.
     """
 
+    def __init__(self, source: SourceFile) -> None:
+        super().__init__(source)
+        self._documents: list[Tree] = []
+
     def _scalar(self, event: yaml.ScalarEvent) -> Scalar:
         span, verbatim, offset = scalar_span(self._source, event)
         text, diagnostics = check_value(event.value or "", span)
@@ -131,6 +136,13 @@ class ParameterFileBuilder(TreeBuilder):
         pass
 
     def _finish(self, tree: Tree) -> None:
-        if isinstance(self.root, Mapping) and isinstance(tree, Mapping):
-            tree = Mapping((*self.root.entries, *tree.entries), self.root.span)
+        self._documents.append(tree)
         self.root = tree
+
+    def merged(self) -> Tree | None:
+        """Return the entries of all documents, or the first document that is not a map."""
+        other = next((tree for tree in self._documents if not isinstance(tree, Mapping)), None)
+        if other is not None or not self._documents:
+            return other
+        maps = [tree for tree in self._documents if isinstance(tree, Mapping)]
+        return Mapping(tuple(entry for tree in maps for entry in tree), maps[0].span)

@@ -131,3 +131,20 @@ def test_loading_pauses_the_cycle_collection_only_while_it_runs(tmp_path: Path) 
     finally:
         gc.callbacks.pop()
     assert collections == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["/**/n#", "/**", "/**/m#/*"])
+def test_many_names_in_parameter_files(tmp_path: Path, name: str) -> None:
+    def validate(count: int) -> None:
+        nodes = "".join(f"  n{number}: {{parameters: {{a: 1.0}}}}\n" for number in range(count))
+        sections = (
+            f"{name.replace('#', str(number))}: {{ros__parameters: {{a: 2.0}}}}\n---\n"
+            for number in range(count)
+        )
+        (tmp_path / "parameters.yaml").write_text(f"{''.join(sections)}/n0: {{}}\n")
+        text = f"system: large\nparameter_files: parameters.yaml\nnodes:\n{nodes}"
+        loading = load_bytes(text.encode(), tmp_path, shown="large.yaml")
+        assert loading.system is not None
+
+    assert_linear(validate, 200, 1_600)

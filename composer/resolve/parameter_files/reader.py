@@ -14,7 +14,7 @@ from composer.resolve.parameter_files.rules import (
     PARAMETER_FILE,
     PARAMETER_SUBSTITUTION,
 )
-from composer.resolve.parameter_files.sections import ParameterFiles
+from composer.resolve.parameter_files.sections import ParameterFiles, Section
 from composer.source import Located, SourceFile, Span, shown_path
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, describe
 
@@ -95,7 +95,7 @@ class _Reader:
                 if self._check_value(item):
                     self._check_duplicate(absolute.value, item)
                     values[item.name] = item
-            self._files.add(absolute, values, self._listed_in)
+            self._files.add(Section(absolute, values, self._listed_in))
 
     def _check_value(self, entry: Entry) -> bool:
         """Report what is wrong with the value, and return whether a parameter can have it."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as Map
 from dataclasses import dataclass, field
 
 from composer.model import USE_SIM_TIME, Node, UnmatchedParameters
 from composer.names import join
+from composer.resolve.parameter_files.patterns import NamePatterns, canonical, is_pattern
 from composer.source import Located, SourceFile
 from composer.tree import Entry
 
@@ -19,49 +21,34 @@ _OF_EVERY_NODE = ("start_type_description_service", "qos_overrides.")
 class Section:
     """The values under one node name.
 
-    ``listed_in`` is the system whose ``parameter_files`` name the file, if any. ``number`` is the
-    position among all sections.
+    ``listed_in`` is the system whose ``parameter_files`` name the file, if any.
     """
 
     name: Located[str]  # absolute
     values: Map[str, Entry]
     listed_in: SourceFile | None
-    number: int
-
-    @property
-    def is_pattern(self) -> bool:
-        """Whether the name has wildcards."""
-        return "*" in self.name.value
-
-    def matches(self, full_name: str) -> bool:
-        """Return whether the values are for the node ``full_name``."""
-        return _is_match(_parts(self.name.value), _parts(full_name))
 
 
 @dataclass(slots=True)
 class ParameterFiles:
-    """The sections of all files. The last value for a parameter takes effect."""
+    """The sections of all files, in order. The last value for a parameter takes effect."""
 
-    _named: dict[str, list[Section]] = field(default_factory=dict)
-    _patterns: list[Section] = field(default_factory=list)
+    sections: list[Section] = field(default_factory=list)
+    _values: dict[str, dict[str, tuple[int, Entry]]] = field(default_factory=dict)
+    _patterns: NamePatterns = field(default_factory=NamePatterns)
     _count: int = 0
 
-    @property
-    def sections(self) -> list[Section]:
-        """All sections, in order."""
-        named = (section for sections in self._named.values() for section in sections)
-        return sorted([*self._patterns, *named], key=lambda item: item.number)
-
-    def add(
-        self, name: Located[str], values: Map[str, Entry], listed_in: SourceFile | None
-    ) -> None:
+    def add(self, section: Section) -> None:
         """Append a section."""
-        section = Section(name, values, listed_in, self._count)
-        self._count += 1
-        if section.is_pattern:
-            self._patterns.append(section)
-        else:
-            self._named.setdefault(name.value, []).append(section)
+        self.sections.append(section)
+        name = canonical(section.name.value)
+        if name not in self._values:
+            self._values[name] = {}
+            if is_pattern(name):
+                self._patterns.add(name)
+        for parameter, entry in section.values.items():
+            self._values[name][parameter] = (self._count, entry)
+            self._count += 1
 
     def given(self, full_name: str, declared: frozenset[str]) -> dict[str, Entry]:
         """Return the values for the node ``full_name``, by parameter.
@@ -69,69 +56,87 @@ class ParameterFiles:
         Sections with wildcards give values for declared parameters and ``use_sim_time`` only, since
         others are for other nodes. Parameters of every ROS node are ignored unless declared.
         """
-        matching = (section for section in self._patterns if section.matches(full_name))
-        found = [*self._named.get(full_name, ()), *matching]
-        given: dict[str, Entry] = {}
-        for section in sorted(found, key=lambda item: item.number):
-            given.update(
-                (name, entry)
-                for name, entry in section.values.items()
-                if name in declared
-                or name == USE_SIM_TIME
-                or not (section.is_pattern or _is_of_every_node(name))
-            )
-        return given
+        found = {
+            parameter: value
+            for parameter, value in self._values.get(full_name, {}).items()
+            if parameter in declared or not _is_of_every_node(parameter)
+        }
+        for pattern in self._patterns.matching(full_name):
+            values = self._values[pattern]
+            for parameter in (*declared, USE_SIM_TIME):
+                if parameter in values:
+                    value = values[parameter]
+                    known = found.setdefault(parameter, value)
+                    found[parameter] = max(value, known, key=lambda item: item[0])
+        in_order = sorted(found.items(), key=lambda item: item[1][0])
+        return {parameter: entry for parameter, (_, entry) in in_order}
 
     def unmatched(self, nodes: Iterable[Node]) -> tuple[UnmatchedParameters, ...]:
         """Return the sections, and parameters of patterns, that are for none of the nodes."""
-        by_name = {node.full_name: node for node in nodes}
-        return tuple(found for section in self.sections for found in _unmatched(section, by_name))
+        search = _Search(self, {node.full_name: node for node in nodes})
+        return tuple(found for section in self.sections for found in search.unmatched(section))
+
+    def names_for(self, full_name: str) -> list[str]:
+        """Return the canonical names of the sections that are for the node ``full_name``."""
+        named = [full_name] if full_name in self._values else []
+        return named + self._patterns.matching(full_name)
 
 
-def _unmatched(section: Section, nodes: Map[str, Node]) -> Iterator[UnmatchedParameters]:
-    if section.is_pattern:
-        matching = [node for name, node in nodes.items() if section.matches(name)]
-    else:
-        matching = [nodes[section.name.value]] if section.name.value in nodes else []
-    renamed = next(_renamed(section, nodes.values()), None)
-    if renamed is not None or not matching:
-        yield UnmatchedParameters(section.name, None, tuple(nodes), renamed)
-    if matching and section.is_pattern and all(node.complete for node in matching):
-        declared = dict.fromkeys(
-            parameter.name.value for node in matching for parameter in node.parameters
-        )
-        for name, entry in section.values.items():
-            if name not in declared and name != USE_SIM_TIME and not _is_of_every_node(name):
-                place = Located(name, entry.key.span)
-                yield UnmatchedParameters(section.name, place, tuple(declared))
+class _Search:
+    """Finds the nodes that each section is for."""
+
+    def __init__(self, files: ParameterFiles, nodes: Map[str, Node]) -> None:
+        self._full_names = tuple(nodes)
+        self._matching: dict[str, list[Node]] = defaultdict(list)
+        self._declared: dict[str, dict[str, None] | None] = {}
+        #: Nodes that only miss the values of a section because an include gave them a prefix.
+        self._renamed: dict[tuple[str, SourceFile], str] = {}
+        for full_name, node in nodes.items():
+            names = files.names_for(full_name)
+            for name in names:
+                self._matching[name].append(node)
+            without_prefix = _name_without_prefix(node)
+            for name in files.names_for(without_prefix) if without_prefix is not None else ():
+                if name not in names:
+                    self._renamed.setdefault((name, node.name.span.file), full_name)
+
+    def unmatched(self, section: Section) -> Iterator[UnmatchedParameters]:
+        """Yield the names of a section that match nothing."""
+        name = canonical(section.name.value)
+        renamed = self._renamed.get((name, section.listed_in)) if section.listed_in else None
+        if renamed is not None or name not in self._matching:
+            yield UnmatchedParameters(section.name, None, self._full_names, renamed)
+        declared = self._declared_by(name) if is_pattern(name) else None
+        if declared is None:
+            return
+        known = tuple(declared)
+        for parameter, entry in section.values.items():
+            if parameter not in declared and not _is_of_every_node(parameter):
+                place = Located(parameter, entry.key.span)
+                yield UnmatchedParameters(section.name, place, known)
+
+    def _declared_by(self, pattern: str) -> dict[str, None] | None:
+        """Return the parameters of all matching nodes, or None if they are not all known."""
+        if pattern not in self._declared:
+            nodes = self._matching.get(pattern, [])
+            names = [parameter.name.value for node in nodes for parameter in node.parameters]
+            are_known = bool(nodes) and all(node.complete for node in nodes)
+            known = dict.fromkeys([*names, USE_SIM_TIME]) if are_known else None
+            self._declared[pattern] = known
+        return self._declared[pattern]
 
 
-def _renamed(section: Section, nodes: Iterable[Node]) -> Iterator[str]:
-    """Yield the nodes that only miss the values because an include gave them a prefix."""
-    for node in nodes:
-        place = node.name.span
-        if place.file != section.listed_in or section.matches(node.full_name):
-            continue
-        text = place.file.line(place.line)[place.column - 1 :][: place.length].strip("'\"")
-        own_name = text if node.name.value.endswith(text) else ""
-        if own_name and section.matches(join(node.namespace.value, own_name)):
-            yield node.full_name
+def _name_without_prefix(node: Node) -> str | None:
+    """Return the full name without the prefixes of includes, or None if there are none.
+
+    The text of the key in its file has no prefix.
+    """
+    span = node.name.span
+    text = span.file.line(span.line)[span.column - 1 :][: span.length].strip("'\"")
+    if not text or text == node.name.value or not node.name.value.endswith(text):
+        return None
+    return join(node.namespace.value, text)
 
 
 def _is_of_every_node(parameter: str) -> bool:
     return parameter.startswith(_OF_EVERY_NODE)
-
-
-def _parts(name: str) -> tuple[str, ...]:
-    return tuple(name.strip("/").split("/"))
-
-
-def _is_match(pattern: Sequence[str], parts: Sequence[str]) -> bool:
-    """Return whether a name matches a pattern, both as parts. No exponential backtracking."""
-    ends = {0}  # the possible numbers of parts matched so far
-    for piece in pattern:
-        if piece == "**":
-            ends = set(range(min(ends), len(parts) + 1)) if ends else set()
-        else:
-            ends = {end + 1 for end in ends if end < len(parts) and piece in ("*", parts[end])}
-    return len(parts) in ends
