@@ -25,7 +25,7 @@ from composer.behavior_types.values import (
     Value,
 )
 from composer.diagnostics import suggestion
-from composer.interfaces import Action, Interfaces, Message, Service
+from composer.interfaces import Action, Field, Interfaces, Message, Service
 from composer.model import Node
 from composer.source import Span
 
@@ -151,7 +151,7 @@ class _FunctionChecker:
                 continue
             field = message.field(keyword.arg)
             if field is not None:
-                yield from self._value(keyword.value, field.type)
+                yield from self._field(keyword.value, field)
             elif keyword.arg != "check_fields":
                 problem = f"{message.name} has no field '{keyword.arg}'"
                 hint = suggestion(keyword.arg, message.field_names)
@@ -185,7 +185,15 @@ class _FunctionChecker:
         message = owner if isinstance(owner, Message) else None
         field = message.field(target.attr) if message is not None else None
         if field is not None:
-            yield from self._value(value, field.type)
+            yield from self._field(value, field)
+
+    def _field(self, node: ast.expr, field: Field) -> Iterator[CodeProblem]:
+        text = node.value if isinstance(node, ast.Constant) else None
+        if field.name.endswith("frame_id") and isinstance(text, str) and text.startswith("/"):
+            problem = f"frame ID '{text}' begins with a slash"
+            yield CodeProblem(Kind.FRAME, problem, self._span(node), "remove the slash")
+        else:
+            yield from self._value(node, field.type)
 
     def _value(self, node: ast.expr, expected: Value) -> Iterator[CodeProblem]:
         found = self.scope.type_of(node)

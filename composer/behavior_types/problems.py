@@ -19,6 +19,7 @@ class Kind(Enum):
     NOT_INSTALLED = "an import of a module that is not installed here"
     INTERNAL = "an import of an internal module of the composer"
     NAME = "a name that is not defined"
+    FRAME = "a frame ID that begins with a slash"
     ANNOTATION = "a handler that annotates its argument with another type"
 
 

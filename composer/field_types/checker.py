@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from composer.diagnostics import suggestion
+from composer.diagnostics import nearest, suggestion
 from composer.expressions import Expression
 from composer.field_types.constants import constant_problem
-from composer.field_types.inference import infer
+from composer.field_types.inference import infer, literal_integer
 from composer.field_types.types import (
     ANYTHING,
     Problem,
@@ -117,7 +117,9 @@ class FieldChecker:
                 yield Problem(problem, name.span, hint, missing=True)
                 yield from self.text(content)
             else:
-                yield from self._field(content, field.type)
+                for found in self._field(content, field.type):
+                    hint = found.hint or _named_value(content, message, name.value)
+                    yield replace(found, hint=hint)
 
     def _field(self, template: Template, type_: FieldType) -> Iterator[Problem]:
         match template:
@@ -128,7 +130,11 @@ class FieldChecker:
                 if problem is not None:
                     yield Problem(problem[0], span, problem[1])
             case Computed(expression=expression, span=span):
-                yield from self._computed(expression, span, type_)
+                number = literal_integer(expression) if is_integer(type_) else None
+                if number is not None:
+                    yield from self._field(Constant(number, span), type_)
+                else:
+                    yield from self._computed(expression, span, type_)
             case Text(span=span):
                 yield from self.text(template)
                 if not is_string(type_):
@@ -186,6 +192,21 @@ class FieldChecker:
         if found_message is None or target_message is None:  # an untyped map, or an unknown message
             return not isinstance(found, FieldType) or _same_name(found, target)
         return found_message.name == target_message.name
+
+
+def _named_value(template: Template, message: Message, field: str) -> str | None:
+    """Return a hint for a text that names a constant of the message, with or without a prefix."""
+    if not isinstance(template, Constant) or not isinstance(template.value, str):
+        return None
+    every = {item.name: item.value for item in message.constants}
+    prefix = f"{field.upper()}_"
+    known = {name: value for name, value in every.items() if name.startswith(prefix)} or every
+    text = template.value.upper()
+    ending = [name for name in known if name == text or name.endswith(f"_{text}")]
+    short = {name.removeprefix(prefix): name for name in known}
+    close = nearest(text, short)
+    name = ending[0] if ending else short[close] if close is not None else None
+    return f"write {known[name]}, the value of {name}" if name is not None else None
 
 
 def _can_format(type_: ValueType, format_spec: str) -> bool:

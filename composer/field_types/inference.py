@@ -65,6 +65,15 @@ def infer(
     return _infer(expression.tree, inference), inference.problems
 
 
+def literal_integer(expression: Expression) -> int | None:
+    """Return the integer that an expression consists of, possibly with a sign; None for others."""
+    node, sign = expression.tree, 1
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        node, sign = node.operand, -1
+    value = node.value if isinstance(node, ast.Constant) else None
+    return sign * value if isinstance(value, int) and not isinstance(value, bool) else None
+
+
 def _infer(node: ast.expr, inference: Inference) -> ValueType:
     return _RULES[type(node)](node, inference)
 

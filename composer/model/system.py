@@ -245,6 +245,7 @@ class Executor:
     kind: ExecutorKind
     span: Span = field(compare=False)
     threads: int = 2
+    threads_span: Span | None = field(default=None, compare=False)  # None: not set
     cpus: tuple[int, ...] = ()
     priority: int | None = None
 

@@ -184,6 +184,7 @@ def _executor(entry: Entry) -> Executor:
         kind=kind.value if kind is not None else ExecutorKind.EVENTS,
         span=entry.key.span,
         threads=threads.value if threads is not None else DEFAULT_THREADS,
+        threads_span=threads.span if threads is not None else None,
         cpus=tuple(number.value for number in numbers if number is not None),
         priority=None if priority is None else priority.value,
     )

@@ -1,0 +1,72 @@
+"""A node that receives its own messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.formatting import port_name
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import Channel, ChannelKind, Event, PortOfNode
+
+RULE = register(
+    Rule(
+        code="RC327",
+        name="own-publisher",
+        severity=Severity.WARNING,
+        summary="A node subscribes to a topic that it publishes itself.",
+        why=(
+            "The node receives each of its own messages, which is rarely meant: usually, one of "
+            "the two topics is wrong. Nodes that exchange messages on one topic are not "
+            "reported."
+        ),
+        bad="""\
+system: loops
+nodes:
+  robot:
+    publishers: {report: {type: std_msgs/msg/String, qos: command, topic: reports}}
+    subscriptions: {order: {type: std_msgs/msg/String, qos: command, topic: reports, log: ordered}}
+    timers: {tick: {period_ms: 1000, publish: {report: {data: idle}}}}
+""",
+        good="""\
+system: loops
+nodes:
+  robot:
+    publishers: {report: {type: std_msgs/msg/String, qos: command, topic: reports}}
+    subscriptions: {order: {type: std_msgs/msg/String, qos: command, topic: orders, log: ordered}}
+    timers: {tick: {period_ms: 1000, publish: {report: {data: idle}}}}
+  console:
+    publishers: {order: {type: std_msgs/msg/String, qos: command, topic: orders}}
+    subscriptions: {report: {type: std_msgs/msg/String, qos: command, topic: reports, log: idle}}
+    timers: {tick: {period_ms: 1000, publish: {order: {data: go}}}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look for topics that exactly one node both publishes and subscribes to."""
+    for channel in context.channels:
+        if channel.kind is not ChannelKind.TOPIC:
+            continue
+        publishers = {end.node.full_name: end for end in channel.sources}
+        both = [end for end in channel.sinks if end.node.full_name in publishers]
+        names = {end.node.full_name for end in both}
+        if len(names) == 1 and not any(_republishes(channel, end) for end in both):
+            sink, source = both[0], publishers[both[0].node.full_name]
+            yield Diagnostic(
+                RULE,
+                f"node '{sink.node.name}' receives its own messages on '{channel.name}'",
+                sink.port.name.span,
+                (Label(source.port.name.span, f"'{port_name(source)}' publishes them"),),
+                "give one of the two ports another topic",
+            )
+
+
+def _republishes(channel: Channel, end: PortOfNode) -> bool:
+    """Return whether the subscription publishes to its own topic; another rule reports that."""
+    reaction = end.port.reaction(Event.MESSAGE)
+    sent = {send.port.value for send in reaction.publish} if reaction is not None else set()
+    return any(
+        source.node is end.node and source.port.name.value in sent for source in channel.sources
+    )

@@ -1,0 +1,8 @@
+from std_msgs.msg import Header
+
+
+class Camera:
+    def on_tick(self):
+        header = Header(frame_id="/camera")
+        header.frame_id = "/map"
+        self.publishers.header.publish(header)
