@@ -1,6 +1,7 @@
 """Fuzz ``compose validate``: ``make fuzz``.
 
-Hypothesis generates files with errors, as in the property tests. If atheris is installed, it also
+Hypothesis generates inputs with errors, as in the property tests: systems, node types, settings,
+interface definitions and parameter files, and systems to draw. If atheris is installed, it also
 generates files and expressions guided by coverage. Inputs that cause a failure are stored in
 ``build/fuzz``: turn them into tests before fixing the code. ``--seed`` makes the inputs
 reproducible, for CI.
@@ -11,6 +12,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import importlib.util
+import itertools
 import os
 import re
 import subprocess
@@ -22,7 +24,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 OUTPUT = ROOT / "build" / "fuzz"
 TARGETS = ("file", "expression")
-EXAMPLES_PER_ROUND = 2000
+EXAMPLES_PER_ROUND = 500
 
 
 def main() -> None:
@@ -53,20 +55,27 @@ def _mutations(seconds: float, first: int) -> None:
     """Run the property tests of validation with new examples until the time is over."""
     from hypothesis import given, seed, settings  # noqa: PLC0415
 
-    from tests.properties.test_validate_total import MUTATED, SPLICED  # noqa: PLC0415
-    from tests.properties.validating import validate_and_check  # noqa: PLC0415
+    from tests.properties.surfaces import SURFACES, Surface  # noqa: PLC0415
 
-    def hold(data: bytes) -> None:
-        validate_and_check(data)
+    def check_surface(surface: Surface, first: int) -> None:
+        """Check new inputs of one kind."""
+
+        @many
+        @seed(first)
+        @given(surface.inputs)
+        def hold(data: bytes) -> None:
+            surface.check(data)
+
+        hold()
 
     many = settings(max_examples=EXAMPLES_PER_ROUND, deadline=None, database=None)
     end_s = time.monotonic() + seconds
-    examples = 0
-    while time.monotonic() < end_s:
-        for inputs in (MUTATED, SPLICED):
-            many(seed(first + examples)(given(inputs)(hold)))()
-            examples += EXAMPLES_PER_ROUND
-            print(f"{examples} files with errors", file=sys.stderr, flush=True)
+    for number, name in enumerate(itertools.cycle(SURFACES)):
+        check_surface(SURFACES[name], first + number)
+        done = (number + 1) * EXAMPLES_PER_ROUND
+        print(f"{done} inputs with errors, last: {name}", file=sys.stderr, flush=True)
+        if time.monotonic() > end_s:
+            return
 
 
 def _start_guided(target: str, seconds: float, seed: int) -> None:

@@ -71,7 +71,7 @@ def _rename(draw: st.DrawFn, container: Any, places: list[Any]) -> None:
     if not isinstance(key, str) or not isinstance(container, dict):
         return
     others = [name for place in places if isinstance(place, dict) for name in place]
-    misspelled = [key[1:], key + "s", key.upper(), key.replace("_", "-"), key[::-1]]
+    misspelled = [key[1:], key + "s", key.upper(), key.replace("_", "-"), key[::-1], ""]
     container[draw(st.sampled_from([*others, *misspelled]))] = container.pop(key)
 
 
@@ -101,3 +101,41 @@ _CHANGES = {
     "replace": _replace,
     "spoil": _spoil,
 }
+
+
+#: Text that means something to one of the parsers.
+_PIECES = (
+    *"\"'\\[]{}(),.:;#=-+*&!|>%@`~/ \t\n\r\x00\x1b\u202e\ufeff",
+    *("'" * 3, '"' * 3, "${", "$${", "---", "1e999", ".nan", "0x", "<=", "null"),
+    *("9" * 200, "9" * 5000, ".a" * 700, "[" * 700),
+)
+
+
+@st.composite
+def spliced(draw: st.DrawFn, texts: list[str]) -> str:
+    """Draw one of ``texts`` with lines removed, duplicated, moved and indented, or characters."""
+    lines = draw(st.sampled_from(texts)).splitlines(keepends=True)
+    for _ in range(draw(st.integers(1, 4))):
+        start = draw(st.integers(0, len(lines)))
+        end = draw(st.integers(start, min(start + 4, len(lines))))
+        piece = lines[start:end]
+        match draw(st.sampled_from(["remove", "duplicate", "move", "indent", "insert", "write"])):
+            case "remove":
+                lines[start:end] = []
+            case "duplicate":
+                lines[start:start] = piece
+            case "move":
+                lines[start:end] = []
+                place = draw(st.integers(0, len(lines)))
+                lines[place:place] = piece
+            case "indent":
+                lines[start:end] = [f"  {line}" for line in piece]
+            case "insert":
+                other = draw(st.sampled_from(texts)).splitlines(keepends=True)
+                lines[start:start] = draw(st.lists(st.sampled_from(other), max_size=3))
+            case "write" if piece:
+                place = draw(st.integers(0, len(piece[0])))
+                written = "".join(draw(st.lists(st.sampled_from(_PIECES), max_size=4)))
+                rest = piece[0][place + draw(st.integers(0, 4)) :]
+                lines[start] = f"{piece[0][:place]}{written}{rest}"
+    return "".join(lines)

@@ -2,74 +2,45 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 from hypothesis import example, given
-from hypothesis import strategies as st
 
 from composer.assembly.canonical import canonical
 from composer.document.writer import write_document
 from composer.loading import collect_diagnostics, load
 from tests.examples import examples
-from tests.properties.mutation import mutated
-from tests.properties.validating import (
-    INTERFACES,
-    SHIPPED,
-    check_diagnostics,
-    contents,
-    validate_and_check,
-)
+from tests.properties.surfaces import SURFACES, TEXTS
+from tests.properties.validating import INTERFACES, check_diagnostics, validate_and_check
 
-CONTENTS = contents()
-TEXTS = [path.read_text(encoding="utf-8") for path in SHIPPED]
-
-
-@st.composite
-def spliced(draw: st.DrawFn) -> str:
-    """Draw a shipped file with lines removed, duplicated, moved and indented."""
-    lines = draw(st.sampled_from(TEXTS)).splitlines(keepends=True)
-    for _ in range(draw(st.integers(1, 4))):
-        start = draw(st.integers(0, len(lines)))
-        end = draw(st.integers(start, min(start + 4, len(lines))))
-        piece = lines[start:end]
-        match draw(st.sampled_from(["remove", "duplicate", "move", "indent", "insert"])):
-            case "remove":
-                lines[start:end] = []
-            case "duplicate":
-                lines[start:start] = piece
-            case "move":
-                lines[start:end] = []
-                place = draw(st.integers(0, len(lines)))
-                lines[place:place] = piece
-            case "indent":
-                lines[start:end] = [f"  {line}" for line in piece]
-            case "insert":
-                other = draw(st.sampled_from(TEXTS)).splitlines(keepends=True)
-                lines[start:start] = draw(st.lists(st.sampled_from(other), max_size=3))
-    return "".join(lines)
-
-
-#: Shipped files with mutated values, and with mutated text.
-MUTATED = (
-    st.sampled_from(CONTENTS).flatmap(mutated).map(lambda content: json.dumps(content).encode())
-)
-SPLICED = spliced().map(str.encode)
+FILES = SURFACES["values"].inputs | SURFACES["lines"].inputs
 
 
 @examples(150)
-@given(MUTATED)
+@given(SURFACES["values"].inputs)
 def test_mutated_files(data: bytes) -> None:
     validate_and_check(data)
 
 
 @examples(100)
-@given(SPLICED)
+@given(SURFACES["lines"].inputs)
 @example(b"")
 @example(b"system: a\nnodes: {b: {type: [x]}}\n")
 def test_spliced_files(data: bytes) -> None:
     validate_and_check(data)
+
+
+@pytest.mark.parametrize("name", ["settings", "toml", "definitions", "parameter files", "graphs"])
+def test_other_inputs(name: str) -> None:
+    surface = SURFACES[name]
+
+    @examples(30)
+    @given(surface.inputs)
+    def holds(data: bytes) -> None:
+        surface.check(data)
+
+    holds()
 
 
 #: Includes part.yaml twice.
@@ -99,7 +70,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @examples(60)
-@given(part=MUTATED | SPLICED, base=MUTATED | SPLICED)
+@given(part=FILES, base=FILES)
 def test_errors_in_included_and_extended_files(project: Path, part: bytes, base: bytes) -> None:
     (project / "part.yaml").write_bytes(part)
     (project / "nodes" / "base.yaml").write_bytes(base)
