@@ -41,6 +41,7 @@ _PARTICIPANTS_TOPIC = "ros_discovery_info"
 _PARTICIPANT_BYTES = 12
 _KNOWN_NAMES = 50_000  # of the largest systems, several times
 _MAX_LISTED = 3
+_MAX_SKIPPED = 1000
 _INVALID = "not a valid name in ROS"
 #: Queries that raise one of these concern a node that has left, or that announces odd names.
 _REFUSED = (RuntimeError, ValueError, NameValidationException)
@@ -54,7 +55,9 @@ class Skipped:
 
     def add(self, reason: str, what: str) -> None:
         """Add ``what``, which was skipped because of ``reason``."""
-        self._found.setdefault(reason, {})[what] = None
+        found = self._found.setdefault(reason, {})
+        if len(found) < _MAX_SKIPPED:
+            found[what] = None
 
     def __bool__(self) -> bool:
         return bool(self._found)
