@@ -13,6 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from composer.characters import escape_line
 from composer.cli.support.errors import FAILED, CommandError
 from composer.cli.support.streams import TolerantStream, drop
 
@@ -98,7 +99,8 @@ def _internal_error(error: Exception) -> int:
         import traceback
 
         traceback.print_exception(error)
-    print(f"compose: internal error: {type(error).__name__}: {error}", file=sys.stderr)
+    text = escape_line(f"{type(error).__name__}: {error}")
+    print(f"compose: internal error: {text}", file=sys.stderr)
     print(
         "  This is a bug in compose. Please report it with the output of the same command with\n"
         "  --debug (compose --debug ...) and of 'compose --version'.",

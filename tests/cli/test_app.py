@@ -198,14 +198,14 @@ def test_an_internal_error_prints_a_traceback_only_on_request(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     def fail(*_: object, **__: object) -> None:
-        raise RuntimeError("out of paper")
+        raise RuntimeError("out of\x1b[2J\npaper")
 
     monkeypatch.delenv("COMPOSE_DEBUG", raising=False)
     monkeypatch.setattr("composer.loading.load_files", fail)
     (tmp_path / "any.yaml").write_text("system: any\n")
     done = compose("validate", str(tmp_path / "any.yaml"))
     assert done.code == cli.INTERNAL
-    assert done.err.startswith("compose: internal error: RuntimeError: out of paper\n")
+    assert done.err.startswith("compose: internal error: RuntimeError: out of\\x1b[2J\\npaper\n")
     assert "Traceback" not in done.err
     monkeypatch.setenv("COMPOSE_DEBUG", "1")
     assert "Traceback" in compose("validate", str(tmp_path / "any.yaml")).err
