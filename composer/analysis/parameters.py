@@ -13,13 +13,17 @@ from composer.tree import Plain
 
 
 def known_values(context: Context) -> Iterator[tuple[Parameter, Located[Plain]]]:
-    """Yield every default and every set value of the parameters with a known type."""
+    """Yield every default and every set value of the parameters with a known type.
+
+    In parameter files, ``${`` is plain text.
+    """
+    files = context.system.parameter_files
     for node in context.system.nodes:
         for parameter in node.parameters:
             if parameter.type.value not in KNOWN_TYPES:
                 continue
             for value in _values(parameter):
-                if not _is_unresolved_value(value.value):
+                if value.span.file in files or not _is_unresolved_value(value.value):
                     yield parameter, value
 
 

@@ -292,6 +292,7 @@ class System:
     delivery: Delivery = Delivery.AUTO
     use_sim_time: bool = False  # for the manager node, and the default for nodes
     node_type: bool = False
+    parameter_files: frozenset[SourceFile] = frozenset()  # those with values
     unmatched_parameters: tuple[UnmatchedParameters, ...] = ()
     unknown: tuple[UnknownKey, ...] = ()  # unknown names from the command line
     _nodes: dict[str, Node] = field(init=False, repr=False, compare=False)

@@ -183,3 +183,12 @@ def test_parameters_that_the_prefix_of_an_include_misses_are_reported(
         f"(write '{name.replace('motor', 'left_motor')}')"
     ]
     assert unmatched("", tmp_path, text.replace("motor", "left_motor")) == []
+
+
+def test_a_variable_is_text_and_must_be_of_the_type(tmp_path: Path) -> None:
+    (tmp_path / "first.yaml").write_text(section("/**", 0).replace("0", "'${speed}'"))
+    (tmp_path / "second.yaml").touch()
+    (tmp_path / "system.yaml").write_text(SYSTEM, encoding="utf-8")
+    found = {item.rule.name: item.message for item in load(tmp_path / "system.yaml").diagnostics}
+    assert found["parameter-type"].endswith("must be of type double, not the string '${speed}'")
+    assert found["parameter-substitution"] == "'${speed}' is not replaced in parameter files"
