@@ -123,15 +123,15 @@ def call(
         found = type_name or GraphNames(session, deadline).only_type("service", name)
         call_request = ServiceRequest(name, found, request, rate)
         for response in call_service(session, deadline, call_request):
-            _print_response(to_plain(response), json=json, is_last=rate is None)
+            _print_response(to_plain(response), json=json, repeated=rate is not None)
 
 
-def _print_response(response: Any, *, json: bool, is_last: bool) -> None:
+def _print_response(response: Any, *, json: bool, repeated: bool) -> None:
     """Print one response; repeated ones are JSON lines or YAML documents."""
     if json:
-        write(as_json(response, indent=2 if is_last else None))
+        write(as_json(response, indent=None if repeated else 2))
     else:
-        write(as_yaml(response) if is_last else f"{as_yaml(response)}\n---")
+        write(f"{as_yaml(response)}\n---" if repeated else as_yaml(response))
 
 
 def split_values(values: list[str]) -> tuple[str | None, str | None]:
