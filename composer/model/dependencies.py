@@ -70,6 +70,15 @@ def dependency_edges(system: System) -> tuple[DependencyEdge, ...]:
     return declared + tuple(edge for edge in implied if group[edge.node] != group[edge.on])
 
 
+def needed_states(system: System) -> Mapping[str, Mapping[str, PrimaryState]]:
+    """Return, for each node, the states that its dependencies must have: the higher of two."""
+    needed: dict[str, dict[str, PrimaryState]] = {node.name.value: {} for node in system.nodes}
+    for edge in dependency_edges(system):
+        if needed[edge.node].get(edge.on) is not PrimaryState.ACTIVE:
+            needed[edge.node][edge.on] = edge.state
+    return needed
+
+
 def dependency_cycles(system: System) -> tuple[tuple[str, ...], ...]:
     """Return a shortest cycle of ``depends_on`` for each set of nodes that wait for each other.
 
@@ -188,18 +197,3 @@ def _path_back(came_from: Mapping[str, str], start: str, last: str) -> tuple[str
     while path[-1] != start:
         path.append(came_from[path[-1]])
     return tuple(reversed(path))
-
-
-def dependents(system: System, node: str) -> frozenset[str]:
-    """Return the keys of the nodes that depend on ``node``, directly or indirectly."""
-    needed_by: dict[str, list[str]] = {}
-    for edge in dependency_edges(system):
-        needed_by.setdefault(edge.on, []).append(edge.node)
-    found: set[str] = set()
-    pending = [node]
-    while pending:
-        for name in needed_by.get(pending.pop(), ()):
-            if name not in found:
-                found.add(name)
-                pending.append(name)
-    return frozenset(found - {node})

@@ -195,6 +195,28 @@ class LifecycleClient:
             state = reached
         return CompletedTransition(node, before, state)
 
+    def follow_to_state(self, node: str, goal: str) -> CompletedTransition:
+        """Take a node to a state to which its system may take it at the same time.
+
+        Raises the same as :meth:`go_to_state`.
+        """
+        before = self._settled_state(node)
+        try:
+            self.go_to_state(node, goal)
+        except TransitionError:
+            if self._settled_state(node) != goal:
+                raise
+        return CompletedTransition(node, before, goal)
+
+    def _settled_state(self, node: str) -> str:
+        """Return the state of a node once no transition runs, or at the end of the time limit."""
+
+        def primary() -> str | None:
+            state = self.state(node)
+            return state if state in PRIMARY_STATES else None
+
+        return self._session.wait_for(primary, self._deadline) or self.state(node)
+
     def _request(self, node: str, before: str, transition: Transition) -> tuple[bool, str]:
         """Request a transition; return whether it succeeded, and the state after it."""
         manager = self._manager(node)

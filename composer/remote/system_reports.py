@@ -24,7 +24,10 @@ class InvalidReportError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class NodeReport:
-    """A node as its manager reports it. ``since_s`` is in seconds since 1970."""
+    """A node as its manager reports it. ``since_s`` is in seconds since 1970.
+
+    ``depends_on`` are the states that the nodes it depends on must have, by their full names.
+    """
 
     node: str
     state: str
@@ -41,6 +44,7 @@ class NodeReport:
     overruns: int
     queue_drops: int
     qos_events: Mapping[str, int]
+    depends_on: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,13 +137,18 @@ def _node_report(status: DiagnosticStatus) -> NodeReport:
         overruns=int(values["overruns"]),
         queue_drops=int(values["queue_drops"]),
         qos_events=_counts(values["qos_events"]),
+        depends_on=_pairs(values["depends_on"]),
     )
 
 
 def _counts(text: str) -> dict[str, int]:
     """Parse counts by name, such as ``incompatible=1``. Raises ValueError."""
-    pairs = (item.partition("=") for item in text.split())
-    return {name: int(count) for name, _, count in pairs}
+    return {name: int(count) for name, count in _pairs(text).items()}
+
+
+def _pairs(text: str) -> dict[str, str]:
+    """Parse values by name, such as ``/planner=active``."""
+    return {name: value for name, _, value in (item.partition("=") for item in text.split())}
 
 
 def _visible(figures: F) -> F:

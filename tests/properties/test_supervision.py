@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from composer.model import Node, PrimaryState, System
+from composer.model import Node, PrimaryState
 from composer.model.dependencies import dependency_edges, in_dependency_order
-from composer.model.dependencies import dependents as dependents_of
 from composer.plan import Fault, FaultKind, bring_up, reconcile
 from composer.runtime.executors.futures import Future
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
@@ -42,7 +41,14 @@ nodes:
   planner: {lifecycle: {depends_on: [sensor], on_failure: isolate}}
   sensor: {}
 """
-NAMES = ("sensor", "planner", "motor", "logger")
+#: The nodes, and those that depend on them.
+DEPENDENTS = {
+    "sensor": ("planner", "motor", "logger"),
+    "planner": ("motor", "logger"),
+    "motor": (),
+    "logger": (),
+}
+NAMES = tuple(DEPENDENTS)
 GOALS = {
     "configure": "inactive",
     "activate": "active",
@@ -157,8 +163,7 @@ class SimulatedNode:
 class World:
     """A node set of simulated nodes, and what the test knows about them."""
 
-    def __init__(self, system: System) -> None:
-        self._system = system
+    def __init__(self) -> None:
         self.nodes: dict[str, SimulatedNode] = {}
         self.hung: frozenset[str] = frozenset()
         self._script: Iterator[Request | None] = iter(())
@@ -195,7 +200,7 @@ class World:
     def allow(self, *names: str) -> None:
         """Allow moves of nodes and of those that depend on them."""
         for name in names:
-            affected = {name, *dependents_of(self._system, name)}
+            affected = {name, *DEPENDENTS[name]}
             self.may_move |= affected
             for other in affected:
                 self.left_in.pop(other, None)
@@ -253,7 +258,7 @@ class Supervision(RuleBasedStateMachine):
     def __init__(self) -> None:
         super().__init__()
         self.system = SYSTEM
-        self.world = World(self.system)
+        self.world = World()
         self.queue = NotedQueue(self.world)
         reporter = Reporter(None)
         status = Status(self.system, in_dependency_order(SYSTEM, dependency_edges(SYSTEM)))
@@ -318,11 +323,11 @@ class Supervision(RuleBasedStateMachine):
         while self.queue.length:
             self.handle()
 
-    @precondition(lambda self: self.supervisor.desired.next_restart is not None)
+    @precondition(lambda self: self.supervisor.desired.scheduled)
     @rule(script=SCRIPTS)
     def restart_a_node(self, script: Script) -> None:
-        restart = self.supervisor.desired.next_restart
-        assert restart is not None
+        """The first one by name, because the times when they are due depend on the machine."""
+        _, restart = min(self.supervisor.desired.scheduled.items())
         self.world.allow(restart.node)
         self.world.play(script)
         self.supervisor.restart(restart)

@@ -18,6 +18,7 @@ from composer.cli.support.terminal import columns, lines, say, write
 
 if TYPE_CHECKING:
     from composer.remote.lifecycle import LifecycleClient
+    from composer.remote.lifecycle_batch import LifecycleBatch
 
 app = typer.Typer(
     help="""Show and change lifecycle states of running nodes.
@@ -124,6 +125,7 @@ class GoalState(StrEnum):
         "compose lifecycle set planner camera activate      several nodes",
         "compose lifecycle set '/perception/*' deactivate   all nodes that match",
         "compose lifecycle set planner --to active          as many transitions as needed",
+        "compose lifecycle set planner deactivate --dependents",
         "compose lifecycle set --system pipeline --to inactive",
     ),
 )
@@ -158,24 +160,39 @@ def set_state(
             autocompletion=complete_running_system,
         ),
     ] = None,
+    dependents: Annotated[
+        bool,
+        typer.Option(
+            "--dependents",
+            help="Also deactivate the active nodes that depend on nodes that go down, before them, "
+            "and activate the inactive ones that depend on nodes that come up, after them.",
+        ),
+    ] = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """Change the lifecycle state of nodes.
 
-    The nodes of a system are brought up in its bring-up order and taken down in reverse order. A
-    transition that is not available in the state of a node is not requested; the command continues
-    with the other nodes.
+    Only the given nodes are moved: nodes that depend on them stay active, and are named. The nodes
+    of a system are brought up in its bring-up order and taken down in reverse order. A transition
+    that is not available in the state of a node is not requested; the command continues with the
+    other nodes.
 
     Exit code 1 if a transition is not available or fails.
     """
     targets, transition = _split(list(words or ()), to, system)
     with ros_session("compose lifecycle set", timeout) as (session, deadline):
-        from composer.remote.lifecycle_batch import LifecycleRequest, change_each, nodes_of_system
+        from composer.remote.lifecycle_batch import (
+            LifecycleBatch,
+            LifecycleRequest,
+            nodes_of_system,
+        )
 
         request = LifecycleRequest(transition, None if to is None else to.value)
         nodes = None if system is None else nodes_of_system(session, deadline, system, request)
+        batch = LifecycleBatch(session, deadline, targets if nodes is None else nodes, request)
+        _check_dependents(batch, dependents=dependents)
         failed = False
-        for outcome in change_each(session, deadline, targets if nodes is None else nodes, request):
+        for outcome in batch.run(dependents=dependents):
             if outcome.error is None:
                 write(lines([str(outcome.result)]))
             else:
@@ -183,6 +200,19 @@ def set_state(
                 say(CommandError(str(outcome.error), hint=outcome.error.hint).text())
     if failed:
         raise typer.Exit(FAILED)
+
+
+def _check_dependents(batch: LifecycleBatch, *, dependents: bool) -> None:
+    """Name the dependents that stay active. Raises CommandError if unknown ones should move."""
+    if dependents and batch.silent_systems:
+        silent = ", ".join(batch.silent_systems)
+        raise CommandError(
+            f"cannot find the dependents: {silent} does not respond",
+            hint="without --dependents, only the given nodes are moved",
+        )
+    if batch.active_dependents and not dependents:
+        names = ", ".join(batch.active_dependents)
+        say(f"note: active nodes depend on this: {names}; --dependents deactivates them first")
 
 
 def _split(

@@ -37,6 +37,9 @@ def up(system: RunningSystem, timeout: Timeout = _TIMEOUT_S) -> None:
     Each node is brought up to its autostart state. If a node fails, the bring-up is rolled back and
     the cause is reported. Nodes that failed before are retried. Use 'compose run' to start the
     process of a system.
+
+    YAML and parameter files are not read again. To apply changes, restart the system: 'compose
+    down', then 'compose run'.
     """
     _command("up", "startup", system, timeout, failure="did not come up")
 
@@ -77,6 +80,9 @@ def reset(system: RunningSystem, timeout: Timeout = _TIMEOUT_S) -> None:
 
     All nodes return to the state unconfigured, and failures are cleared. Use 'compose up' to bring
     them up again.
+
+    Parameters keep their values, and YAML and parameter files are not read again. To apply
+    changes, restart the system: 'compose down', then 'compose run'.
     """
     _command("reset", "reset", system, timeout, failure="did not reset")
 

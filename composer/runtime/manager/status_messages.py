@@ -51,6 +51,7 @@ def _of_node(system: str, node: NodeStatus) -> DiagnosticStatus:
     values = {
         "state": node.state,
         "desired": node.desired,
+        "depends_on": " ".join(f"{on}={state}" for on, state in node.depends_on.items()),
         "left_to_manager": " ".join(node.left_to_manager),
         "since": f"{node.since_s:.3f}",
         "restarts": str(node.restarts),

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from composer.model import PrimaryState, System
+from composer.model.dependencies import needed_states
 from composer.plan import start_goals
 from composer.runtime.metrics.statistics import Statistics
 
@@ -23,7 +24,8 @@ class NodeStatus:
 
     ``desired`` is the state that the supervisor keeps it in; ``since_s`` is when it reached its
     state, in seconds since 1970. ``held_down`` is why a failed node is held down, else empty.
-    ``starts_active`` is whether a start of the system activates it. ``left_to_manager`` are the
+    ``starts_active`` is whether a start of the system activates it. ``depends_on`` are the states
+    that the nodes it depends on must have, by their full names. ``left_to_manager`` are the
     services that the manager node has instead (see :class:`composer.model.Introspection`).
 
     Rates are in hertz over the last second, and so is ``busy``, the share of a thread that its
@@ -35,6 +37,7 @@ class NodeStatus:
     node: str
     desired: str
     starts_active: bool = True
+    depends_on: Mapping[str, str] = field(default_factory=dict)
     left_to_manager: tuple[str, ...] = ()
     state: str = "unconfigured"
     since_s: float = 0.0
@@ -123,6 +126,7 @@ class Status:
         now_s = time.time()
         models = {node.name.value: node for node in system.nodes}
         goals = start_goals(system, PrimaryState.ACTIVE)
+        needed = needed_states(system)
         self._status = SystemStatus(
             system=system.name.value,
             activity="starting",
@@ -136,6 +140,9 @@ class Status:
                 models[name].full_name,
                 PrimaryState.UNCONFIGURED.value,
                 starts_active=goals[name] is PrimaryState.ACTIVE,
+                depends_on={
+                    models[on].full_name: state.value for on, state in needed[name].items()
+                },
                 left_to_manager=models[name].introspection.left_to_manager,
                 since_s=now_s,
             )

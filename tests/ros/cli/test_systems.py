@@ -254,6 +254,27 @@ def test_lifecycle_set_with_several_nodes_patterns_and_systems(robot: Robot) -> 
         assert compose("lifecycle", "set", *arguments).returncode in (1, 2)
 
 
+def test_lifecycle_set_names_the_dependents_and_moves_them_on_request(robot: Robot) -> None:
+    done = compose("lifecycle", "set", "planner", "deactivate")
+    assert (done.returncode, done.stdout) == (0, "/fleet/planner: active -> inactive\n")
+    assert done.stderr == (
+        "note: active nodes depend on this: /fleet/motor; --dependents deactivates them first\n"
+    )
+    assert robot.states()["/fleet/motor"] == "active"
+    done = compose("lifecycle", "set", "planner", "activate")
+    assert (done.returncode, done.stderr) == (0, "")
+    moved = output_of("lifecycle", "set", "planner", "--to", "unconfigured", "--dependents")
+    assert moved.splitlines() == [
+        "/fleet/motor: active -> inactive",
+        "/fleet/planner: active -> unconfigured",
+    ]
+    moved = output_of("lifecycle", "set", "planner", "--to", "active", "--dependents")
+    assert moved.splitlines() == [
+        "/fleet/planner: unconfigured -> active",
+        "/fleet/motor: inactive -> active",
+    ]
+
+
 def test_unresponsive_nodes_and_systems_are_reported_in_time(robot: Robot) -> None:
     output_of("lifecycle", "set", "planner", "deactivate")
     output_of("param", "set", "/fleet/planner", "fault", "hang")
