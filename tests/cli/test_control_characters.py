@@ -12,7 +12,7 @@ import yaml
 
 from composer.characters import is_safe
 from composer.cli.commands import diff, doctor, ps
-from composer.cli.commands import topic as topic_command
+from composer.cli.commands.topic.info import _as_text
 from composer.cli.commands.topic.message_format import MessageFormat
 from composer.cli.support.output import as_json, as_yaml, print_names
 from composer.cli.support.progress import Progress
@@ -98,7 +98,7 @@ def test_a_hostile_check_has_the_usual_lines() -> None:
 
 def test_a_hostile_topic_has_the_usual_lines() -> None:
     found: Any = SimpleNamespace(types=(HOSTILE,), publishers=(), subscriptions=())
-    assert len(topic_command._as_text(found, verbose=True).split("\n")) == 3
+    assert len(_as_text(found, verbose=True).split("\n")) == 3
 
 
 def test_a_hostile_system_has_one_title() -> None:
