@@ -40,8 +40,9 @@ _TRIGGER_TYPE = "std_srvs/srv/Trigger"
 _SERVICE = f"/{NAME}/{IS_ACTIVE}"
 #: Fast DDS discovers a participant at once or within 3 s; managers report every second.
 DISCOVERY_S = 3.5
-#: Managers send a new report when the subscription has received the latched one.
-_FRESH_WITHIN_S = 0.2
+#: Managers send a new report once the subscription has received the latched one, which may be old,
+#: and at the latest within a second.
+_FRESH_WITHIN_S = 1.5
 #: How long to wait for the last messages of a process that has ended.
 _LAST_MESSAGES_S = 0.1
 

@@ -63,7 +63,7 @@ _PERIOD_S = 1.0
 #: Changes within this time, as in a bring-up, become one message.
 _BATCH_S = 0.05
 #: A stopped process does not keep others from getting the status.
-_ACKNOWLEDGED_WITHIN_S = 0.5
+_ACKNOWLEDGED_WITHIN_S = 0.2
 _ACKNOWLEDGMENT_PERIOD_S = 0.02
 _AT_ONCE = Duration()
 _ENDS_WITHIN_S = 0.2
