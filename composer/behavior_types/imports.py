@@ -5,7 +5,8 @@ from __future__ import annotations
 import ast
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from composer.behavior_source import Module
@@ -61,11 +62,12 @@ def import_problems(
     yield from ((problem, None) for problem in _attributes(module))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Imports:
     module: Module
     folder: Path
     interfaces: Interfaces
+    _known: dict[str, frozenset[str] | None] = field(default_factory=dict)
 
     def imported_from(self, node: ast.ImportFrom) -> Iterator[tuple[CodeProblem, str | None]]:
         """Check a ``from`` import."""
@@ -80,7 +82,9 @@ class _Imports:
         for alias in node.names:
             if alias.name == "*" or self._is_interface(name, alias.name):
                 continue
-            names = self._names(name)
+            if name not in self._known:
+                self._known[name] = self._names(name)
+            names = self._known[name]
             if names is None or self._has(name, names, alias.name):
                 continue
             missing = _Missing(
@@ -110,8 +114,7 @@ class _Imports:
             return None
         if is_installed(top):
             return None
-        known = {*sys.stdlib_module_names, *self.interfaces.packages(), *self._siblings(), *_USUAL}
-        close = nearest(top, (other for other in known if other[0] != "_"))
+        close = nearest(top, self._modules)
         if close is None:
             hint = "install it, or correct the name"
             message = f"no module named '{top}' is installed"
@@ -141,6 +144,12 @@ class _Imports:
             if found is not None and _is_in_project(found, home):
                 return found
         return None
+
+    @cached_property
+    def _modules(self) -> tuple[str, ...]:
+        """The modules that a misspelled name may mean."""
+        known = {*sys.stdlib_module_names, *self.interfaces.packages(), *self._siblings(), *_USUAL}
+        return tuple(name for name in known if name[0] != "_")
 
     def _siblings(self) -> Iterator[str]:
         for folder in (self.module.path.parent, self.folder):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import lru_cache
 
 from composer.behavior_source import Module
 from composer.behavior_source.method_body import Function, dotted
 from composer.behavior_types.api import API_CLASSES
-from composer.interfaces import Interfaces
 
 _API_MODULE = "composer.behavior"
 _INTERFACE = re.compile(r"(?P<package>\w+)\.(?P<folder>msg|srv|action)\.(?P<name>[A-Za-z]\w*)")
@@ -44,18 +44,19 @@ def api_class(full: str) -> str | None:
 
 def function_named(name: str, module: Module) -> Function | None:
     """Return the function at the top level of a module, if nothing else has its name."""
-    found = [
-        item
-        for item in module.tree.body
-        if isinstance(item, ast.FunctionDef | ast.AsyncFunctionDef) and item.name == name
-    ]
-    is_plain = len(found) == 1 and name not in module.assigned and name not in module.imports
-    return found[0] if is_plain else None
+    found = _functions(module).get(name)
+    is_plain = name not in module.assigned and name not in module.imports
+    return found if is_plain else None
 
 
-def is_interface(full: str, interfaces: Interfaces) -> bool:
-    """Return whether a full name begins with an interface that exists."""
-    return interfaces.find(interface_name(full)[0]) is not None
+@lru_cache(maxsize=128)
+def _functions(module: Module) -> dict[str, Function | None]:
+    """Return the functions at the top level of a module; None for one defined several times."""
+    found: dict[str, Function | None] = {}
+    for item in module.tree.body:
+        if isinstance(item, Function):
+            found[item.name] = None if item.name in found else item
+    return found
 
 
 def own_name(node: ast.expr, module: Module) -> str:
