@@ -49,7 +49,8 @@ def import_problems(
     module: Module, folder: Path, interfaces: Interfaces
 ) -> Iterator[tuple[CodeProblem, str | None]]:
     """Yield the problems of the imports in a file, each with the name that is probably meant."""
-    checker = _Imports(module, folder, interfaces)
+    projects = {home: Project.at(home) for home in (module.path.parent, folder)}
+    checker = _Imports(module, folder, interfaces, projects)
     for node in _unguarded(module.tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -67,6 +68,9 @@ class _Imports:
     module: Module
     folder: Path
     interfaces: Interfaces
+    #: The projects of the folder of the file and of ``folder``.
+    projects: dict[Path, Project]
+    _files: dict[str, Path | None] = field(default_factory=dict)
     _known: dict[str, frozenset[str] | None] = field(default_factory=dict)
 
     def imported_from(self, node: ast.ImportFrom) -> Iterator[tuple[CodeProblem, str | None]]:
@@ -131,17 +135,21 @@ class _Imports:
 
     @property
     def _place(self) -> tuple[Path, Project]:
-        return self.folder, Project.at(self.folder)
+        return self.folder, self.projects[self.folder]
 
     def _local(self, name: str) -> Path | None:
         """Return the file of a module next to the importing one, or in the project."""
-        homes = (self.module.path.parent, self.folder)
-        for home in dict.fromkeys(homes):
+        if name not in self._files:
+            self._files[name] = self._find_local(name)
+        return self._files[name]
+
+    def _find_local(self, name: str) -> Path | None:
+        for home, project in self.projects.items():
             try:
-                found = module_file(name, home, Project.at(home))
+                found = module_file(name, home, project)
             except Unreadable:
                 return self.module.path
-            if found is not None and _is_in_project(found, home):
+            if found is not None and _is_in_project(found, home, project):
                 return found
         return None
 
@@ -207,11 +215,11 @@ def _of_composer(name: str) -> _Missing | None:
     )
 
 
-def _is_in_project(path: Path, home: Path) -> bool:
+def _is_in_project(path: Path, home: Path, project: Project) -> bool:
     if {"site-packages", "dist-packages"}.intersection(path.parts):
         return False
     return path.is_relative_to(home) or any(
-        path.is_relative_to(folder) for folder in Project.at(home).node_folders
+        path.is_relative_to(folder) for folder in project.node_folders
     )
 
 
