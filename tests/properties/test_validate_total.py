@@ -89,4 +89,6 @@ def test_errors_in_included_and_extended_files(project: Path, part: bytes, base:
 
 def test_shipped_files_are_clean() -> None:
     for text in TEXTS:
-        assert validate_and_check(text.encode("utf-8")) == []
+        found = validate_and_check(text.encode("utf-8"))
+        # All are validated under one name of a file.
+        assert [item for item in found if item.rule.name != "node-type-name"] == []

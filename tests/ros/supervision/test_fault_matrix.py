@@ -288,4 +288,4 @@ def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
         assert system.stop()[0] == 0, "all failed nodes have recovered"
     for place in PLACES:
         line = system.lines.index(system.wait_for(rf"\[raise\] on_{place}: {RAISED}"))
-        assert system.lines[line + 1] == "Traceback (most recent call last):", place
+        assert system.lines[line + 1].lstrip() == "Traceback (most recent call last):", place
