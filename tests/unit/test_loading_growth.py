@@ -130,7 +130,7 @@ def test_loading_pauses_the_cycle_collection_only_while_it_runs(tmp_path: Path) 
         assert gc.isenabled() == before
     finally:
         gc.callbacks.pop()
-    # One may start when they are enabled again; without the pause there are dozens.
+    # One may start when they are enabled again; without the pause there are several.
     assert collections in ([], ["start", "stop"])
 
 
