@@ -31,7 +31,7 @@ The rules of `compose validate`. A system with errors does not run; one with war
 This page is generated from the rules (`make generate`), and every example is tested.
 
 To ignore a warning or an info, add a comment on the same line, or on a line of its own before it:
-`# compose: ignore[unheard-publisher]`. Errors cannot be ignored.
+`# compose: ignore[publisher-without-subscription]`. Errors cannot be ignored.
 """
 
 

@@ -39,14 +39,14 @@ RULE = register(
 system: silence
 nodes:
   talker:
-    # compose: ignore[unheard-publisher]
+    # compose: ignore[publisher-without-subscription]
     publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
 """,
         good="""\
 system: silence
 nodes:
   talker:
-    # compose: ignore[unheard-publisher] read with ros2 topic echo
+    # compose: ignore[publisher-without-subscription] read with ros2 topic echo
     publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
 """,
     )

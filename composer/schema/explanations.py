@@ -224,7 +224,7 @@ def _out_of_range(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnosti
     yield Diagnostic(rules.OUT_OF_RANGE, message, error.place.value_span)
 
 
-def _nothing_there(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+def _empty_collection(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     name = error.path[-1] if error.path else "this"
     least, found = error.required, len(error.instance)
     message, hint = f"'{shown(name)}' is empty", "add at least one"
@@ -232,7 +232,7 @@ def _nothing_there(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnost
         entries = "is empty" if not found else f"has only {found}"
         message = f"'{shown(name)}' needs at least {least} entries, and {entries}"
         hint = f"add {least - found} or more"
-    yield Diagnostic(rules.NOTHING_THERE, message, error.owner_span, hint=hint)
+    yield Diagnostic(rules.EMPTY_COLLECTION, message, error.owner_span, hint=hint)
 
 
 def _any_of(names: Iterable[str]) -> str:
@@ -250,8 +250,8 @@ _EXPLAINERS: dict[str, Callable[[_SchemaError, _MisspelledKeys], Iterator[Diagno
     "enum": _unknown_word,
     "oneOf": _no_word_or_variable,
     **dict.fromkeys(_LIMITS, _out_of_range),
-    "minItems": _nothing_there,
-    "minProperties": _nothing_there,
+    "minItems": _empty_collection,
+    "minProperties": _empty_collection,
 }
 
 #: The keywords with an explanation. A test checks that these are all keywords of the schemas.

@@ -120,10 +120,10 @@ nodes:
 """,
     )
 )
-NOTHING_THERE = register(
+EMPTY_COLLECTION = register(
     _error(
         code="RC107",
-        name="nothing-there",
+        name="empty-collection",
         summary="A map or list is empty, or has fewer entries than required.",
         why="A system without nodes, a connection without ports and a chain of one do nothing.",
         bad="""\

@@ -42,7 +42,8 @@ CONTENTS = contents()
 TEXTS = [path.read_text(encoding="utf-8") for path in SHIPPED]
 SETTINGS = [
     "nodes: [nodes]\ninterfaces: [interfaces, more]\nstrict: true\n"
-    "select: [RC3]\nignore: [qos-implicit, RC412]\nseverity: {unheard-publisher: warning}\n",
+    "select: [RC3]\nignore: [qos-implicit, RC412]\n"
+    "severity: {publisher-without-subscription: warning}\n",
 ]
 TOMLS = [
     """\
@@ -56,7 +57,7 @@ ignore = [
   '''RC4''',
 ]
 [tool.composer.severity]
-unheard-publisher = "warning"
+publisher-without-subscription = "warning"
 [[tool.other]]
 composer = {a.b = 1.5, c = [[1], {d = 07:32:00}]}
 [tool.ruff]

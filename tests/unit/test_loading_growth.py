@@ -37,7 +37,7 @@ SYSTEMS: dict[str, tuple[list[tuple[str, str]], str]] = {
             ("nodes:\n", f"  talker_#: {{publishers: {{p: {{{STRING}, topic: /topic_#}}}}}}\n"),
             ("", f"  listener_#: {{subscriptions: {{s: {{{STRING}, topic: /topik_#}}}}}}\n"),
         ],
-        "unfed-subscription",
+        "subscription-without-publisher",
     ),
     "profiles misspelt": (
         [
@@ -49,7 +49,7 @@ SYSTEMS: dict[str, tuple[list[tuple[str, str]], str]] = {
     "unknown keys": ([("nodes: {one: {}}\n", "key_#: [1, 2, 3]\n")], "unknown-key"),
     "one node with many ports": (
         [("nodes:\n  one:\n    publishers:\n", f"      port_#: {{{STRING}}}\n")],
-        "unheard-publisher",
+        "publisher-without-subscription",
     ),
     "one that all wait for": (
         [("nodes:\n  first: {}\n", "  node_#: {lifecycle: {depends_on: [first]}}\n")],

@@ -202,11 +202,11 @@ def test_a_diagnostic_shows_the_way_to_its_file(tmp_path: Path) -> None:
 def test_comments_silence_in_the_file_and_where_it_is_included(tmp_path: Path) -> None:
     unheard = "system: unheard\nnodes:\n  a: {publishers: {chatter: {type: std_msgs/msg/String, "
     unheard += "qos: command}}}"
-    comment = "  # compose: ignore[unheard-publisher] people listen by hand\n"
+    comment = "  # compose: ignore[publisher-without-subscription] people listen by hand\n"
     plain = included(tmp_path, "part.yaml", part=unheard + "\n")
     there = included(tmp_path, "part.yaml", part=unheard + comment)
     here = included(tmp_path, "part.yaml" + comment.rstrip(), part=unheard + "\n")
-    assert reported(plain.diagnostics) == ["part.yaml:3:20 unheard-publisher"]
+    assert reported(plain.diagnostics) == ["part.yaml:3:20 publisher-without-subscription"]
     assert (reported(there.diagnostics), reported(here.diagnostics)) == ([], [])
 
 
@@ -346,7 +346,10 @@ connections:
 
 def test_the_settings_of_the_project_hold_for_what_is_included(tmp_path: Path) -> None:
     unheard = "system: part\nnodes:\n  a: {publishers: {chatter: {type: std_msgs/msg/String, "
-    files = {"part": unheard + "qos: command}}}\n", "composer": "ignore: [unheard-publisher]\n"}
+    files = {
+        "part": unheard + "qos: command}}}\n",
+        "composer": "ignore: [publisher-without-subscription]\n",
+    }
     assert reported(included(tmp_path, "part.yaml", **files).diagnostics) == []
 
 

@@ -66,9 +66,9 @@ def test_connections_and_includes() -> None:
 @pytest.mark.parametrize(
     ("loops", "rule", "place"),
     [
-        ("{}", "nothing-there", "4:5"),
+        ("{}", "empty-collection", "4:5"),
         ("[a]", "wrong-type", "4:15"),
-        ("{i: []}", "nothing-there", "4:16"),
+        ("{i: []}", "empty-collection", "4:16"),
         ("{i: 0}", "out-of-range", "4:19"),
         ("{i: -1}", "out-of-range", "4:19"),
         ("{i: text}", "wrong-type", "4:19"),

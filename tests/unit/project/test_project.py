@@ -25,7 +25,7 @@ ignore = [
 ]
 
 [tool.composer.severity]
-unheard-publisher = "warning"
+publisher-without-subscription = "warning"
 RC412 = "eror"
 
 [tool.ruff]
@@ -85,7 +85,7 @@ def test_a_table_in_pyproject_says_the_same_with_places(tmp_path: Path) -> None:
         ("RC9", "10:3"),
     ]
     assert [(text.value, severity) for text, severity in settings.severity] == [
-        ("unheard-publisher", Severity.WARNING)
+        ("publisher-without-subscription", Severity.WARNING)
     ]
     ((line, column, message),) = reported(project.diagnostics)
     assert (line, column) == (15, 9)
@@ -192,9 +192,9 @@ def test_rules_are_ignored_selected_and_weighed_but_errors_stay(tmp_path: Path) 
         path.write_text(text)
         return [(item.rule.name, item.severity.value) for item in load(path).diagnostics]
 
-    everything = [("unheard-publisher", "info"), ("qos-implicit", "info")]
+    everything = [("publisher-without-subscription", "info"), ("qos-implicit", "info")]
     assert sorted(found("")) == sorted(everything)
-    assert found("ignore: [RC5]") == [("unheard-publisher", "info")]
+    assert found("ignore: [RC5]") == [("publisher-without-subscription", "info")]
     assert found("select: [qos-implicit]") == [("qos-implicit", "info")]
     assert found("severity: {qos-implicit: error}\nignore: [RC3]") == [("qos-implicit", "error")]
     broken = TALKER.replace("String", "Strin")

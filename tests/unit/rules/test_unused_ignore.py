@@ -27,15 +27,15 @@ def text(before: str = "# a talker", behind: str = "") -> str:
 @pytest.mark.parametrize(
     ("before", "behind"),
     [
-        ("#", "  # compose: ignore[unheard-publisher]"),
+        ("#", "  # compose: ignore[publisher-without-subscription]"),
         ("#", " #compose:ignore[RC324]"),
-        ("#", "  # compose: ignore[unheard-publisher] because people listen"),
-        ("# compose: ignore[unheard-publisher]", ""),
-        ("# compose: ignore[unheard-publisher]\n    # and why\n", ""),
+        ("#", "  # compose: ignore[publisher-without-subscription] because people listen"),
+        ("# compose: ignore[publisher-without-subscription]", ""),
+        ("# compose: ignore[publisher-without-subscription]\n    # and why\n", ""),
     ],
 )
 def test_a_comment_applies_to_its_line(before: str, behind: str, tmp_path: Path) -> None:
-    assert rules_broken(text(), tmp_path) == ["unheard-publisher"]
+    assert rules_broken(text(), tmp_path) == ["publisher-without-subscription"]
     assert rules_broken(text(before, behind), tmp_path) == []
 
 
@@ -44,11 +44,11 @@ def test_a_comment_applies_to_its_line(before: str, behind: str, tmp_path: Path)
     [
         "  # compose: ignore",
         "  # compose: ignore[]",
-        "  # composed: ignore[unheard-publisher]",
+        "  # composed: ignore[publisher-without-subscription]",
     ],
 )
 def test_other_comments_ignore_nothing(behind: str, tmp_path: Path) -> None:
-    assert rules_broken(text(behind=behind), tmp_path) == ["unheard-publisher"]
+    assert rules_broken(text(behind=behind), tmp_path) == ["publisher-without-subscription"]
 
 
 @pytest.mark.parametrize("line", ["log: a# compose: ignore[x]", 'log: "a # compose: ignore[x]"'])
@@ -57,13 +57,15 @@ def test_text_other_than_comments_ignores_nothing(line: str) -> None:
 
 
 def test_every_unused_rule_of_a_comment_is_reported(tmp_path: Path) -> None:
-    behind = "  # compose: ignore[RC324, unfed-subscription, unherd-publisher]"
+    behind = (
+        "  # compose: ignore[RC324, subscription-without-publisher, publisher-without-subscripton]"
+    )
     found = diagnostics_in(text(behind=behind), tmp_path)
     assert [(item.rule.name, quoted(item)) for item in found] == [
-        ("unused-ignore", "unfed-subscription"),
-        ("unused-ignore", "unherd-publisher"),
+        ("unused-ignore", "subscription-without-publisher"),
+        ("unused-ignore", "publisher-without-subscripton"),
     ]
-    assert found[1].hint == "did you mean 'unheard-publisher'?"
+    assert found[1].hint == "did you mean 'publisher-without-subscription'?"
 
 
 def test_a_comment_at_a_related_location_applies_too(tmp_path: Path) -> None:
@@ -105,7 +107,7 @@ def test_a_comment_in_a_python_file_applies_to_that_file(tmp_path: Path) -> None
 
 
 def test_nothing_is_unused_if_the_file_cannot_be_read(tmp_path: Path) -> None:
-    broken = "system: demo  # compose: ignore[unheard-publisher]\nnodes: {a: [}\n"
+    broken = "system: demo  # compose: ignore[publisher-without-subscription]\nnodes: {a: [}\n"
     assert "unused-ignore" not in rules_broken(broken, tmp_path)
 
 

@@ -56,13 +56,13 @@ def profile(text: str) -> str:
     [
         # the file
         ("system: demo", "missing-key", "system", "a system needs 'nodes' or 'in", "nodes: {"),
-        ("system: demo\nnodes: {}", "nothing-there", "nodes", "'nodes' is empty", "at least one"),
+        ("system: demo\nnodes: {}", "empty-collection", "nodes", "'nodes' is empty", "at least"),
         (
             "system: demo\nnodes: {a: {}}\nchains: {c: {through: [a.p], latency_ms: 5}}",
-            "nothing-there", "through", "'through' needs at least 2 entries, and has only 1",
+            "empty-collection", "through", "'through' needs at least 2 entries, and has only 1",
             "add 1",
         ),
-        ("system: demo\ninclude: []", "nothing-there", "include", "'include' is empty", "at least"),
+        ("system: a\ninclude: []", "empty-collection", "include", "'include' is empty", "at least"),
         (
             "system: 5\nnodes: {robot: {}}",
             "wrong-type", "5", "expected a string for 'system', found the number 5", "quote it",
@@ -254,7 +254,7 @@ def profile(text: str) -> str:
         ),
         (
             connection("{topic: /a, from: a.b, to: []}"),
-            "nothing-there", "to", "'to' is empty", "at least one",
+            "empty-collection", "to", "'to' is empty", "at least one",
         ),
         (
             connection("{topic: /a, from: a.b, to: [3]}"),

@@ -13,7 +13,7 @@ from composer.model import PortKind
 RULE = register(
     Rule(
         code="RC324",
-        name="unheard-publisher",
+        name="publisher-without-subscription",
         severity=Severity.INFO,
         summary="No node in the system subscribes to a published topic.",
         why=(

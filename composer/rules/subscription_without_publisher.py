@@ -18,7 +18,7 @@ from composer.model import PortKind
 RULE = register(
     Rule(
         code="RC323",
-        name="unfed-subscription",
+        name="subscription-without-publisher",
         severity=Severity.WARNING,
         summary="No node in the system publishes to a subscribed topic.",
         why=(

@@ -13,7 +13,7 @@ from composer.diagnostics import Diagnostic, Rule, Severity, register
 RULE = register(
     Rule(
         code="RC305",
-        name="unfit-value",
+        name="invalid-value",
         severity=Severity.ERROR,
         summary="A constant or an expression does not fit the field it is assigned to.",
         why=(

@@ -12,7 +12,7 @@ from composer.model import Node, Timer
 RULE = register(
     Rule(
         code="RC412",
-        name="rate-band",
+        name="unusual-rate",
         severity=Severity.INFO,
         summary="A control or perception node runs at an unusual rate.",
         why=(
