@@ -29,7 +29,7 @@ from composer.source import Span, shown_path
 
 _API = "composer.behavior"
 _FOLDERS = ("msg", "srv", "action")
-#: Packages that behaviors often import, for hints.
+#: Packages that behaviors often import. They need not be installed where files are validated.
 _USUAL = ("composer", "cv2", "numpy", "rclpy", "tf2_ros")
 _IMPORT_ERRORS = frozenset({"ImportError", "ModuleNotFoundError", "Exception", "BaseException"})
 
@@ -116,7 +116,7 @@ class _Imports:
                 hint = suggestion(last, names) if names and nearest(last, names) else None
                 return _Missing(f"no module named '{name}'", hint, last)
             return None
-        if is_installed(top):
+        if is_installed(top) or top in _USUAL:
             return None
         close = nearest(top, self._modules)
         if close is None:

@@ -13,7 +13,7 @@ RULE = register(
     Rule(
         code="RC445",
         name="module-not-installed",
-        severity=Severity.WARNING,
+        severity=Severity.INFO,
         summary="A behavior imports a module that is not installed on this computer.",
         why=(
             "The node cannot be created on a computer without the module. If it is installed "

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 import json
+from pathlib import Path
 
 import pytest
 import yaml
@@ -25,14 +26,26 @@ def test_nested_messages_are_expanded() -> None:
     ]
 
 
+@pytest.fixture
+def commented(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A project with the nested message ``parts/msg/Outer``, which has comments."""
+    folder = tmp_path / "interfaces" / "msg"
+    folder.mkdir(parents=True)
+    package = "<package format='3'><name>parts</name></package>"
+    (folder.parent / "package.xml").write_text(package, encoding="utf-8")
+    (folder / "Outer.msg").write_text("# outer\n\nInner inner  # field\n", encoding="utf-8")
+    (folder / "Inner.msg").write_text("# inner\nint32 a\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("commented")
 def test_comments_are_all_shown_or_none() -> None:
-    done = compose("interface", "show", "std_msgs/msg/Header", "--no-comments", "--all-comments")
-    assert done.code == 2
-    commented = compose("interface", "show", "std_msgs/msg/Header").out
-    assert commented.startswith("# ")
-    assert len(compose("interface", "show", "std_msgs/msg/Header", "--all-comments").out) > len(
-        commented
-    )
+    show = ("interface", "show", "parts/msg/Outer")
+    assert compose(*show, "--no-comments", "--all-comments").code == 2
+    assert "outer" in compose(*show).out
+    assert "inner\n" not in compose(*show).out.replace("Inner inner", "")
+    assert "# inner\n" in compose(*show, "--all-comments").out
+    assert "#" not in compose(*show, "--no-comments").out
 
 
 def test_the_type_is_read_from_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,7 +84,7 @@ def test_a_prototype_has_all_fields() -> None:
 
 def test_flat_does_not_expand_nested_messages() -> None:
     done = compose("interface", "show", "geometry_msgs/msg/PointStamped", "--flat")
-    assert done.out.endswith("\nstd_msgs/Header header\nPoint point\n")
+    assert done.out.endswith("std_msgs/Header header\nPoint point\n")
 
 
 def test_services_actions_and_constants_are_shown() -> None:
