@@ -105,7 +105,7 @@ def load_files(paths: Iterable[Path]) -> list[LoadResult]:
         folder = _real_folder(path)
         if folder not in by_folder:
             by_folder[folder] = _Definitions.with_shared_interfaces(folder, shared)
-        results.append(_run_pipeline(_read(path, str(path)), by_folder[folder]))
+        results.append(_run_pipeline(_read(path), by_folder[folder]))
     return results
 
 
@@ -271,7 +271,7 @@ def _merge_node_type(tree: Mapping, source: SourceFile, definitions: _Definition
     return _Merged(inherited.tree, expanded, diagnostics, inherited.folders)
 
 
-def _read(path: Path, shown: str | None) -> _Document:
+def _read(path: Path, shown: str | None = None) -> _Document:
     tree, source, diagnostics = read_document(path, shown)
     if path.name == SETTINGS_FILE:  # its diagnostics are those of the project
         tree, diagnostics = None, []

@@ -101,7 +101,7 @@ def _is_needed(port: Port) -> bool:
 
 
 def _is_readable(reference: BehaviorReference) -> bool:
-    """Return whether the class can be looked up; the schema reports a missing colon."""
+    """Return whether the class can be looked up; a missing one is reported by a rule."""
     return bool(reference.class_name) and not is_unresolved(reference.text.value)
 
 

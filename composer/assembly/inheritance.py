@@ -17,7 +17,7 @@ from composer.node_types import NodeTypes
 from composer.project import Project
 from composer.schema.kinds import NODE, check_kind
 from composer.schema.sections import with_intended_sections
-from composer.source import Located, SourceFile, shown_path
+from composer.source import Located, SourceFile
 from composer.tree import Mapping, Scalar
 
 EXTENDS = "extends"
@@ -106,7 +106,7 @@ def _base(
     if len(files) > MAX_INCLUDE_DEPTH:
         message = f"node types extend each other more than {MAX_INCLUDE_DEPTH} deep"
         raise LimitExceeded(message, name.span, "extend the base type directly")
-    tree, source, found = read_document(path, shown_path(path))
+    tree, source, found = read_document(path)
     diagnostics += found
     if tree is None:
         return None

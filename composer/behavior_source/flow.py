@@ -27,6 +27,14 @@ def empty_returns(function: Function) -> Iterator[ast.Return]:
             yield node
 
 
+def returned_values(function: Function) -> Iterator[ast.expr]:
+    """Yield what the ``return`` statements of ``function`` return, except None."""
+    empty = set(empty_returns(function))
+    for node in _own_nodes(function.body):
+        if isinstance(node, ast.Return) and node.value is not None and node not in empty:
+            yield node.value
+
+
 def reaches_end(function: Function) -> bool:
     """Return whether ``function`` may reach the end of its body, and so return None.
 

@@ -25,21 +25,22 @@ class _Scope:
 def undefined_names(tree: ast.Module) -> Iterator[tuple[ast.Name, frozenset[str]]]:
     """Yield each undefined name where it is first used, with the names that are defined there.
 
-    Annotations are left out: they need not be evaluated. So is a file with names that its syntax
-    does not show, such as those of ``from module import *``.
+    Annotations are left out where Python does not evaluate them: in functions, and everywhere with
+    ``from __future__ import annotations``. So is a file with names that its syntax does not show,
+    such as those of ``from module import *``.
     """
     if any(_is_dynamic(node) for node in ast.walk(tree)):
         return
     module = _Scope(set(_MODULE_NAMES) | set(_defined(tree.body)) | set(_globals(tree)))
     seen: set[str] = set()
-    for name, known in _uses(tree.body, (module,)):
+    for name, known in _uses(tree.body, (module,), not _postpones_annotations(tree)):
         if name.id not in seen:
             seen.add(name.id)
             yield name, known
 
 
 def _uses(
-    body: Iterable[ast.AST], outer: tuple[_Scope, ...]
+    body: Iterable[ast.AST], outer: tuple[_Scope, ...], with_annotations: bool
 ) -> Iterator[tuple[ast.Name, frozenset[str]]]:
     """Yield the undefined names in ``body``, which sees the names of the scopes ``outer``."""
     pending = [(node, outer) for node in body][::-1]
@@ -50,6 +51,8 @@ def _uses(
                 yield node, frozenset().union(*(scope.names for scope in scopes))
             continue
         pending.extend(list(_children(node, scopes))[::-1])
+        if with_annotations:
+            pending.extend([(item, scopes) for item in _annotations(node, scopes)][::-1])
 
 
 def _children(
@@ -82,6 +85,27 @@ def _children(
                 yield node.value, scopes
         case _:
             yield from ((item, scopes) for item in ast.iter_child_nodes(node))
+
+
+def _annotations(node: ast.AST, scopes: tuple[_Scope, ...]) -> Iterator[ast.expr]:
+    """Yield the annotations of a node that Python 3.12 evaluates."""
+    match node:
+        case ast.FunctionDef() | ast.AsyncFunctionDef() if not any(_types(node)):
+            arguments = (item for item in ast.walk(node.args) if isinstance(item, ast.arg))
+            written = [node.returns, *(item.annotation for item in arguments)]
+            found = [item for item in written if item is not None]
+            yield from sorted(found, key=lambda item: (item.lineno, item.col_offset))
+        case ast.AnnAssign(annotation=annotation) if len(scopes) == 1 or scopes[-1].is_class:
+            yield annotation
+
+
+def _postpones_annotations(tree: ast.Module) -> bool:
+    return any(
+        isinstance(node, ast.ImportFrom)
+        and node.module == "__future__"
+        and any(item.name == "annotations" for item in node.names)
+        for node in tree.body
+    )
 
 
 def _defined(body: Iterable[ast.AST]) -> Iterator[str]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from composer.behavior_source import BehaviorSource, Function
+from composer.behavior_source.flow import returned_values
 from composer.behavior_source.receivers import lacks_self
 from composer.behavior_source.spans import attribute_span, span_of, start_span
 from composer.behavior_types.attributes import attribute_problem
@@ -77,6 +78,7 @@ class _FunctionChecker:
     def problems(self) -> Iterator[CodeProblem]:
         """Yield the problems of the function."""
         yield from self._annotations()
+        yield from self._returned()
         for pending in used_without_await(self.function, self.scope):
             yield self._missing_await(pending)
         for node in nodes_of(self.function):
@@ -186,6 +188,13 @@ class _FunctionChecker:
         field = message.field(target.attr) if message is not None else None
         if field is not None:
             yield from self._field(value, field)
+
+    def _returned(self) -> Iterator[CodeProblem]:
+        """Check what the handler of a service returns; None has a rule of its own."""
+        match self.given:
+            case (_, Message() as response):
+                for value in returned_values(self.function):
+                    yield from self._value(value, response)
 
     def _field(self, node: ast.expr, field: Field) -> Iterator[CodeProblem]:
         text = node.value if isinstance(node, ast.Constant) else None

@@ -20,7 +20,7 @@ from composer.document.files import decode, read_bytes, too_large
 from composer.document.limits import MAX_BYTES
 from composer.document.parameter_files import ParameterFileBuilder
 from composer.document.rules import KEY_WITHOUT_VALUE, NOT_A_MAP
-from composer.source import SourceFile, Span
+from composer.source import SourceFile, Span, shown_path
 from composer.tree import Mapping, Scalar, Tree, describe
 
 #: Larger files are systems, which are parsed once anyway.
@@ -33,11 +33,11 @@ __all__ = ["parse_bytes", "parse_document", "read_document", "read_parameter_doc
 def read_document(
     path: Path, shown: str | None = None
 ) -> tuple[Mapping | None, SourceFile, list[Diagnostic]]:
-    """Read the file at ``path``; ``shown`` is its name in diagnostics, ``path`` itself by default.
+    """Read the file at ``path``; ``shown`` is its name in diagnostics, by default its shown_path.
 
     Reads regular files only (through symbolic links), at most MAX_BYTES of them.
     """
-    name = str(path) if shown is None else shown
+    name = shown_path(path) if shown is None else shown
     unread = SourceFile(name)
     data, diagnostics = read_bytes(path, unread)
     return (None, unread, diagnostics) if diagnostics else parse_bytes(data, name)

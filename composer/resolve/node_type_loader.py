@@ -16,7 +16,7 @@ from composer.resolve.source_folders import SourceFolders
 from composer.resolve.tree_values import entries
 from composer.schema import check_schema
 from composer.schema.kinds import NODE, check_kind
-from composer.source import Located, Span, shown_path
+from composer.source import Located, Span
 from composer.tree import Entry, Mapping, Plain, Tree, plain
 
 RULE = register(
@@ -129,7 +129,7 @@ class NodeTypeLoader:
         return self._read[path]
 
     def _read_file(self, path: Path) -> Inherited | None:
-        tree, source, found = read_document(path, shown_path(path))
+        tree, source, found = read_document(path)
         self.diagnostics.extend(found)
         if tree is None:
             return None

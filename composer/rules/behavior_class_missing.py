@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.behaviors import behaviors
-from composer.analysis.context import Context
+from composer.analysis.context import Context, is_unresolved
 from composer.analysis.spans import part_of
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.model import BehaviorReference
 
 RULE = register(
     Rule(
@@ -39,7 +40,10 @@ class Planner:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Check that the module of every behavior defines its class."""
+    """Check that every behavior names a class, and that its module defines it."""
+    for node in context.system.nodes:
+        if node.behavior is not None and not node.behavior.class_name:
+            yield from _unnamed(node.behavior)
     for _, source in context.once(behaviors):
         if not source.module_found or source.class_found or source.problem is not None:
             continue
@@ -52,3 +56,17 @@ def check(context: Context) -> Iterator[Diagnostic]:
             part_of(reference.text, len(reference.module) + 1, len(reference.class_name)),
             hint=suggestion(reference.class_name, source.class_names),
         )
+
+
+def _unnamed(reference: BehaviorReference) -> Iterator[Diagnostic]:
+    text = reference.text.value
+    if is_unresolved(text):
+        return
+    module, _, name = text.rstrip(":").rpartition(".")
+    is_dotted = bool(module) and name[:1].isupper()
+    yield Diagnostic(
+        RULE,
+        f"behavior '{text}' names no class",
+        reference.text.span,
+        hint=f"did you mean '{module}:{name}'?" if is_dotted else "write 'module:Class'",
+    )

@@ -1,4 +1,4 @@
-"""A multi_threaded executor with one thread."""
+"""An executor with one thread that is declared as if it had several."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.diagnostics import Diagnostic, Rule, Severity, register
-from composer.model import ExecutorKind
+from composer.model import Executor, ExecutorKind
 
 RULE = register(
     Rule(
         code="RC417",
         name="single-thread",
         severity=Severity.WARNING,
-        summary="A multi_threaded executor has one thread.",
+        summary="An executor has one thread, but is declared as if it had several.",
         why=(
-            "With one thread, callbacks never run at the same time, but each of them costs the "
-            "locking of an executor with several threads."
+            "With one thread, callbacks never run at the same time. A multi_threaded executor with "
+            "one thread still costs the locking of several; the other kinds ignore 'threads'."
         ),
         bad="""\
 system: threads
@@ -44,3 +44,15 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 executor.threads_span or executor.name.span,
                 hint="use two or more threads, or 'kind: events'",
             )
+        elif executor.kind is not ExecutorKind.MULTI_THREADED and _several(executor):
+            yield Diagnostic(
+                RULE,
+                f"executor '{executor.name}' has one thread, as its kind is {executor.kind}",
+                executor.threads_span or executor.name.span,
+                hint="add 'kind: multi_threaded', or remove 'threads'",
+            )
+
+
+def _several(executor: Executor) -> bool:
+    """Return whether several threads are written; the default does not count."""
+    return executor.threads_span is not None and executor.threads > 1

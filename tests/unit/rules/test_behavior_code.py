@@ -199,6 +199,9 @@ MISTAKES = [
     # control flow
     ("reset", "if request:\n    return", "missing-return", "return", "'return response'"),
     ("reset", "return None", "missing-return", "return None", None),
+    ("reset", "if request:\n    return True", "unfit-value", "True", None),
+    ("reset", "return request", "unfit-value", "request", None),
+    ("reset", "return Trigger.Response", "unfit-value", "Trigger.Response", "create it"),
     ("configure", "while True:\n    self.count = 1", "endless-loop", "while", "sleep"),
     ("drive", "while not goal.is_cancel_requested:\n    pass", "endless-loop", "while", None),
     ("drive", "time.sleep(1.0)", "blocking-call", "time.sleep", "self.clock.sleep"),
@@ -251,6 +254,8 @@ RIGHT = [
     ("drive", "return await self._wait() and None"),
     ("reset", "response.success = True"),
     ("reset", "while True:\n    return response"),
+    ("reset", "return Trigger.Response(success=True)"),
+    ("reset", "def small():\n    return True\nresponse.success = small()"),
     ("reset", "raise ValueError(request)"),
     ("follow", "goal.request.target\nsent.cancel"),
     ("function", "stamp.sec\nstamp.nanosec"),

@@ -55,6 +55,22 @@ HINTS: dict[str, tuple[str, str, list[str | None]]] = {
         "duplicate-server",
         ["rename one of them"],
     ),
+    "a behavior with a dot instead of a colon": (
+        "system: demo\nnodes: {n: {behavior: lift.Lift}}\n",
+        "behavior-class-missing",
+        ["did you mean 'lift:Lift'?"],
+    ),
+    "a behavior without a class": (
+        "system: demo\nnodes: {n: {behavior: 'lift:'}}\n",
+        "behavior-class-missing",
+        ["write 'module:Class'"],
+    ),
+    "threads of an executor that has one": (
+        "system: demo\nexecutors: {io: {threads: 4}}\n"
+        "nodes: {n: {executor: io, on_activate: {log: hello}}}\n",
+        "single-thread",
+        ["add 'kind: multi_threaded', or remove 'threads'"],
+    ),
     "a chain without timers": (
         CHAIN % (", budget_ms: 20, publish: {out: '{message}'}", ""),
         "latency-budget",
