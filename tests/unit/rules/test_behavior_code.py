@@ -199,9 +199,9 @@ MISTAKES = [
     # control flow
     ("reset", "if request:\n    return", "missing-return", "return", "'return response'"),
     ("reset", "return None", "missing-return", "return None", None),
-    ("reset", "if request:\n    return True", "unfit-value", "True", None),
-    ("reset", "return request", "unfit-value", "request", None),
-    ("reset", "return Trigger.Response", "unfit-value", "Trigger.Response", "create it"),
+    ("reset", "if request:\n    return True", "invalid-value", "True", None),
+    ("reset", "return request", "invalid-value", "request", None),
+    ("reset", "return Trigger.Response", "invalid-value", "Trigger.Response", "create it"),
     ("configure", "while True:\n    self.count = 1", "endless-loop", "while", "sleep"),
     ("drive", "while not goal.is_cancel_requested:\n    pass", "endless-loop", "while", None),
     ("drive", "time.sleep(1.0)", "blocking-call", "time.sleep", "self.clock.sleep"),
