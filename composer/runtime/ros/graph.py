@@ -9,13 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import lru_cache
+from importlib import import_module
+from types import ModuleType
 from typing import TypeAlias
 
-from rclpy.action.graph import (
-    get_action_client_names_and_types_by_node,
-    get_action_names_and_types,
-    get_action_server_names_and_types_by_node,
-)
 from rclpy.exceptions import NameValidationException
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -143,7 +140,7 @@ class RosGraph:
 
     def actions(self) -> list[NameAndTypes]:
         """Return all actions."""
-        return self._valid("action", get_action_names_and_types(self._node))
+        return self._valid("action", _actions().get_action_names_and_types(self._node))
 
     def publishers_of(self, node: NodeName) -> list[NameAndTypes]:
         """Return the topics that a node publishes."""
@@ -165,7 +162,7 @@ class RosGraph:
         """Return the actions that a node provides."""
         return self._of(
             "action",
-            lambda *at: get_action_server_names_and_types_by_node(self._node, *at),
+            lambda *at: _actions().get_action_server_names_and_types_by_node(self._node, *at),
             node,
         )
 
@@ -173,7 +170,7 @@ class RosGraph:
         """Return the actions that a node sends goals to."""
         return self._of(
             "action",
-            lambda *at: get_action_client_names_and_types_by_node(self._node, *at),
+            lambda *at: _actions().get_action_client_names_and_types_by_node(self._node, *at),
             node,
         )
 
@@ -250,3 +247,8 @@ def _full_name(namespace: str, name: str) -> str:
 def _listed(found: list[str]) -> str:
     more = len(found) - _MAX_LISTED
     return ", ".join(found[:_MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _actions() -> ModuleType:
+    """Import the queries of actions late: they import numpy, which most commands do not need."""
+    return import_module("rclpy.action.graph")
