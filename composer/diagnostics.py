@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from enum import Enum
 
+from composer.fast_dataclass import dataclass
 from composer.source import Span
 from composer.spelling import vocabulary
 

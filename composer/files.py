@@ -6,11 +6,12 @@ import os
 import re
 import stat
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from composer.diagnostics import Diagnostic
 from composer.document.rules import UNREADABLE_FILE
+from composer.fast_dataclass import dataclass
 from composer.project import SETTINGS_FILE, Project
 from composer.source import SourceFile, Span
 

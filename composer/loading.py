@@ -10,7 +10,7 @@ import gc
 from collections.abc import Collection, Iterable, Iterator
 from collections.abc import Mapping as Map
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TypeAlias
 
@@ -19,6 +19,7 @@ from composer.assembly.deduplication import add_include_labels, deduplicate
 from composer.diagnostics import Diagnostic, Severity, has_errors, in_order, registered_rules
 from composer.document import parse_bytes, read_document
 from composer.expand import expand
+from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 from composer.model import System
 from composer.node_types import NodeTypes, interface_folders

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
+from composer.fast_dataclass import dataclass
 from composer.project import Project
 from composer.resources import interfaces_folder, nodes_folder
 

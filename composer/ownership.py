@@ -7,8 +7,9 @@ Python a system runs, so the owner is checked, as git does (``safe.directory``).
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from pathlib import Path
+
+from composer.fast_dataclass import dataclass
 
 #: Folders that are used regardless of their owner, separated by colons; ``*`` stands for all.
 SAFE_FOLDERS_VARIABLE = "COMPOSE_SAFE_FOLDERS"

@@ -7,8 +7,9 @@ Policies and values are spelled as rclpy spells them; durations are in milliseco
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from enum import StrEnum
+
+from composer.fast_dataclass import dataclass
 
 
 class History(StrEnum):

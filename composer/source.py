@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Generic, TypeVar
+
+from composer.fast_dataclass import dataclass
 
 T = TypeVar("T")
 U = TypeVar("U")
@@ -33,7 +35,7 @@ class SourceFile:
         return self.lines[number - 1] if 1 <= number <= len(self.lines) else ""
 
 
-@dataclass(frozen=True, slots=True, order=True)
+@dataclass(frozen=True, slots=True)
 class Span:
     """A part of a line. Lines and columns count from 1, columns and length in characters."""
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeAlias
 
 from composer import tree
@@ -23,6 +23,7 @@ from composer.expressions import (
     ExpressionError,
     compile_expression,
 )
+from composer.fast_dataclass import dataclass
 from composer.source import Located, Span
 from composer.tree import ScalarValue, Tree
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeAlias
 
 from composer.diagnostics import shown
+from composer.fast_dataclass import dataclass
 from composer.source import Span
 
 #: A YAML 1.2 core-schema scalar.

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from composer.analysis.context import Context, is_unresolved
 from composer.behavior_source import BehaviorSource, Call, Method, find_behavior
+from composer.fast_dataclass import dataclass
 from composer.model import BehaviorReference, Node, Port, PortKind
 from composer.source import Located
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 from composer.analysis.context import Context
 from composer.analysis.publications import causes
+from composer.fast_dataclass import dataclass
 from composer.model import Chain, Node, Port, PortKind, Timer
 from composer.source import Span
 

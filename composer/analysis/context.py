@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeVar
 
+from composer.fast_dataclass import dataclass
 from composer.interfaces import Action, Interfaces, Message, Service
 from composer.model import Channel, ChannelKind, Port, System, channels
 from composer.node_types import NodeTypes

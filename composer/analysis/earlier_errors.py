@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
 
 from composer.analysis.context import Context
 from composer.diagnostics import nearest
+from composer.fast_dataclass import dataclass
 from composer.model import Node, PortKind
 from composer.source import Span
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
 from composer.analysis.publications import Cause
 from composer.analysis.rates import Rates, rates
 from composer.diagnostics import Label
+from composer.fast_dataclass import dataclass
 from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, Timer
 from composer.source import Located, Span
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 from composer.analysis.context import Context
 from composer.analysis.reactions import reactions
 from composer.expressions import Expression
+from composer.fast_dataclass import dataclass
 from composer.model import Event, Node, Port, Reaction, System
 from composer.source import Span
 from composer.templates import Template, expressions_in

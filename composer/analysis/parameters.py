@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 from composer.analysis.context import Context, is_unresolved
+from composer.fast_dataclass import dataclass
 from composer.model import Parameter, ParameterType
 from composer.source import Located
 from composer.tree import Plain

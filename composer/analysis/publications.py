@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
 from composer.analysis.behaviors import (
     GENERAL_HANDLERS,
@@ -14,6 +13,7 @@ from composer.analysis.behaviors import (
 )
 from composer.analysis.context import Context
 from composer.behavior_source import BehaviorSource, Call, published_port
+from composer.fast_dataclass import dataclass
 from composer.model import Node, Port, PortKind, Reaction, Timer
 
 _ENTRIES = ("on_", "accept_")

@@ -6,10 +6,10 @@ A rate is a maximum: messages that depend on a condition may be less frequent.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
 from composer.analysis.context import Context
 from composer.analysis.publications import Cause, Causes, causes
+from composer.fast_dataclass import dataclass
 from composer.model import ChannelKind, Node, PortKind, PortOfNode
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from composer.analysis.context import Context
+from composer.fast_dataclass import dataclass
 from composer.interfaces import Action, Message, Service
 from composer.model import Event, Node, Port, PortKind, Reaction, Send, System
 from composer.templates import Template

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeAlias
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.references import matched_ports, own_name
 from composer.diagnostics import Label
+from composer.fast_dataclass import dataclass
 from composer.model import ChannelKind, Connection, Node, PortKind, PortOfNode
 from composer.source import Span
 from composer.spelling import vocabulary

@@ -6,7 +6,7 @@ Every key and value keeps the file and location where it was written.
 from __future__ import annotations
 
 from collections.abc import Mapping as Map
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from composer.assembly.include_entries import IncludeReader
@@ -16,6 +16,7 @@ from composer.assembly.limits import IncludeLimits, LimitExceeded
 from composer.assembly.rules import INCLUDE_CYCLE, INVALID_INCLUDE
 from composer.diagnostics import Diagnostic
 from composer.expand.rules import DUPLICATE_NODE_NAME, TOO_LARGE
+from composer.fast_dataclass import dataclass
 from composer.project import Project
 from composer.source import SourceFile, Span
 from composer.tree import Mapping

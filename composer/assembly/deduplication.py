@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as Map
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from composer.diagnostics import Diagnostic, Label
+from composer.fast_dataclass import dataclass
 from composer.model import Node
 from composer.source import Located, Span
 

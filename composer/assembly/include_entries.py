@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import islice
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from composer.assembly.rules import INVALID_INCLUDE
 from composer.diagnostics import Diagnostic, nearest, shown
 from composer.document import read_document
 from composer.document.rules import FILE_TOO_LARGE, UNREADABLE_FILE
+from composer.fast_dataclass import dataclass
 from composer.names import namespace_problem
 from composer.project import Project
 from composer.schema.kinds import SYSTEM, check_kind

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from composer.assembly.include_entries import Include, IncludeReader, SystemFile, read_include
@@ -16,6 +16,7 @@ from composer.diagnostics import Diagnostic, Label, shown
 from composer.document.limits import MAX_INCLUDE_DEPTH
 from composer.expand import expand
 from composer.expand.scope import measure
+from composer.fast_dataclass import dataclass
 from composer.schema import check_schema
 from composer.schema.kinds import SYSTEM
 from composer.schema.sections import with_intended_sections

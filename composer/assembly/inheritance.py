@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Map
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from composer.assembly.limits import IncludeLimits, LimitExceeded
@@ -13,6 +13,7 @@ from composer.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.document import read_document
 from composer.document.limits import MAX_INCLUDE_DEPTH
 from composer.expand.scope import measure
+from composer.fast_dataclass import dataclass
 from composer.node_types import NodeTypes
 from composer.project import Project
 from composer.schema.kinds import NODE, check_kind

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 from composer.assembly.rules import INCLUDE_CONFLICT
 from composer.diagnostics import Diagnostic, Label, shown
 from composer.expand.rules import DUPLICATE_NODE_NAME
+from composer.fast_dataclass import dataclass
 from composer.source import Span
 from composer.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, plain
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from composer.assembly.rules import TOO_MUCH_INCLUDED
 from composer.diagnostics import Diagnostic
 from composer.document.limits import MAX_BYTES, MAX_INCLUDED_VALUES, MAX_INCLUDES, MAX_MATCHES
+from composer.fast_dataclass import dataclass
 from composer.source import Span
 
 #: Comparisons of names with patterns.

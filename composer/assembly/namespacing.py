@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from composer.assembly.merging import merge_maps
+from composer.fast_dataclass import dataclass
 from composer.model import USE_SIM_TIME
 from composer.source import Located, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree

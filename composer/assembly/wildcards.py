@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from composer.assembly.limits import IncludeLimits
+from composer.fast_dataclass import dataclass
 from composer.names import matches_wildcard
 from composer.source import Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from composer.behavior_source.modules import (
@@ -13,6 +13,7 @@ from composer.behavior_source.modules import (
     relative_module_file,
 )
 from composer.behavior_source.syntax import Class, Import, Method, Module, read_module
+from composer.fast_dataclass import dataclass
 from composer.model import BehaviorReference
 from composer.project import Project
 from composer.source import Span, shown_path

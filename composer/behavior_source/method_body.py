@@ -5,9 +5,10 @@ from __future__ import annotations
 import ast
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from composer.behavior_source.spans import span_of
+from composer.fast_dataclass import dataclass
 from composer.source import SourceFile, Span
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef

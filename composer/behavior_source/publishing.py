@@ -5,9 +5,9 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 from composer.behavior_source.method_body import Body, Function
+from composer.fast_dataclass import dataclass
 
 #: Statements that may leave a method early.
 _EXITS = (ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Assert)

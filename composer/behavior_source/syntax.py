@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from composer.behavior_source.method_body import Call, Function, dotted, importe
 from composer.behavior_source.modules import Unreadable, read_text
 from composer.behavior_source.publishing import PublisherUses, publisher_uses
 from composer.behavior_source.spans import start_span
+from composer.fast_dataclass import dataclass
 from composer.source import SourceFile, Span
 
 

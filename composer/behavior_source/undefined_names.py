@@ -5,7 +5,9 @@ from __future__ import annotations
 import ast
 import builtins
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
+
+from composer.fast_dataclass import dataclass
 
 _MODULE_NAMES = frozenset(
     {*dir(builtins), "__file__", "__path__", "__annotations__", "__builtins__", "__module__"}

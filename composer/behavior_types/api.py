@@ -5,10 +5,10 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 
 from composer import behavior
+from composer.fast_dataclass import dataclass
 
 _AWAITABLE = re.compile(r"Awaitable\[(\w+)\]")
 

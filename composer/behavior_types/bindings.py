@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 
 from composer.behavior_source import Function
+from composer.fast_dataclass import dataclass
 
 
 class How(Enum):

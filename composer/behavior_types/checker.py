@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from composer.behavior_source import BehaviorSource, Function
 from composer.behavior_source.flow import returned_values
@@ -26,6 +25,7 @@ from composer.behavior_types.values import (
     Value,
 )
 from composer.diagnostics import suggestion
+from composer.fast_dataclass import dataclass
 from composer.interfaces import Action, Field, Interfaces, Message, Service
 from composer.model import Node
 from composer.source import Span

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from composer.behavior_source.syntax import read_module
 from composer.behavior_types.api import API_NAMES
 from composer.behavior_types.problems import CodeProblem, Kind
 from composer.diagnostics import nearest, suggestion
+from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 from composer.project import Project
 from composer.source import Span, shown_path

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 from composer.behavior_source import BehaviorSource, Method, Module
@@ -28,6 +28,7 @@ from composer.behavior_types.values import (
     Value,
     join,
 )
+from composer.fast_dataclass import dataclass
 from composer.field_types import (
     ANYTHING,
     BOOL,
@@ -61,7 +62,7 @@ _ANNOTATIONS: Mapping[str, Value] = {
 _TIME = "builtin_interfaces/msg/Time"
 
 
-@dataclass
+@dataclass()
 class BehaviorTypes:
     """The types in the class of a behavior, used in one node."""
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 
+from composer.fast_dataclass import dataclass
 from composer.source import Span
 
 

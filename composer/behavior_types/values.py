@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import ast
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from composer.behavior_source import Method, Module
 from composer.behavior_types.api import Member
+from composer.fast_dataclass import dataclass
 from composer.field_types import ANYTHING, ValueType
 from composer.interfaces import Action, Message, Service
 from composer.model import Port, PortKind

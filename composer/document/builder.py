@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import yaml
 
@@ -12,6 +12,7 @@ from composer.document.characters import check_value
 from composer.document.limits import MAX_DEPTH, MAX_VALUES
 from composer.document.scalars import NumberRefused, resolve_plain
 from composer.document.spans import Mark, collection_span, scalar_span, span_at
+from composer.fast_dataclass import dataclass
 from composer.source import SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, describe
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import yaml
 
 from composer.diagnostics import Diagnostic, Label, shown
 from composer.document.rules import YAML_SYNTAX
 from composer.document.spans import Mark, span_at
+from composer.fast_dataclass import dataclass
 from composer.source import SourceFile, Span
 
 _QUOTE_TEXT = "put the whole text in quotes"

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from composer.drift.drift import Drift, DriftKind
+from composer.fast_dataclass import dataclass
 
 _Identity = tuple[DriftKind, str, str]
 

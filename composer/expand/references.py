@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
+from composer.fast_dataclass import dataclass
 from composer.tree import Mapping, Scalar, Sequence, Tree
 
 _MARK = "${"

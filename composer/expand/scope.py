@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from composer.diagnostics import nearest
+from composer.fast_dataclass import dataclass
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 #: Maximum number of comparisons for hints in one file, to limit the time.

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from composer.diagnostics import Diagnostic, Rule, shown
 from composer.document.limits import MAX_BYTES, MAX_COPIES, MAX_DEPTH, MAX_VALUES
 from composer.expand import rules
 from composer.expand.references import Reference, has_reference, pieces
 from composer.expand.scope import Scope, Sized
+from composer.fast_dataclass import dataclass
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Container, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import takewhile
 from types import CodeType, TracebackType
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 from composer.diagnostics import shown
 from composer.expressions.errors import EvaluationError, Refusal
 from composer.expressions.values import describe, map_key
+from composer.fast_dataclass import dataclass
 
 _REASONS: Mapping[type[Exception], str] = {
     KeyError: "there is no such name here",

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from composer.expressions.errors import Refusal
 from composer.expressions.values import Kind, describe, kind_of, plain
+from composer.fast_dataclass import dataclass
 
 #: The range of integers: int64 and uint64.
 MAXIMUM_INTEGER = 2**64 - 1

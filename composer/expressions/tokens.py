@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from composer.expressions.errors import ExpressionError
+from composer.fast_dataclass import dataclass
 
 #: Limits the recursion depth of Python's parser.
 MAXIMUM_TOKENS = 256

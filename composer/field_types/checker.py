@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from composer.diagnostics import nearest, suggestion
 from composer.expressions import Expression
+from composer.fast_dataclass import dataclass
 from composer.field_types.constants import constant_problem
 from composer.field_types.inference import infer, literal_integer
 from composer.field_types.types import (

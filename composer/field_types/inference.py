@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 from typing import Any
 
 from composer.diagnostics import suggestion
 from composer.expressions import CONSTANTS, Expression, FieldPath, path_of
+from composer.fast_dataclass import dataclass
 from composer.field_types.types import (
     ANYTHING,
     BOOL,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import takewhile
 from typing import TypeAlias
 
 from composer.diagnostics import suggestion
 from composer.expressions import map_key
+from composer.fast_dataclass import dataclass
 from composer.interfaces import (
     FLOATS,
     INTEGER_RANGES,

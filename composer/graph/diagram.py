@@ -6,9 +6,9 @@ Every view (``views/``) turns a system into a :class:`Graph`; every renderer (``
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 
+from composer.fast_dataclass import dataclass
 from composer.tree import Plain
 
 #: Facts about a vertex or an edge, in the order they are shown.

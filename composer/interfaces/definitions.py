@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
+from composer.fast_dataclass import dataclass
 from composer.tree import Plain
 
 #: The primitive types of the ROS 2 interface definition language, and the range of the integers.

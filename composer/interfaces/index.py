@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
 from composer.diagnostics import nearest, shown, suggestion
+from composer.fast_dataclass import dataclass
 from composer.interfaces.definitions import Action, Interface, Message, Service, parts
 from composer.interfaces.parser import DefinitionError, parse_definition, split_name
 from composer.interfaces.share_json import read_description

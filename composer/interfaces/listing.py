@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
+from composer.fast_dataclass import dataclass
 from composer.interfaces.definitions import (
     FLOATS,
     TEXTS,

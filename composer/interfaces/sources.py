@@ -11,11 +11,11 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
 
+from composer.fast_dataclass import dataclass
 from composer.interfaces.parser import split_name
 
 FOLDERS = ("msg", "srv", "action")

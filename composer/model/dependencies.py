@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from heapq import heappop, heappush
 
+from composer.fast_dataclass import dataclass
 from composer.model.ports import ChannelKind
 from composer.model.system import PrimaryState, System, channels
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from composer.expressions import EvaluationError, Expression
+from composer.fast_dataclass import dataclass
 from composer.source import Span
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from composer.expressions import Expression
+from composer.fast_dataclass import dataclass
 from composer.model.periods import Period
 from composer.qos import QosProfile
 from composer.source import Located, Span

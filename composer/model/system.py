@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+from composer.fast_dataclass import dataclass
 from composer.model.introspection import DEFAULT_INTROSPECTION, Introspection
 from composer.model.periods import PeriodError
 from composer.model.ports import (

@@ -9,10 +9,11 @@ externally after that, the step or the fault is outdated: the later of two chang
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import StrEnum
 from typing import TypeVar
 
+from composer.fast_dataclass import dataclass
 from composer.model import PrimaryState
 
 T = TypeVar("T")

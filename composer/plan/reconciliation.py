@@ -9,8 +9,8 @@ failed node after a backoff.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
+from composer.fast_dataclass import dataclass
 from composer.model import OnFailure, PrimaryState, System
 from composer.model.dependencies import DependencyEdge, dependency_edges, in_dependency_order
 from composer.plan.desired_state import DesiredState, Fault, FaultKind

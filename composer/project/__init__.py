@@ -13,10 +13,11 @@ from __future__ import annotations
 
 import os
 import pwd
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from composer.diagnostics import Diagnostic, shown
+from composer.fast_dataclass import dataclass
 from composer.ownership import SAFE_FOLDERS_VARIABLE, TrustedUsers
 from composer.project.rules import FOREIGN_OWNER
 from composer.project.settings import Settings, read_settings

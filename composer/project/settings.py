@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from composer.diagnostics import Diagnostic, Severity, shown
+from composer.fast_dataclass import dataclass
 from composer.project.rules import BAD_SETTING
 from composer.project.sources import SettingsSource
 from composer.schema import check_schema

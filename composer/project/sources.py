@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TypeAlias
@@ -12,6 +12,7 @@ from composer.diagnostics import Diagnostic, Label
 from composer.document import read_document
 from composer.document.files import decode, read_bytes
 from composer.document.rules import NOT_A_MAP, UNREADABLE_FILE
+from composer.fast_dataclass import dataclass
 from composer.project.rules import BAD_SETTING
 from composer.project.toml import TABLE, read_table
 from composer.source import SourceFile, Span, shown_path

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from composer.diagnostics import Diagnostic, shown
 from composer.document.limits import MAX_DEPTH, MAX_INTEGER, MIN_INTEGER
 from composer.document.rules import BAD_NUMBER, NESTED_TOO_DEEP
+from composer.fast_dataclass import dataclass
 from composer.project.rules import BAD_SETTING
 from composer.project.toml_places import NestedTooDeep, Path, Places, find_places
 from composer.source import SourceFile, Span

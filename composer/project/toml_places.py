@@ -10,11 +10,12 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum, auto
 from typing import TypeAlias
 
 from composer.document.limits import MAX_DEPTH
+from composer.fast_dataclass import dataclass
 from composer.source import SourceFile, Span
 
 #: The keys and, in arrays, the indexes that lead to a value.

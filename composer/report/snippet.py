@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from composer.fast_dataclass import dataclass
 from composer.report.display import visible, width
 from composer.source import Span
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import TypeVar
 
+from composer.fast_dataclass import dataclass
 from composer.model import Chain, ChannelKind, Connection, Delivery, Endpoint, Isolation, Port, Qos
 from composer.names import join
 from composer.resolve.qos import QosTable, implicit_qos

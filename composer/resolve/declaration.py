@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from composer.diagnostics import Diagnostic
+from composer.fast_dataclass import dataclass
 from composer.model import (
     BehaviorReference,
     Parameter,

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from composer.diagnostics import Diagnostic
+from composer.fast_dataclass import dataclass
 from composer.model import (
     USE_SIM_TIME,
     Dependency,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from composer.assembly import Inherited, NodeTypeFile, inherit
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, has_errors, register, shown
 from composer.document import read_document
 from composer.expand import expand, missing_variables
+from composer.fast_dataclass import dataclass
 from composer.resolve.declaration import Declaration, declare
 from composer.resolve.qos import QosTable
 from composer.resolve.source_folders import SourceFolders

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, shown
 from composer.document import parse_document
+from composer.fast_dataclass import dataclass
 from composer.model import USE_SIM_TIME
 from composer.source import Located, SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree

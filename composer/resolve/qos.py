@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Mapping as Map
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
+from composer.fast_dataclass import dataclass
 from composer.model import ChannelKind, NamedQos, Qos, QosReference
 from composer.qos import (
     PRESETS,

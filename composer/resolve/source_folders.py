@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Map
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
+from composer.fast_dataclass import dataclass
 from composer.node_types import NodeTypes
 from composer.project import Project
 from composer.source import Span

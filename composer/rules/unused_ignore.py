@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 from composer.diagnostics import (
     Diagnostic,
@@ -22,6 +21,7 @@ from composer.diagnostics import (
     registered_rules,
     shown,
 )
+from composer.fast_dataclass import dataclass
 from composer.source import SourceFile, Span
 
 RULE = register(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import a, either
 from composer.analysis.reactions import sends
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.fast_dataclass import dataclass
 from composer.model import Chain, ChannelKind, Connection, Endpoint, Port, PortKind
 
 RULE = register(

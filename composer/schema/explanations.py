@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Label, nearest, shown
+from composer.fast_dataclass import dataclass
 from composer.schema import rules
 from composer.schema.common_mistakes import advice, intended_key, value_advice
 from composer.schema.expectations import expected, type_hint
@@ -181,7 +181,8 @@ def _missing_choice(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterato
 def _excluding_keys(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     entries = error.index.entries(error.place.tree)
     first, second = sorted(
-        (entries[name].key for name in error.required["required"]), key=lambda key: key.span
+        (entries[name].key for name in error.required["required"]),
+        key=lambda key: (key.span.line, key.span.column),
     )
     message = f"{error.owner} has both '{first.value}' and '{second.value}'"
     label = Label(first.span, "the other one")

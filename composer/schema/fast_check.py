@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeAlias
+
+from composer.fast_dataclass import dataclass
 
 #: Returns whether a value is valid.
 Check: TypeAlias = Callable[[Any], bool]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from composer.fast_dataclass import dataclass
 from composer.source import Span
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 

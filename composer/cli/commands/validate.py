@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +16,7 @@ from composer.cli.support.errors import FAILED, UsageError
 from composer.cli.support.options import examples
 from composer.cli.support.system_arguments import example_systems, nearest_path, path_exists
 from composer.cli.support.terminal import say, use_color, write_raw
+from composer.fast_dataclass import dataclass
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic

@@ -8,9 +8,10 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import datetime
 from typing import TypeAlias
+
+from composer.fast_dataclass import dataclass
 
 CONSOLE_FORMAT_VARIABLE = "RCUTILS_CONSOLE_OUTPUT_FORMAT"
 _FILE_FORMAT = "[{date_time_with_ms}] [{severity}] [{name}] {message}"

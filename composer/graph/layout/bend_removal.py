@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from composer.fast_dataclass import dataclass
 from composer.graph.layout.boxes import Box
 from composer.graph.layout.rank_extents import Extent
 

@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeAlias
 
+from composer.fast_dataclass import dataclass
 from composer.graph.diagram import Edge
 from composer.graph.layout.result import Point, Size
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from composer.fast_dataclass import dataclass
 from composer.graph.diagram import Cluster, Direction, Edge, Graph
 from composer.graph.layout.boxes import (
     BEND_GAP,

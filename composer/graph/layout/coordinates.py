@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import groupby
 
+from composer.fast_dataclass import dataclass
 from composer.graph.layout.boxes import Box, Group, Item, space_between
 
 #: Sweeps propagate positions over all ranks; rounds balance pulls from both sides.

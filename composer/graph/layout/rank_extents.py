@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from composer.fast_dataclass import dataclass
 from composer.graph.layout.boxes import Box, Group, Item
 
 _RANK_GAP = 22.0

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from composer.fast_dataclass import dataclass
 from composer.graph.diagram import Cluster, Edge
 
 

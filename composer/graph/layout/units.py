@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from composer.fast_dataclass import dataclass
 from composer.graph.diagram import Cluster, Graph, Vertex
 from composer.graph.layout.result import Size
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from composer.drift.compare import states_after_bring_up
+from composer.fast_dataclass import dataclass
 from composer.graph.labels import qos_label
 from composer.graph.scenes.diagnostics import DiagnosticIndex
 from composer.graph.scenes.facts import node_facts, port_facts

@@ -6,8 +6,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from composer.fast_dataclass import dataclass
 from composer.graph.diagram import Details
 from composer.model import ChannelKind, PortKind
 

@@ -7,7 +7,9 @@ like it, and not with all of them.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
+
+from composer.fast_dataclass import dataclass
 
 ONE_PART = "*"
 ANY_PARTS = "**"

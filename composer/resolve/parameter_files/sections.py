@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as Map
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from composer.fast_dataclass import dataclass
 from composer.model import USE_SIM_TIME, Node, UnmatchedParameters
 from composer.names import join
 from composer.resolve.parameter_files.patterns import NamePatterns, canonical, is_pattern

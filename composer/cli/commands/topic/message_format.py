@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import typer
@@ -10,6 +9,7 @@ import typer
 from composer.cli.commands.topic.option_groups import option_group
 from composer.cli.support.errors import UsageError
 from composer.cli.support.output import as_json, as_yaml
+from composer.fast_dataclass import dataclass
 
 _MAX_LENGTH = 128
 

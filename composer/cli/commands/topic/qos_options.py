@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -10,6 +10,7 @@ import typer
 
 from composer.cli.commands.topic.option_groups import option_group
 from composer.cli.support.options import finite
+from composer.fast_dataclass import dataclass
 from composer.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -23,6 +23,7 @@ from composer.cli.support.options import Json
 from composer.cli.support.output import as_json
 from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import say, write
+from composer.fast_dataclass import dataclass
 
 if TYPE_CHECKING:
     from composer.remote.rates import BandwidthStatistics, DelayStatistics, RateStatistics
