@@ -31,9 +31,10 @@ def undefined_names(tree: ast.Module) -> Iterator[tuple[ast.Name, frozenset[str]
     ``from __future__ import annotations``. So is a file with names that its syntax does not show,
     such as those of ``from module import *``.
     """
-    if any(_is_dynamic(node) for node in ast.walk(tree)):
+    nodes = list(ast.walk(tree))
+    if any(_is_dynamic(node) for node in nodes):
         return
-    module = _Scope(set(_MODULE_NAMES) | set(_defined(tree.body)) | set(_globals(tree)))
+    module = _Scope(set(_MODULE_NAMES) | set(_defined(tree.body)) | set(_globals(nodes)))
     seen: set[str] = set()
     for name, known in _uses(tree.body, (module,), not _postpones_annotations(tree)):
         if name.id not in seen:
@@ -142,8 +143,8 @@ def _defined(body: Iterable[ast.AST]) -> Iterator[str]:
             pending.extend(ast.iter_child_nodes(node))
 
 
-def _globals(tree: ast.Module) -> Iterator[str]:
-    for node in ast.walk(tree):
+def _globals(nodes: Iterable[ast.AST]) -> Iterator[str]:
+    for node in nodes:
         if isinstance(node, ast.Global):
             yield from node.names
 

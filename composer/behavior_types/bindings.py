@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
 from dataclasses import field
 from enum import Enum
+from functools import lru_cache
 
 from composer.behavior_source import Function
 from composer.fast_dataclass import dataclass
@@ -74,14 +74,17 @@ def bindings_of(function: Function, *, is_method: bool = True) -> Bindings:
     return found
 
 
-def nodes_of(function: Function) -> Iterator[ast.AST]:
-    """Yield the nodes in the body of ``function`` in source order, without nested classes."""
+@lru_cache(maxsize=512)
+def nodes_of(function: Function) -> tuple[ast.AST, ...]:
+    """Return the nodes in the body of ``function`` in source order, without nested classes."""
+    found: list[ast.AST] = []
     pending: list[ast.AST] = list(reversed(function.body))
     while pending:
         node = pending.pop()
-        yield node
+        found.append(node)
         if not isinstance(node, ast.ClassDef):
             pending.extend(reversed(list(ast.iter_child_nodes(node))))
+    return tuple(found)
 
 
 def _bind(node: ast.AST, found: Bindings) -> None:

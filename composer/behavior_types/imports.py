@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import field
 from functools import cached_property
 from pathlib import Path
@@ -32,6 +32,8 @@ _API = "composer.behavior"
 _FOLDERS = ("msg", "srv", "action")
 #: Packages that behaviors often import. They need not be installed where files are validated.
 _USUAL = ("composer", "cv2", "numpy", "rclpy", "tf2_ros")
+#: Fields of statements that contain statements.
+_BODIES = ("body", "handlers", "orelse", "finalbody", "cases")
 _IMPORT_ERRORS = frozenset({"ImportError", "ModuleNotFoundError", "Exception", "BaseException"})
 
 
@@ -52,7 +54,7 @@ def import_problems(
     """Yield the problems of the imports in a file, each with the name that is probably meant."""
     projects = {home: Project.at(home) for home in (module.path.parent, folder)}
     checker = _Imports(module, folder, interfaces, projects)
-    for node in _unguarded(module.tree):
+    for node in _unguarded(module.tree.body):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 found = checker.missing_module(alias.name)
@@ -246,18 +248,19 @@ def _names_in(path: Path) -> frozenset[str] | None:
     return frozenset({*functions, *stored, *modules, *module.imports})
 
 
-def _unguarded(tree: ast.Module) -> Iterator[ast.AST]:
-    """Yield the nodes of a file, except where a ``try`` handles a failing import."""
-    pending: list[ast.AST] = [tree]
+def _unguarded(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
+    """Yield the statements of a file, except where a ``try`` handles a failing import."""
+    pending = list(body[::-1])
     while pending:
         node = pending.pop()
         yield node
         if isinstance(node, ast.Try) and any(_handles_imports(item) for item in node.handlers):
-            pending.extend([*node.handlers, *node.orelse, *node.finalbody][::-1])
+            inner: list[ast.AST] = [*node.handlers, *node.orelse, *node.finalbody]
         elif isinstance(node, ast.If) and _is_type_checking(node.test):
-            pending.extend(node.orelse[::-1])
+            inner = [*node.orelse]
         else:
-            pending.extend(list(ast.iter_child_nodes(node))[::-1])
+            inner = [item for name in _BODIES for item in getattr(node, name, ())]
+        pending.extend(inner[::-1])
 
 
 def _handles_imports(handler: ast.ExceptHandler) -> bool:
@@ -280,19 +283,15 @@ def _attributes(module: Module) -> Iterator[CodeProblem]:
     }
     if not aliases:
         return
-    stored = {
-        node.id
-        for node in ast.walk(module.tree)
-        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)
-    }
-    arguments = {node.arg for node in ast.walk(module.tree) if isinstance(node, ast.arg)}
+    uses: list[tuple[str, ast.Attribute]] = []
     for node in ast.walk(module.tree):
-        if not isinstance(node, ast.Attribute) or not isinstance(node.value, ast.Name):
-            continue
-        name = node.value.id
-        if name not in aliases or name in stored or name in arguments:
-            continue
-        names = _known_names(aliases[name])
+        match node:
+            case ast.Attribute(value=ast.Name(id=name)) if name in aliases:
+                uses.append((name, node))
+            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name):
+                aliases.pop(name, None)  # means something else, at least somewhere
+    for name, node in uses:
+        names = _known_names(aliases[name]) if name in aliases else None
         if names is not None and node.attr not in names and not node.attr.startswith("__"):
             message = f"module '{aliases[name]}' has no '{node.attr}'"
             hint = suggestion(node.attr, names) if nearest(node.attr, names) else None
