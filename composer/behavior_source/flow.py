@@ -6,6 +6,7 @@ import ast
 from collections.abc import Iterator, Sequence
 
 from composer.behavior_source.method_body import Function
+from composer.behavior_source.traversal import children, walk
 
 _SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 _LEAVES = (ast.Return, ast.Raise, ast.Break, ast.Yield, ast.YieldFrom)
@@ -146,15 +147,10 @@ def _has_break(body: Sequence[ast.stmt]) -> bool:
         if isinstance(node, ast.For | ast.AsyncFor | ast.While):
             pending.extend(node.orelse)
         elif not isinstance(node, _SCOPES):
-            pending.extend(ast.iter_child_nodes(node))
+            pending.extend(children(node))
     return False
 
 
 def _own_nodes(body: Sequence[ast.stmt]) -> Iterator[ast.AST]:
     """Yield the nodes of ``body`` in source order, without nested functions and classes."""
-    pending: list[ast.AST] = list(reversed(body))
-    while pending:
-        node = pending.pop()
-        yield node
-        if not isinstance(node, _SCOPES):
-            pending.extend(reversed(list(ast.iter_child_nodes(node))))
+    return walk(body, closed=_SCOPES)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import ast
 import importlib
 import sys
-import sysconfig
 import warnings
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
 from composer.behavior_source.modules import Unreadable, module_below, read_text
+from composer.behavior_source.traversal import walk
 
-_FOLDERS = tuple(dict.fromkeys(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib")))
+_FOLDER = Path(ast.__file__).parent  # sysconfig knows it as well, but takes 2 ms to import
 #: Text of modules that add names to themselves when they are imported.
 _DYNAMIC = ("globals()", "_convert_", "sys.modules[", "def __getattr__", "vars()", "exec(")
 _MAXIMUM_STARS = 4
@@ -45,13 +45,11 @@ def standard_names(module: str) -> frozenset[str] | None:
 
 def _is_own(file: str | None) -> bool:
     """Return whether a file, None for a built-in module, belongs to the standard library."""
-    return file is None or any(Path(file).is_relative_to(folder) for folder in _FOLDERS)
+    return file is None or Path(file).is_relative_to(_FOLDER)
 
 
 def _file(module: str) -> Path | None:
-    parts = module.split(".")
-    found = (module_below(folder, parts) for folder in _FOLDERS)
-    return next((path for path in found if path is not None), None)
+    return module_below(_FOLDER, module.split("."))
 
 
 def _submodules(module: str) -> frozenset[str]:
@@ -108,9 +106,4 @@ def _starred(node: ast.ImportFrom, path: Path, stars: int) -> frozenset[str] | N
 
 def _statements(tree: ast.Module) -> Iterator[ast.AST]:
     """Yield the nodes outside functions and classes."""
-    pending: list[ast.AST] = [tree]
-    while pending:
-        node = pending.pop()
-        yield node
-        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Lambda):
-            pending.extend(ast.iter_child_nodes(node))
+    return walk([tree], closed=(ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda))

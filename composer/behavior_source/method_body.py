@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 
 from composer.behavior_source.spans import span_of
+from composer.behavior_source.traversal import children
 from composer.fast_dataclass import dataclass
 from composer.source import SourceFile, Span
 
@@ -60,9 +61,8 @@ def read_body(function: Function, imports: Mapping[str, str], source: SourceFile
     pending: list[tuple[ast.AST, bool]] = [(node, False) for node in reversed(function.body)]
     while pending:
         node, deferred = pending.pop()
-        children = visitor.visit(node, deferred)
         within = deferred or isinstance(node, _SCOPES)
-        pending.extend((child, within) for child in reversed(children))
+        pending.extend((child, within) for child in reversed(visitor.visit(node, deferred)))
     names = visitor.names()
     return Body(
         calls=tuple(
@@ -103,16 +103,16 @@ class _BodyVisitor:
 
     def visit(self, node: ast.AST, deferred: bool) -> list[ast.AST]:
         """Record ``node``, and return the children that remain to be visited."""
-        children: list[ast.AST] = []
+        below: list[ast.AST] = []
         match node:
             case ast.Name(id=name, ctx=ast.Load()):
                 self.mentioned.append(name)
             case ast.Name(id=name) | ast.arg(arg=name):
                 self.assigned[name] += 1
             case ast.Attribute():
-                children = self._attribute(node)
+                below = self._attribute(node)
             case ast.Call():
-                children = self._call(node, deferred)
+                below = self._call(node, deferred)
             case ast.Assign(targets=[ast.Name(id=name)], value=value) if dotted(value):
                 self.assigned[name] += 1
                 self.aliases.append((name, dotted(value)))
@@ -120,10 +120,10 @@ class _BodyVisitor:
                 self.imports.update(imported_names(node))
             case ast.Await(value=value):
                 self.awaited.add(id(value))
-                children = [value]
+                below = [value]
             case _:
-                children = list(ast.iter_child_nodes(node))
-        return children
+                below = children(node)
+        return below
 
     def names(self) -> Mapping[str, str]:
         """Return the full names of imports and of local names of publishers.

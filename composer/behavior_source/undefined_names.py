@@ -7,6 +7,7 @@ import builtins
 from collections.abc import Iterable, Iterator
 from dataclasses import field
 
+from composer.behavior_source.traversal import children, walk
 from composer.fast_dataclass import dataclass
 
 _MODULE_NAMES = frozenset(
@@ -31,7 +32,7 @@ def undefined_names(tree: ast.Module) -> Iterator[tuple[ast.Name, frozenset[str]
     ``from __future__ import annotations``. So is a file with names that its syntax does not show,
     such as those of ``from module import *``.
     """
-    nodes = list(ast.walk(tree))
+    nodes = list(walk(tree.body))
     if any(_is_dynamic(node) for node in nodes):
         return
     module = _Scope(set(_MODULE_NAMES) | set(_defined(tree.body)) | set(_globals(nodes)))
@@ -81,13 +82,13 @@ def _children(
             names = {name for item in node.generators for name in _stored(item.target)}
             # The first iterable sees a class around it; for simplicity, all of it does.
             inside = (*scopes, _Scope(names))
-            yield from ((item, inside) for item in ast.iter_child_nodes(node))
+            yield from ((item, inside) for item in children(node))
         case ast.AnnAssign():
             yield node.target, scopes
             if node.value is not None:
                 yield node.value, scopes
         case _:
-            yield from ((item, scopes) for item in ast.iter_child_nodes(node))
+            yield from ((item, scopes) for item in children(node))
 
 
 def _annotations(node: ast.AST, scopes: tuple[_Scope, ...]) -> Iterator[ast.expr]:
@@ -140,7 +141,7 @@ def _defined(body: Iterable[ast.AST]) -> Iterator[str]:
             inner = (part for part in ast.walk(node) if isinstance(part, ast.NamedExpr))
             yield from (part.target.id for part in inner)
         elif not isinstance(node, ast.Lambda):
-            pending.extend(ast.iter_child_nodes(node))
+            pending.extend(children(node))
 
 
 def _globals(nodes: Iterable[ast.AST]) -> Iterator[str]:

@@ -8,6 +8,7 @@ from enum import Enum
 from functools import lru_cache
 
 from composer.behavior_source import Function
+from composer.behavior_source.traversal import walk
 from composer.fast_dataclass import dataclass
 
 
@@ -77,14 +78,7 @@ def bindings_of(function: Function, *, is_method: bool = True) -> Bindings:
 @lru_cache(maxsize=512)
 def nodes_of(function: Function) -> tuple[ast.AST, ...]:
     """Return the nodes in the body of ``function`` in source order, without nested classes."""
-    found: list[ast.AST] = []
-    pending: list[ast.AST] = list(reversed(function.body))
-    while pending:
-        node = pending.pop()
-        found.append(node)
-        if not isinstance(node, ast.ClassDef):
-            pending.extend(reversed(list(ast.iter_child_nodes(node))))
-    return tuple(found)
+    return tuple(walk(function.body, closed=(ast.ClassDef,)))
 
 
 def _bind(node: ast.AST, found: Bindings) -> None:

@@ -20,6 +20,7 @@ from composer.behavior_source.modules import (
 )
 from composer.behavior_source.spans import attribute_span, start_span
 from composer.behavior_source.syntax import read_module
+from composer.behavior_source.traversal import walk
 from composer.behavior_types.api import API_NAMES
 from composer.behavior_types.problems import CodeProblem, Kind
 from composer.diagnostics import nearest, suggestion
@@ -236,12 +237,12 @@ def _names_in(path: Path) -> frozenset[str] | None:
         return None
     functions = (
         item.name
-        for item in ast.walk(module.tree)
+        for item in walk(module.tree.body)
         if isinstance(item, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
     )
     stored = (
         item.id
-        for item in ast.walk(module.tree)
+        for item in walk(module.tree.body)
         if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Store)
     )
     modules = {name.partition(".")[0] for name in module.imports}
@@ -284,7 +285,7 @@ def _attributes(module: Module) -> Iterator[CodeProblem]:
     if not aliases:
         return
     uses: list[tuple[str, ast.Attribute]] = []
-    for node in ast.walk(module.tree):
+    for node in walk(module.tree.body):
         match node:
             case ast.Attribute(value=ast.Name(id=name)) if name in aliases:
                 uses.append((name, node))

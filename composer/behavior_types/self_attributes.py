@@ -6,6 +6,7 @@ import ast
 from collections.abc import Iterable, Iterator
 
 from composer.behavior_source import BehaviorSource, Function
+from composer.behavior_source.traversal import walk
 from composer.behavior_types.api import BEHAVIOR_ATTRIBUTES
 from composer.behavior_types.bindings import nodes_of
 
@@ -38,7 +39,7 @@ def escapes(source: BehaviorSource) -> bool:
 def _defined(statement: ast.stmt) -> Iterator[str]:
     """Yield the names that a statement of a class may define."""
     is_function = isinstance(statement, Function)
-    for node in ast.walk(statement):
+    for node in walk([statement]):
         match node:
             case ast.Name(id=name) if not is_function:
                 yield name

@@ -133,7 +133,9 @@ class Interfaces:
 
     def packages(self) -> frozenset[str]:
         """Return the packages that define interfaces."""
-        return frozenset().union(*(source.packages() for source in self._sources))
+        if self._packages is None:
+            self._packages = frozenset().union(*(source.packages() for source in self._sources))
+        return self._packages
 
     def names(self, folder: str) -> tuple[str, ...]:
         """Return the names of all interfaces in ``folder`` (msg, srv or action), sorted."""
@@ -176,9 +178,7 @@ class Interfaces:
         return None
 
     def _may_exist(self, name: str) -> bool:
-        if self._packages is None:
-            self._packages = self.packages()
-        if name.partition("/")[0] not in self._packages:
+        if name.partition("/")[0] not in self.packages():
             return True
         return any(source.read(name) is not None for source in self._sources)
 
