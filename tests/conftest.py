@@ -49,6 +49,10 @@ def pytest_configure(config: pytest.Config) -> None:
         folder = tempfile.TemporaryDirectory(prefix="bytecode-")
         config.add_cleanup(folder.cleanup)
         os.environ["PYTHONPYCACHEPREFIX"] = folder.name
+    # The logs of runs do not belong into the home folder of who runs the tests.
+    logs = tempfile.TemporaryDirectory(prefix="ros-log-", ignore_cleanup_errors=True)
+    config.add_cleanup(logs.cleanup)
+    os.environ["ROS_LOG_DIR"] = logs.name
     # numpy, which every ROS process imports, would start a thread for each core.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # A background job of a script ignores SIGINT, and its children inherit that: tests could not

@@ -18,6 +18,7 @@ COMMANDS = {
     "run": "run",
     "ps": "ps",
     "top": "top",
+    "logs": "logs",
     "up": "manage",
     "down": "manage",
     "pause": "manage",

@@ -9,9 +9,17 @@ import sys
 import threading
 from pathlib import Path
 
-from composer.cli.support.console import OutputQueue
+from composer.cli.support.output_queue import FileDescriptor, OutputQueue
 
 LIMIT_S = 20.0
+
+
+def queue_to(fd: int, max_waiting: int = 1_048_576) -> OutputQueue:
+    return OutputQueue(
+        FileDescriptor(fd),
+        lambda count: f"... {count} lines dropped: the output was blocked\n",
+        max_waiting,
+    )
 
 
 class FullPipe:
@@ -33,7 +41,7 @@ class FullPipe:
 
 def test_text_is_written_in_order() -> None:
     reading, writing = os.pipe()
-    queue = OutputQueue(writing)
+    queue = queue_to(writing)
     os.close(writing)
     lines = [f"line {number} ä\n" for number in range(1000)]
     for line in lines:
@@ -45,7 +53,7 @@ def test_text_is_written_in_order() -> None:
 
 def test_the_oldest_lines_are_dropped_and_counted_while_nothing_reads() -> None:
     pipe = FullPipe()
-    queue = OutputQueue(pipe.writing, max_waiting=50)
+    queue = queue_to(pipe.writing, max_waiting=50)
     pipe.close_writing()
     queue.put("first\n")
     while queue._texts:  # until the thread has taken it
@@ -65,7 +73,7 @@ def test_the_oldest_lines_are_dropped_and_counted_while_nothing_reads() -> None:
 
 def test_the_end_does_not_wait_for_a_pipe_that_nothing_reads() -> None:
     pipe = FullPipe()
-    queue = OutputQueue(pipe.writing)
+    queue = queue_to(pipe.writing)
     queue.put("text\n")
     closing = threading.Thread(target=queue.close)
     closing.start()
@@ -78,7 +86,7 @@ def test_the_end_does_not_wait_for_a_pipe_that_nothing_reads() -> None:
 def test_a_closed_pipe_drops_everything() -> None:
     reading, writing = os.pipe()
     os.close(reading)
-    queue = OutputQueue(writing)
+    queue = queue_to(writing)
     os.close(writing)
     queue.put("text\n")
     queue.close()
@@ -87,7 +95,7 @@ def test_a_closed_pipe_drops_everything() -> None:
 
 def test_lines_that_a_full_disk_refuses_are_counted() -> None:
     with Path("/dev/full").open("w", encoding="utf-8") as full:
-        queue = OutputQueue(full.fileno())
+        queue = queue_to(full.fileno())
         queue.put("one\ntwo\n")
         queue.close()
     assert queue._dropped_lines == 2

@@ -244,13 +244,21 @@ def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
     from composer.cli.support.line_format import console_format
     from composer.cli.support.process import end_now
     from composer.cli.support.progress import Progress, summary
+    from composer.cli.support.run_logging import run_log
+    from composer.names import join
     from composer.plan import tear_down
     from composer.runtime.host import Host
     from composer.runtime.process import StartRefused
+    from composer.runtime.supervision.events import Event
 
-    with queued_output():
+    with queued_output(), run_log(join(system.namespace, system.name.value)) as log:
         progress = Progress(sys.stderr, console_format())
-        host = Host(system, plan, tear_down(system), options, progress.show)
+
+        def report(event: Event) -> None:
+            progress.show(event)
+            log.show(event)
+
+        host = Host(system, plan, tear_down(system), options, report)
         try:
             outcome = host.run()
         except StartRefused as refusal:

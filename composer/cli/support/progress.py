@@ -58,23 +58,28 @@ class Progress:
         self._stream.write(f"{line}\n")
 
     def _line(self, event: Event) -> str:
-        if isinstance(event, Logged):
-            name, text = event.logger, event.message
-        else:
-            name, text = "compose", str(event)
-        text = _continued(text)  # not the line: a format may have colors
-        severity = _severity(event)
+        name, text = logger_and_text(event)
+        text = continued(text)  # not the line: a format may have colors
+        severity = severity_of(event)
         if self._format is None:
             return f"[{event.elapsed_s:.3f}] [{severity}] [{name}] {text}"
         return self._format.render(Line(severity, name, text, time.time_ns()))
 
 
-def _continued(text: str) -> str:
+def logger_and_text(event: Event) -> tuple[str, str]:
+    """Return the name of the logger that an event is shown with, and its text."""
+    if isinstance(event, Logged):
+        return event.logger, event.message
+    return "compose", str(event)
+
+
+def continued(text: str) -> str:
     """Return ``text`` with all lines but the first indented: a message must not look like two."""
     return escape_lines(text).replace("\n", f"\n{_INDENT}")
 
 
-def _severity(event: Event) -> str:
+def severity_of(event: Event) -> str:
+    """Return the severity of an event in upper case, as in the format of log lines."""
     match event:
         case Logged():
             return event.level.upper()

@@ -1,0 +1,87 @@
+"""Keeps the log of a run in files, which ``compose logs`` reads."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from composer.cli.support.output_queue import OutputQueue
+from composer.cli.support.progress import logger_and_text, severity_of
+from composer.cli.support.terminal import say
+from composer.run_log import Record, RotatingFile, RunFolder
+from composer.runtime.process.environment import log_folder
+from composer.runtime.supervision.events import CallbackFailed, Event, Logged
+
+
+class RunLog:
+    """Writes events to the log files of a run. A slow or full disk does not delay the run.
+
+    The files are created at the first event: a run that is refused leaves none. Without a writable
+    folder, the run has no log, and a warning says so.
+    """
+
+    def __init__(self, system: str) -> None:
+        """``system`` is the full name of the system."""
+        self._system = system
+        self._folder: RunFolder | None = None
+        self._queue: OutputQueue | None = None
+        self._is_started = False
+
+    def show(self, event: Event) -> None:
+        """Write an event, except for what the nodes have logged themselves."""
+        if isinstance(event, CallbackFailed):
+            return
+        if not self._is_started:
+            self._start()
+        if self._queue is not None:
+            self._queue.put(_record(event).to_line())
+
+    def close(self) -> None:
+        """Write what waits, as far as possible."""
+        if self._queue is not None:
+            self._queue.close()
+        if self._folder is not None:
+            self._folder.close()
+
+    def _start(self) -> None:
+        self._is_started = True
+        logs = log_folder(os.environ)
+        problem = "neither ROS_LOG_DIR nor HOME is set"
+        try:
+            self._folder = None if logs is None else RunFolder(logs, self._system)
+        except OSError as error:
+            problem = f"{error.strerror}: '{error.filename}'"
+        if self._folder is None:
+            say(f"warning: 'compose logs' will not show this run: {problem}")
+            return
+        self._queue = OutputQueue(RotatingFile(self._folder.path), _note, name="run log")
+
+
+@contextmanager
+def run_log(system: str) -> Iterator[RunLog]:
+    """Keep the log of a run within the block."""
+    log = RunLog(system)
+    try:
+        yield log
+    finally:
+        log.close()
+
+
+def _record(event: Event) -> Record:
+    logger, text = logger_and_text(event)
+    if isinstance(event, Logged):
+        node = "" if logger in _OWN_LOGGERS else "/" + logger.replace(".", "/")
+    else:
+        node = getattr(event, "node", "")
+    return Record(time.time_ns(), severity_of(event).lower(), logger, node, text)
+
+
+def _note(dropped_lines: int) -> str:
+    text = f"{dropped_lines} lines of the log are missing: the disk was full or too slow"
+    return Record(time.time_ns(), "warn", "compose", "", text).to_line()
+
+
+#: Those of the composer, which is not a node.
+_OWN_LOGGERS = ("compose", "composer")
