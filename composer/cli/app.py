@@ -24,6 +24,7 @@ COMMANDS = {
     "pause": "manage",
     "resume": "manage",
     "reset": "manage",
+    "restart": "restart",
     "validate": "validate",
     "config": "config",
     "graph": "graph",

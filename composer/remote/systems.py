@@ -7,9 +7,11 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
@@ -30,6 +32,8 @@ from composer.runtime.ros.manager_protocol import (
     CALLBACKS_TOPIC,
     IS_ACTIVE,
     NAME,
+    RESTART,
+    RESTART_NODES,
     STATE_QOS,
     STATE_TOPIC,
 )
@@ -138,23 +142,22 @@ class Systems:
         ``command`` is a service of :class:`composer.runtime.manager.node.ManagerNode`. Raises
         NoResponseError.
         """
-        limit = _ProcessDeadline(name, self._deadline)
-        # A report proves that the process is alive: the services of a killed process remain in the
-        # graph for a while.
-        discovery = _ProcessDeadline(name, Deadline(min(DISCOVERY_S, limit.left_s)))
-        if not self._wait_for_reports((name,), discovery):
-            raise self._no_response_error(name)
-        service = f"{name}/{NAME}/{command}"
-        try:
-            response = call_once(self._session, Trigger, service, Trigger.Request(), limit)
-        except NoResponseError as error:
-            if limit.has_process_ended:
-                raise NoResponseError(f"{name} did not {command}: its process has ended") from error
-            raise NoResponseError(
-                f"{name} did not {command} within {self._deadline.timeout_s:g} s",
-                "it may still be in progress: see 'compose ps'. Use --timeout to wait longer",
-            ) from error
+        response = self._call(name, command, Trigger, Trigger.Request())
         return bool(response.success), str(response.message)
+
+    def restart(self, name: str, nodes: Iterable[str]) -> tuple[bool, str]:
+        """Restart nodes of a system; return whether it succeeded, and the message of the manager.
+
+        ``nodes`` are full names. Raises NoResponseError.
+        """
+        value = ParameterValue(
+            type=ParameterType.PARAMETER_STRING_ARRAY, string_array_value=list(nodes)
+        )
+        request = SetParametersAtomically.Request(
+            parameters=[Parameter(name=RESTART_NODES, value=value)]
+        )
+        result = self._call(name, RESTART, SetParametersAtomically, request).result
+        return bool(result.successful), str(result.reason)
 
     def shut_down(self, name: str) -> str:
         """Shut down a system and its process; return its message. Raises NoResponseError."""
@@ -163,6 +166,25 @@ class Systems:
         if is_local:
             self._session.wait_for(lambda: name not in local_systems() or None, self._deadline)
         return message
+
+    def _call(self, name: str, command: str, kind: Any, request: Any) -> Any:
+        """Return the response of a service of a manager. Raises NoResponseError."""
+        limit = _ProcessDeadline(name, self._deadline)
+        # A report proves that the process is alive: the services of a killed process remain in the
+        # graph for a while.
+        discovery = _ProcessDeadline(name, Deadline(min(DISCOVERY_S, limit.left_s)))
+        if not self._wait_for_reports((name,), discovery):
+            raise self._no_response_error(name)
+        service = f"{name}/{NAME}/{command}"
+        try:
+            return call_once(self._session, kind, service, request, limit)
+        except NoResponseError as error:
+            if limit.has_process_ended:
+                raise NoResponseError(f"{name} did not {command}: its process has ended") from error
+            raise NoResponseError(
+                f"{name} did not {command} within {self._deadline.timeout_s:g} s",
+                "it may still be in progress: see 'compose ps'. Use --timeout to wait longer",
+            ) from error
 
     def _wait_for_reports(self, names: Collection[str], deadline: Deadline) -> bool:
         """Wait for the reports of all systems; return whether all have arrived."""

@@ -251,8 +251,9 @@ class Host:
             self._main_queue.request_stop("--for elapsed")
 
     def _run_command(self, command: Command) -> None:
-        self._reporter.report(events.Commanded(self._reporter.elapsed_s, command.name))
-        command.answer(*self._commands.run(command.name))
+        at_s = self._reporter.elapsed_s
+        self._reporter.report(events.Commanded(at_s, command.name, command.nodes))
+        command.answer(*self._commands.run(command))
 
     def _fail(self, reason: str) -> None:
         self._failed = True

@@ -1,7 +1,8 @@
 """The manager node of a system: its commands as services, and its status as topics.
 
 The services (std_srvs/srv/Trigger) are named as those of nav2's lifecycle manager: ``startup``,
-``pause``, ``resume``, ``reset``, ``shutdown`` and ``is_active``.
+``pause``, ``resume``, ``reset``, ``shutdown`` and ``is_active``. ``restart`` restarts the nodes
+whose full names are in the parameter ``nodes`` (rcl_interfaces/srv/SetParametersAtomically).
 
 The node publishes the states of all nodes on ``/diagnostics`` (REP 107) and, latched, on ``state``:
 on each change, and while there are subscriptions every second and for each new one. While there
@@ -19,6 +20,8 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.duration import Duration
 from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
 from rclpy.node import Node
@@ -51,6 +54,8 @@ from composer.runtime.ros.manager_protocol import (
     CALLBACKS_TOPIC,
     IS_ACTIVE,
     NAME,
+    RESTART,
+    RESTART_NODES,
     STATE_QOS,
     STATE_TOPIC,
 )
@@ -131,8 +136,9 @@ class ManagerNode:
             f"~/{CALLBACKS_TOPIC}", CALLBACKS_QOS, self._publish_callbacks
         )
         for command in COMMANDS:
-            self._add_service(command, partial(self._on_command, command))
-        self._add_service(IS_ACTIVE, self._on_is_active)
+            self._add_service(Trigger, command, partial(self._on_command, command))
+        self._add_service(Trigger, IS_ACTIVE, self._on_is_active)
+        self._add_service(SetParametersAtomically, RESTART, self._on_restart)
         self._instances = OtherInstances(
             self._node,
             self._loop,
@@ -183,8 +189,8 @@ class ManagerNode:
             self.process_context.events.watch(publisher.handle, kind, on_matched)
         return publisher
 
-    def _add_service(self, name: str, callback: Callable[[Any, Reply], None]) -> None:
-        service = self._node.create_service(Trigger, f"~/{name}", unused_callback)
+    def _add_service(self, kind: Any, name: str, callback: Callable[[Any, Reply], None]) -> None:
+        service = self._node.create_service(kind, f"~/{name}", unused_callback)
         self._loop.add_service(service, callback)
 
     def _on_command(self, name: str, _: Trigger.Request, reply: Reply) -> None:
@@ -192,6 +198,26 @@ class ManagerNode:
             self._loop.call_soon(lambda: reply(Trigger.Response(success=success, message=message)))
 
         self._host.on_command(Command(name, answer))
+
+    def _on_restart(self, request: SetParametersAtomically.Request, reply: Reply) -> None:
+        def answer(success: bool, message: str) -> None:
+            result = SetParametersResult(successful=success, reason=message)
+            response = SetParametersAtomically.Response(result=result)
+            self._loop.call_soon(lambda: reply(response))
+
+        nodes = tuple(
+            name
+            for parameter in request.parameters
+            if parameter.name == RESTART_NODES
+            for name in parameter.value.string_array_value
+        )
+        known = self._host.nodes()
+        unknown = [name for name in nodes if name not in known]
+        if unknown or not nodes:
+            expected = "expected the full names of nodes in the parameter 'nodes'"
+            answer(False, f"there is no node '{unknown[0]:.256}'" if unknown else expected)
+        else:
+            self._host.on_command(Command(RESTART, answer, nodes))
 
     def _on_is_active(self, _: Trigger.Request, reply: Reply) -> None:
         status = self._status.snapshot()

@@ -12,6 +12,10 @@ NAME = "manager"
 #: Services: std_srvs/srv/Trigger; ChangeState for nodes without lifecycle services.
 IS_ACTIVE = "is_active"
 CHANGE_STATE = "change_state"
+#: rcl_interfaces/srv/SetParametersAtomically, with the full names of nodes in the parameter
+#: ``nodes``: the only standard service that takes names and returns a reason.
+RESTART = "restart"
+RESTART_NODES = "nodes"
 #: A hidden service of each manager, with a unique name: see ``manager/other_instances.py``.
 INSTANCE_PREFIX = "_instance_"
 

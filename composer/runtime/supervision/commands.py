@@ -4,6 +4,7 @@
 ``pause``     deactivate the active nodes
 ``resume``    bring up the inactive nodes, all or nothing
 ``reset``     make all nodes unconfigured, and forget failures
+``restart``   take nodes down and bring them up again, each to its desired state
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from typing import TYPE_CHECKING
 
 from composer.model import PrimaryState, System
 from composer.plan import blocked_nodes, plan_transitions, start_causes, start_goals
+from composer.runtime.node.outcome import FINALIZED
+from composer.runtime.supervision.main_queue import Command
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
 
@@ -27,6 +30,9 @@ _ACTIVITIES = {
     "resume": ("resuming", "running"),
     "reset": ("resetting", "reset"),
 }
+_RESTART = "restart"
+#: An error in a handler also ends in one of these states.
+_DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +44,16 @@ class Commands:
     supervisor: Supervisor
     status: Status
 
-    def run(self, name: str) -> tuple[bool, str]:
+    def run(self, command: Command) -> tuple[bool, str]:
         """Run a command; return whether it succeeded, and the problem and state of the system."""
+        if command.name == _RESTART:
+            problem = self._restart(command.nodes, self.supervisor.desired.serial)
+        else:
+            problem = self._run_for_system(command.name)
+        summary = self.status.snapshot().summary
+        return problem is None, summary if problem is None else f"{problem}; {summary}"
+
+    def _run_for_system(self, name: str) -> str | None:
         doing, done = _ACTIVITIES[name]
         before = self.status.without_nodes.activity
         self.status.set_activity(doing)
@@ -51,9 +65,7 @@ class Commands:
         }
         problem = actions[name](self.supervisor.desired.serial)
         self.status.set_activity(done if problem is None else before)
-        if problem is not None:
-            return False, f"{problem}; {self.status.snapshot().summary}"
-        return True, self.status.snapshot().summary
+        return problem
 
     # The actions move no node that has been moved externally since the serial number ``since``.
 
@@ -86,6 +98,33 @@ class Commands:
         goals = dict.fromkeys(self.node_set.nodes, PrimaryState.UNCONFIGURED)
         return self._lower(goals, since, "the system is reset") or self._recreate(since)
 
+    def _restart(self, full_names: Collection[str], since: int) -> str | None:
+        """Restart nodes, with the nodes that depend on them inactive meanwhile.
+
+        A node that was shut down, or not brought up, is started.
+        """
+        names = [name for name, node in self.node_set.nodes.items() if node.full_name in full_names]
+        for name in names:
+            if self.node_set.is_lost(name):
+                return f"{self.node_set.nodes[name].full_name} hangs and cannot be restarted"
+        for failure in self.supervisor.take_down(names, "restart requested"):
+            name = failure.step.node
+            if name in names and self.node_set.nodes[name].state not in _DOWN:
+                return str(failure)
+        goals = self._start_goals()
+        started = {
+            name: goals[name]
+            for name in names
+            if self.supervisor.desired.goals[name] is PrimaryState.UNCONFIGURED
+        }
+        self.supervisor.release(names)
+        self.supervisor.set_goals(started, since)
+        problem = self._recreate(since, names)
+        if problem is None:
+            failures = self.supervisor.reconcile("restart requested")
+            problem = str(failures[0]) if failures else None
+        return problem or self._unreached_of(names)
+
     def _bring_up(
         self, names: Collection[str], since: int, *, forget_failures: bool = False
     ) -> str | None:
@@ -113,12 +152,20 @@ class Commands:
                 return f"{node.full_name} is {node.state} and cannot be moved"
         return None
 
+    def _unreached_of(self, names: Collection[str]) -> str | None:
+        """Name a restarted node that has not reached its goal, as one it depends on is down."""
+        desired = self.supervisor.desired
+        blocked = blocked_nodes(self.system, desired)
+        return self._unreached({name: desired.goals[name] for name in names if name not in blocked})
+
     def _start_goals(self) -> Mapping[str, PrimaryState]:
         return start_goals(self.system, PrimaryState.ACTIVE)
 
-    def _recreate(self, since: int) -> str | None:
-        """Create finalized nodes again; return why one cannot be created."""
+    def _recreate(self, since: int, names: Collection[str] | None = None) -> str | None:
+        """Create finalized nodes again, by default all; return why one cannot be created."""
         for name, node in tuple(self.node_set.nodes.items()):
+            if names is not None and name not in names:
+                continue
             problem = self.node_set.recreate(name, partial(self.supervisor.has_moved, name, since))
             if problem is not None:
                 return f"{node.full_name}: {problem}"

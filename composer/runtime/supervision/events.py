@@ -92,13 +92,15 @@ class Restarted:
 
 @dataclass(frozen=True, slots=True)
 class Commanded:
-    """A command for the whole system was requested externally."""
+    """A command was requested externally: for the whole system, or for ``nodes``."""
 
     elapsed_s: float
     command: str
+    nodes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        return f"{self.command} requested externally"
+        of = f" of {', '.join(self.nodes)}" if self.nodes else ""
+        return f"{self.command}{of} requested externally"
 
 
 @dataclass(frozen=True, slots=True)

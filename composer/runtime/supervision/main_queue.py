@@ -47,10 +47,14 @@ class LoopRecovered:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command for the system, see :mod:`.commands`. Call ``answer(success, message)`` once."""
+    """A command for the system, see :mod:`.commands`. Call ``answer(success, message)`` once.
+
+    ``nodes`` are the full names of the nodes that a restart is for.
+    """
 
     name: str
     answer: Callable[[bool, str], None]
+    nodes: tuple[str, ...] = ()
 
 
 NodeEvent: TypeAlias = Fault | NodeMoved | CallbackHanging | LoopRecovered

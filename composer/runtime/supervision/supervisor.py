@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -123,6 +123,24 @@ class Supervisor:
             reason = f"{step.transition} failed: bring-up timed out after {within_s:g} s"
         self._roll_back(before, since, step.full_name, reason)
         return f"{step.full_name}: {reason}"
+
+    def take_down(self, names: Iterable[str], cause: str) -> tuple[StepFailed, ...]:
+        """Take nodes down as if they had failed, for a restart, and return the failed steps.
+
+        The nodes that depend on them become inactive. The desired states do not change.
+        """
+        desired = self.desired
+        lowered = desired
+        for name in names:
+            lowered = lowered.fail(Fault(name, FaultKind.STEP, cause, lowered.serial))
+        plan = reconcile(self._system, lowered, self._node_set.states(), cause)
+        options = ExecutionOptions(best_effort=True, serial=desired.serial)
+        return self._plan_executor.execute(plan, options)
+
+    def release(self, names: Iterable[str]) -> None:
+        """Forget the failures of nodes and their scheduled restarts."""
+        for name in names:
+            self.shared.update(partial(DesiredState.release, node=name))
 
     def reconcile(self, cause: str) -> tuple[StepFailed, ...]:
         """Take every node to its desired state; failures on the way become faults."""

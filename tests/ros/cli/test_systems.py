@@ -197,7 +197,8 @@ def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
     assert refusal.startswith("compose: there is no running system 'robot'")
     assert "no system is running: start one with 'compose run'" in refusal
 
-    (log,) = robot.log.parent.iterdir()  # no command leaves an empty log of rcl
+    # No command leaves an empty log of rcl.
+    (log,) = (file for file in robot.log.parent.iterdir() if file.name != "compose")
     line = r"^\[20[-0-9]{8} [:0-9]{8}\.\d{3}\] \[INFO\] \[compose\] /fleet/planner active$"
     assert re.search(line, log.read_text(), re.MULTILINE)
 
@@ -219,6 +220,35 @@ def test_commands_to_a_whole_system(robot: Robot) -> None:
     output_of("param", "set", "/fleet/planner", "fault", "none")
     assert output_of("up", "robot") == "/fleet/robot: 2 of 3 nodes active\n"
     assert refused("up", "rowbot").splitlines()[1] == "  did you mean '/fleet/robot'?"
+
+
+def test_nodes_are_restarted_in_order_with_their_dependents(robot: Robot) -> None:
+    before = output_of("logs", "--system", "robot", "--json").count("\n")
+    assert output_of("restart", "planner") == ("/fleet/planner: restarted (2 of 3 nodes active)\n")
+    entries = output_of("logs", "--system", "robot", "--json").splitlines()[before:]
+    assert [json.loads(entry)["message"] for entry in entries] == [
+        "restart of /fleet/planner requested externally",
+        "/fleet/motor inactive",
+        "/fleet/planner inactive",
+        "/fleet/planner unconfigured",
+        "/fleet/planner inactive",
+        "/fleet/planner active",
+        "go",
+        "/fleet/motor active",
+    ]
+    output_of("lifecycle", "set", "planner", "shutdown")
+    assert robot.states()["/fleet/planner"] == "finalized"
+    assert output_of("restart", "*/planner", "camera") == (
+        "/fleet/planner, /fleet/camera: restarted (2 of 3 nodes active)\n"
+    )
+    assert robot.states()["/fleet/motor"] == "active"
+    assert robot.states()["/fleet/camera"] == "inactive"
+    output_of("param", "set", "planner", "fault", "configure")
+    refusal = refused("restart", "planner")
+    assert "/fleet/planner: the restart failed: /fleet/planner: configure failed: " in refusal
+    assert "no map" in output_of("logs", "planner", "--level", "error")
+    assert "did you mean '/fleet/planner'?" in refused("restart", "planer")
+    assert "no line of" not in output_of("logs", "-n", 3, "motor", "--since", "10m")
 
 
 def test_lifecycle_set_with_several_nodes_patterns_and_systems(robot: Robot) -> None:

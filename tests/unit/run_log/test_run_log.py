@@ -109,7 +109,7 @@ def test_runs_are_found_by_system_in_order_and_the_oldest_removed(tmp_path: Path
     kept.touch()
     started = RunFolder(tmp_path, "/pipeline")
     runs = [run for run in find_runs(tmp_path, "pipeline") if run.system == "/pipeline"]
-    assert len(runs) == MAX_RUNS + 1  # and the one with a file of somebody else
+    assert len(runs) == MAX_RUNS + 1  # and the one that holds another file
     assert runs[0].folder == kept.parent
     assert runs[-1].folder == started.path
     assert runs[-1].pid == str(os.getpid())
@@ -201,5 +201,5 @@ def test_times_and_durations_are_understood(text: str, before: timedelta) -> Non
 
 
 @pytest.mark.parametrize("text", ["", "10", "m", "10 m", "yesterday", "1e999d", "9" * 400 + "d"])
-def test_other_texts_are_no_times(text: str) -> None:
+def test_other_texts_are_refused(text: str) -> None:
     assert parse_since(text, NOW) is None
