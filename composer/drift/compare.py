@@ -68,7 +68,7 @@ def _missing(node: Node, others: Sequence[ObservedNode]) -> Drift:
     by_last_part = {name.rpartition("/")[2]: name for name in names}
     close = nearest(node.full_name, names)
     if close is None:
-        match = nearest(node.name.value, by_last_part)
+        match = nearest(node.ros_name.value, by_last_part)
         close = by_last_part[match] if match is not None else None
     hint = f"'{close}' exists: did you mean that?" if close is not None else ""
     return Drift(DriftKind.MISSING_NODE, node.full_name, hint=hint, span=node.name.span)

@@ -113,11 +113,15 @@ class UnmatchedParameters:
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One node of a system, merged from its type (where it has one) and its own entry."""
+    """One node of a system, merged from its type (where it has one) and its own entry.
+
+    ``name`` is its key in the system, ``own_name`` its name in ROS if that differs.
+    """
 
     name: Located[str]
     namespace: Located[str]  # absolute
     span: Span = field(compare=False)
+    own_name: Located[str] | None = None
     type_name: Located[str] | None = None
     type_found: bool = True
     type_files: tuple[Path, ...] = field(default=(), compare=False)  # its own and its base types'
@@ -142,9 +146,14 @@ class Node:
         object.__setattr__(self, "_ports", _by_name(self.ports))
 
     @property
+    def ros_name(self) -> Located[str]:
+        """The name of the node in ROS, without its namespace."""
+        return self.name if self.own_name is None else self.own_name
+
+    @property
     def full_name(self) -> str:
         """The full name of the node in ROS."""
-        return f"{self.namespace.value.rstrip('/')}/{self.name.value}"
+        return f"{self.namespace.value.rstrip('/')}/{self.ros_name.value}"
 
     def port(self, name: str) -> Port | None:
         """Return the port called ``name``, or None."""

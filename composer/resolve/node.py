@@ -71,10 +71,12 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
     made = _inline(tree, context) if type_entry is None else _typed(type_entry, tree, context)
     declared = made.declaration
     namespace = node_namespace(tree.get("namespace"), context.namespace)
+    own_name = text(tree.get("name"))
+    ros_name = entry.name if own_name is None else own_name.value
     known = frozenset(parameter.name.value for parameter in declared.parameters)
     has_use_sim_time = type_entry is None and USE_SIM_TIME in known
     given = {} if has_use_sim_time else {item.name: item for item in context.use_sim_time}
-    given |= context.parameter_files.given(join(namespace.value, entry.name), known)
+    given |= context.parameter_files.given(join(namespace.value, ros_name), known)
     if type_entry is not None:
         given |= {item.name: item for item in entries(tree.get("parameters"))}
     given |= context.overrides.by_node.get(entry.name, {})
@@ -86,6 +88,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
     return Node(
         name=key(entry),
         namespace=namespace,
+        own_name=own_name,
         span=entry.key.span,
         type_name=text_or_opaque(type_entry.value, type_entry.key.span) if type_entry else None,
         type_found=made.type_found,
@@ -94,7 +97,10 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         behavior=declared.behavior,
         parameters=parameters,
         ports=place_ports(
-            declared.ports, entry.name, namespace.value, remappings, context.port_connections
+            declared.ports,
+            NodeNames(entry.name, ros_name, namespace.value),
+            remappings,
+            context.port_connections,
         ),
         timers=declared.timers,
         state=declared.state,
@@ -120,10 +126,18 @@ def node_namespace(tree: Tree | None, system: Located[str]) -> Located[str]:
     return own if is_opaque(own.value) else own.map(lambda name: join(system.value, name))
 
 
+@dataclass(frozen=True, slots=True)
+class NodeNames:
+    """The key of a node in its system, its name in ROS, and its absolute namespace."""
+
+    key: str
+    ros_name: str
+    namespace: str
+
+
 def place_ports(
     ports: Iterable[Port],
-    name: str,
-    namespace: str,
+    names: NodeNames,
     remappings: Iterable[Remapping],
     port_connections: PortConnections,
 ) -> tuple[Port, ...]:
@@ -134,13 +148,17 @@ def place_ports(
     """
 
     def expanded(ros_name: str) -> str:
-        return ros_name if is_opaque(ros_name) else expand_name(ros_name, name, namespace)
+        return (
+            ros_name
+            if is_opaque(ros_name)
+            else expand_name(ros_name, names.ros_name, names.namespace)
+        )
 
     renamed: dict[str, str] = {}
     for remapping in remappings:
         renamed.setdefault(expanded(remapping.source.value), expanded(remapping.target.value))
     return tuple(
-        _place_port(port, port_connections.get((name, port.name.value), ()), expanded, renamed)
+        _place_port(port, port_connections.get((names.key, port.name.value), ()), expanded, renamed)
         for port in ports
     )
 

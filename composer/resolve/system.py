@@ -17,7 +17,7 @@ from composer.model import (
 from composer.names import join
 from composer.resolve.connections import read_chains, read_connections
 from composer.resolve.declaration import declare
-from composer.resolve.node import SystemContext, place_ports, resolve_node, state
+from composer.resolve.node import NodeNames, SystemContext, place_ports, resolve_node, state
 from composer.resolve.node_options import read_introspection, read_supervision
 from composer.resolve.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides
@@ -118,7 +118,9 @@ def resolve_node_type(
         description=declared.description,
         behavior=declared.behavior,
         parameters=parameters,
-        ports=place_ports(declared.ports, name.value, namespace.value, (), {}),
+        ports=place_ports(
+            declared.ports, NodeNames(name.value, name.value, namespace.value), (), {}
+        ),
         timers=declared.timers,
         state=declared.state,
         reactions=declared.reactions,

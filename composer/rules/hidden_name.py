@@ -52,7 +52,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 def _names(context: Context) -> Iterator[tuple[str, Located[str]]]:
     for node in context.system.nodes:
-        yield "node", node.name
+        yield "node", node.ros_name
         for port in node.ports:
             yield port.kind.channel.value, port.ros_name
     for connection in context.system.connections:

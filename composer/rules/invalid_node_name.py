@@ -35,9 +35,9 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the name of every node."""
-    names = {node.name.value for node in context.system.nodes}
+    names = {node.ros_name.value for node in context.system.nodes}
     for node in context.system.nodes:
-        name = node.name
+        name = node.ros_name
         problem = node_name_problem(name.value)
         if problem is not None and not is_unresolved(name.value):
             yield Diagnostic(

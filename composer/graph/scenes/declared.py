@@ -61,7 +61,7 @@ def _scene_node(
 ) -> SceneNode:
     rates_hz = publishing_rates_hz(node)
     return SceneNode(
-        name=node.name.value,
+        name=node.ros_name.value,
         full_name=node.full_name,
         namespace=node.namespace.value,
         note=_note(node, system, several),
@@ -84,7 +84,7 @@ def _with_duplicate(scene_node: SceneNode) -> SceneNode:
 def _note(node: Node, system: System, several: bool) -> str:
     """Return the note of a node: its type if it differs from its name, and its system."""
     type_name = node.type_name.value if node.type_name is not None else ""
-    labels = type_name if type_name != node.name.value else ""
+    labels = type_name if type_name != node.ros_name.value else ""
     return " · ".join(filter(None, (labels, system.name.value if several else "")))
 
 

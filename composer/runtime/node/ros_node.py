@@ -36,7 +36,7 @@ def make_ros_node(model: Node) -> RosNode:
     if not offers.type_description:
         overrides.append(Parameter("start_type_description_service", value=False))
     return kind(
-        model.name.value,
+        model.ros_name.value,
         namespace=model.namespace.value,
         use_global_arguments=False,
         enable_rosout=False,

@@ -37,7 +37,7 @@ nodes:
     parameters: {fault: {type: string, default: ""}}
     publishers: {plan: {type: std_msgs/msg/String, qos: command, external: true}}
     timers: {tick: {rate_hz: 20, publish: {plan: {data: "{count} steps"}}}}
-  camera: {lifecycle: {autostart: inactive}, on_activate: {log: go}}
+  webcam: {name: camera, lifecycle: {autostart: inactive}, on_activate: {log: go}}
 """
 PLANNER = """
 import time

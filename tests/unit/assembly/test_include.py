@@ -414,3 +414,31 @@ def test_one_cause_is_reported_once(tmp_path: Path, text: str) -> None:
     (tmp_path / "whole.yaml").write_text(f"system: whole\ninclude:\n{whole}")
     [diagnostic] = load(tmp_path / "whole.yaml").diagnostics
     assert diagnostic.rule == alone.rule
+
+
+def test_a_prefix_changes_keys_and_not_the_names_in_ros(tmp_path: Path) -> None:
+    camera = """\
+system: camera
+nodes:
+  driver: {name: camera_driver, on_activate: {log: go}}
+  viewer: {lifecycle: {depends_on: [driver]}, on_activate: {log: go}}
+"""
+    project(
+        tmp_path,
+        camera=camera,
+        robot="""\
+system: robot
+include:
+  - {file: camera.yaml, prefix: left_, namespace: left}
+  - {file: camera.yaml, prefix: right_, namespace: right}
+""",
+    )
+    system = load(tmp_path / "robot.yaml").system
+    assert system is not None
+    assert {node.name.value: node.full_name for node in system.nodes} == {
+        "left_driver": "/left/camera_driver",
+        "left_viewer": "/left/left_viewer",
+        "right_driver": "/right/camera_driver",
+        "right_viewer": "/right/right_viewer",
+    }
+    assert system.nodes[1].depends_on[0].node.value == "left_driver"

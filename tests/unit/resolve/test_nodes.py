@@ -344,3 +344,40 @@ def test_a_mistake_in_an_argument_is_reported_at_every_argument(tmp_path: Path) 
     )
     assert [diagnostic.primary.line for diagnostic in diagnostics] == [3, 4, 5, 6]
     assert {diagnostic.primary.file.path for diagnostic in diagnostics} == {"robot.yaml"}
+
+
+def test_a_node_may_have_another_name_in_ros(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(
+        "/front/camera: {ros__parameters: {rate_hz: 5.0}}\n"
+        "/front_camera: {ros__parameters: {rate_hz: 1.0}}\n"
+    )
+    system, diagnostics = resolve_text(
+        """\
+        system: robot
+        parameter_files: [robot.yaml]
+        nodes:
+          front_camera:
+            name: camera
+            namespace: front
+            parameters: {rate_hz: {type: double, default: 2.0}}
+            publishers:
+              image: {type: sensor_msgs/msg/Image, topic: ~/image}
+              info: {type: sensor_msgs/msg/CameraInfo}
+          viewer:
+            lifecycle: {depends_on: [front_camera]}
+            subscriptions: {image: {type: sensor_msgs/msg/Image}}
+        connections:
+          - {topic: /image, from: front_camera.image, to: viewer.image}
+          - {topic: /info, from: front_camera.info}
+        """,
+        tmp_path,
+    )
+    assert diagnostics == []
+    camera, _ = system.nodes
+    assert camera.name.value == "front_camera"
+    assert camera.full_name == "/front/camera"
+    assert camera.ros_name.span.line == 5
+    assert [port.full_name for port in camera.ports] == ["/image", "/info"]
+    assert camera.initial_parameters == {"rate_hz": 5.0}
+    (unmatched,) = system.unmatched_parameters
+    assert unmatched.section.value == "/front_camera"
