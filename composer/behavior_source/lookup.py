@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import field
 from pathlib import Path
 
 from composer.behavior_source.modules import (
     Unreadable,
     is_compiled,
+    local_module_file,
     module_file,
     relative_module_file,
 )
@@ -42,8 +45,8 @@ class BehaviorSource:
     ``complete`` is true if ``methods`` contains all methods; only then can one be missing.
     ``problem`` is the reason why a module that exists cannot be read, ``problem_span`` its location
     in the module. ``classes`` are the class and its bases, nearest first, each with its module;
-    bases that cannot be found are left out. ``own_modules`` are the files that were read for them
-    and that belong to the project.
+    bases that cannot be found are left out. ``own_modules`` are the files of the project that were
+    read: those of the classes, and the modules that they import.
     """
 
     reference: BehaviorReference
@@ -96,6 +99,7 @@ def find_behavior(reference: BehaviorReference) -> BehaviorSource:
     methods: dict[str, Method] = {}
     complete = True
     classes = tuple(reader.with_bases(*start))
+    reader.read_helpers(module)
     for found in classes:
         complete = complete and found is not None and not found[1].dynamic
         for method in found[1].methods if found is not None else ():
@@ -137,6 +141,41 @@ class _Reader:
         """Return whether a file belongs to the project."""
         path = module.path
         return self.project.holds(path) and not _INSTALLED.intersection(path.parts)
+
+    def read_helpers(self, start: Module) -> None:
+        """Read the modules of the project that ``start`` imports, and those that they import."""
+        pending = [start, *self.modules.values()]
+        seen: set[Path] = set()
+        while pending:
+            module = pending.pop()
+            if module.path in seen or not self.is_own(module):
+                continue
+            seen.add(module.path)
+            for path in dict.fromkeys(self._helpers_of(module)):
+                try:
+                    pending.append(self.module(path))
+                except Unreadable:  # the rule of imports reports what has no other problem
+                    continue
+
+    def _helpers_of(self, module: Module) -> Iterator[Path]:
+        home = module.path.parent
+        for imported in module.imports.values():
+            names = [imported.module, f"{imported.module}.{imported.name}".strip(".")]
+            for name in names if imported.name else names[:1]:
+                if imported.level:
+                    path = relative_module_file(name, imported.level, module.path)
+                    if path is not None and self.project.holds(path):
+                        yield path
+                elif name.partition(".")[0] not in sys.stdlib_module_names:
+                    yield from self._local_files(name, home)
+
+    def _local_files(self, name: str, home: Path) -> Iterator[Path]:
+        for folder in dict.fromkeys((home, self.folder)):
+            with suppress(Unreadable):
+                path = local_module_file(name, folder, self.project)
+                if path is not None:
+                    yield path
+                    return
 
     def with_bases(self, module: Module, start: Class) -> Iterator[_ClassInModule | None]:
         """Yield a class and all its bases, nearest first; None for a base that cannot be found."""

@@ -41,12 +41,21 @@ def module_file(module: str, folder: Path, project: Project) -> Path | None:
     parts = module.split(".")
     if not all(part.isidentifier() for part in parts):
         return None
+    return local_module_file(module, folder, project) or _installed(parts)
+
+
+def local_module_file(module: str, folder: Path, project: Project) -> Path | None:
+    """Return the file of ``module`` next to the YAML file or among the node types, or None.
+
+    Raises Unreadable as :func:`module_file`.
+    """
+    parts = module.split(".")
     for base in dict.fromkeys((folder, *project.node_folders)):
         file = base.joinpath(*parts).with_suffix(".py")  # the one that the runtime loads
         found = file if _exists(file) else module_below(base, parts)
         if found is not None:
             return _checked(found, project)
-    return _installed(parts)
+    return None
 
 
 def is_compiled(module: str) -> bool:

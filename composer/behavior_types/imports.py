@@ -75,6 +75,7 @@ class _Imports:
     #: The projects of the folder of the file and of ``folder``.
     projects: dict[Path, Project]
     _files: dict[str, Path | None] = field(default_factory=dict)
+    _unreadable: dict[str, str] = field(default_factory=dict)
     _known: dict[str, frozenset[str] | None] = field(default_factory=dict)
 
     def imported_from(self, node: ast.ImportFrom) -> Iterator[tuple[CodeProblem, str | None]]:
@@ -106,6 +107,8 @@ class _Imports:
         top, _, rest = name.partition(".")
         if self._local(name) is not None:
             return None
+        if name in self._unreadable:
+            return _Missing(f"module '{name}' {self._unreadable[name]}", part=name)
         if top == "composer":
             return _of_composer(name)
         if top in self.interfaces.packages():
@@ -148,11 +151,15 @@ class _Imports:
         return self._files[name]
 
     def _find_local(self, name: str) -> Path | None:
+        top = name.partition(".")[0]
+        if is_standard(top) or top == "composer":
+            return None
         for home, project in self.projects.items():
             try:
                 found = module_file(name, home, project)
-            except Unreadable:
-                return self.module.path
+            except Unreadable as error:
+                self._unreadable[name] = str(error)
+                return None
             if found is not None and _is_in_project(found, home, project):
                 return found
         return None

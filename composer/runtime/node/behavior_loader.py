@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
-import importlib.util
-import sys
-import threading
 from collections.abc import Callable, Mapping
 from functools import cache
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -17,14 +12,12 @@ from composer.behavior import CallCancelled
 from composer.model import BehaviorReference
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Future
-from composer.runtime.executors.stacks import calls_user_code, interruptible
+from composer.runtime.executors.stacks import interruptible
 from composer.runtime.executors.tasks import sleep
+from composer.runtime.node.behavior_modules import import_module
 
 #: A method of a behavior.
 Method = Callable[..., Any]
-
-#: Held during imports: another loop must not see a module that is only half executed.
-_IMPORT_LOCK = threading.RLock()
 
 
 class BehaviorLoadError(Exception):
@@ -55,10 +48,10 @@ def method(behavior: object | None, name: str) -> Method | None:
 
 def _module(reference: BehaviorReference) -> ModuleType:
     parts = reference.module.split(".")
-    for folder in (reference.folder, *reference.node_folders):
-        path = folder.joinpath(*parts).with_suffix(".py")
-        if path.is_file():
-            return _module_of_file(path)
+    folders = (reference.folder, *reference.node_folders)
+    for folder in folders:
+        if folder.joinpath(*parts).with_suffix(".py").is_file():
+            return import_module(reference.module, folder, folders)
     try:
         return importlib.import_module(reference.module)
     except ModuleNotFoundError as error:
@@ -66,29 +59,6 @@ def _module(reference: BehaviorReference) -> ModuleType:
             f"behavior '{reference.text}': there is no '{parts[-1]}.py' in {reference.folder} "
             "or among the project's node types, and no such installed module"
         ) from error
-
-
-def _module_of_file(path: Path) -> ModuleType:
-    """Import a file under a unique name: two folders may each have a ``planner.py``."""
-    digest = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
-    name = f"_composer_behavior_{digest}_{path.stem}"
-    with _IMPORT_LOCK:
-        return sys.modules.get(name) or _import_file(name, path)
-
-
-@calls_user_code
-def _import_file(name: str, path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise BehaviorLoadError(f"{path} is not a Python file")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses and pickle look up their module there
-    try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
 
 
 class Named:

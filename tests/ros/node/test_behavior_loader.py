@@ -50,3 +50,79 @@ def test_a_behavior_does_not_shadow_the_standard_library(tmp_path: Path) -> None
     assert found.__name__ == "Light"
     assert sys.modules["signal"] is signal
     assert sys.path == before
+
+
+HELPED = """\
+import helper
+import tools.geometry
+from helper import text as shown
+from tools import geometry as g
+from tools.units import METERS
+
+
+class Planner:
+    def on_tick(self):
+        from late import LATE
+
+        return helper.NAME, tools.geometry.AREA, g.AREA, METERS, shown(), LATE, helper.signal
+"""
+
+
+@pytest.mark.parametrize("name", ["first", "second"])
+def test_modules_next_to_a_behavior_are_imported_for_it_alone(name: str, tmp_path: Path) -> None:
+    for folder in ("first", "second"):
+        files = {
+            "planner.py": HELPED,
+            "helper.py": f"import signal\nimport late\nNAME = '{folder}'\ntext = lambda: NAME\n",
+            "late.py": f"LATE = '{folder}'\n",
+            "signal.py": "raise ImportError('not the one of the standard library')\n",
+            "tools/__init__.py": "",
+            "tools/geometry.py": "from .units import METERS\nAREA = METERS * 2\n",
+            "tools/units.py": "METERS = 3\n",
+        }
+        for path, text in files.items():
+            file = tmp_path / folder / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text, encoding="utf-8")
+    span = Span(SourceFile("system.yaml", ""), 1, 1, 1)
+    before = list(sys.path)
+    reference = BehaviorReference(Located("planner:Planner", span), tmp_path / name)
+    planner = behavior_class(reference)()
+    assert planner.on_tick() == (name, 6, 6, 3, name, name, signal)
+    assert sys.path == before
+    assert {"helper", "late", "tools", "planner"}.isdisjoint(sys.modules)
+
+
+def test_a_behavior_and_its_helpers_share_the_modules_of_the_node_types(tmp_path: Path) -> None:
+    nodes = tmp_path / "nodes"
+    (nodes / "drivers").mkdir(parents=True)
+    (nodes / "drivers" / "__init__.py").touch()
+    (tmp_path / "systems").mkdir()
+    (nodes / "drivers" / "camera.py").write_text(
+        "from base import Base\nimport lens\nclass Camera(Base):\n    LENS = lens\n"
+    )
+    (nodes / "drivers" / "lens.py").write_text("from drivers import camera\n")
+    (nodes / "base.py").write_text("class Base:\n    pass\n")
+    (tmp_path / "systems" / "own.py").write_text(
+        "from base import Base\nclass Own(Base):\n    pass\n"
+    )
+    span = Span(SourceFile("system.yaml", ""), 1, 1, 1)
+
+    def load(text: str) -> type[Any]:
+        return behavior_class(
+            BehaviorReference(Located(text, span), tmp_path / "systems", (nodes,))
+        )
+
+    camera, own = load("drivers.camera:Camera"), load("own:Own")
+    assert camera.__mro__[1] is own.__mro__[1]
+    assert camera.LENS.camera.Camera is camera
+
+
+def test_a_module_that_cannot_be_imported_is_named(tmp_path: Path) -> None:
+    (tmp_path / "planner.py").write_text("import nothing_of_that_name\nclass Planner: pass\n")
+    span = Span(SourceFile("system.yaml", ""), 1, 1, 1)
+    reference = BehaviorReference(Located("planner:Planner", span), tmp_path)
+    with pytest.raises(ModuleNotFoundError, match="No module named 'nothing_of_that_name'"):
+        behavior_class(reference)
+    (tmp_path / "planner.py").write_text("class Planner: pass\n")
+    assert behavior_class(reference).__name__ == "Planner"

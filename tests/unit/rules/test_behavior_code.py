@@ -18,7 +18,7 @@ SYSTEM = """\
 system: demo
 nodes:
   robot:
-    behavior: code:Code
+    behavior: robot_code:Code
     parameters:
       speed: {type: double, default: 1.0}
       names: {type: string_array, default: [a]}
@@ -99,7 +99,7 @@ def found(place: str, statement: str, folder: Path) -> list[Diagnostic]:
         text = statement if other == place else "pass"
         indentation = "    " if other == "function" else "        "
         code = code.replace(f"{{{other}}}", text.replace("\n", f"\n{indentation}"))
-    (folder / "code.py").write_text(code, encoding="utf-8")
+    (folder / "robot_code.py").write_text(code, encoding="utf-8")
     return diagnostics_in(SYSTEM, folder)
 
 
@@ -192,7 +192,7 @@ MISTAKES = [
     ("odometry", "from std_msgs.msg import Strng", "unknown-import", "Strng", "'String'"),
     ("odometry", "from std_msgs.srv import Trigger", "unknown-import", "Trigger", None),
     ("odometry", "from std_msgs.mgs import String", "unknown-import", "mgs", "'msg'"),
-    ("odometry", "from code import Cod", "unknown-import", "Cod", "'Code'"),
+    ("odometry", "from robot_code import Cod", "unknown-import", "Cod", "'Code'"),
     ("odometry", "from .nowhere import x", "unknown-import", ".nowhere", None),
     ("odometry", "import qwertzuiop", "module-not-installed", "qwertzuiop", None),
     ("odometry", "from composer.names import expand_name", "internal-import", None, None),
@@ -286,7 +286,7 @@ def test_the_annotation_of_a_handler_decides_in_it(tmp_path: Path) -> None:
         "    def on_reset(self, request, response):\n        return response\n\n"
         "    def on_drive(self, goal):\n        pass\n"
     )
-    (tmp_path / "code.py").write_text(code, encoding="utf-8")
+    (tmp_path / "robot_code.py").write_text(code, encoding="utf-8")
     [diagnostic] = diagnostics_in(system, tmp_path)
     assert diagnostic.rule.name == "handler-annotation"
     assert quoted(diagnostic) == "Odometry"
@@ -295,9 +295,9 @@ def test_the_annotation_of_a_handler_decides_in_it(tmp_path: Path) -> None:
 def test_two_nodes_with_one_class_report_it_once(tmp_path: Path) -> None:
     system = "system: demo\nnodes:\n"
     for name in ("left", "right"):
-        system += f"  {name}: {{behavior: code:Code, timers: {{tick: {{period_ms: 100}}}}}}\n"
+        system += f"  {name}: {{behavior: robot_code:Code, timers: {{tick: {{period_ms: 100}}}}}}\n"
     code = "class Code:\n    def on_tick(self):\n        self.publishers.text.publish(0)\n"
-    (tmp_path / "code.py").write_text(code, encoding="utf-8")
+    (tmp_path / "robot_code.py").write_text(code, encoding="utf-8")
     [diagnostic] = diagnostics_in(system, tmp_path)
     assert diagnostic.rule.name == "unknown-attribute"
 
@@ -328,9 +328,46 @@ def test_copies_of_a_node_are_checked_once(tmp_path: Path, monkeypatch: pytest.M
         return behavior_problems(node, *rest)
 
     monkeypatch.setattr(behavior_code, "behavior_problems", counted)
-    (tmp_path / "code.py").write_text("class Code:\n    def on_tick(self):\n        self.a\n")
-    entry = "behavior: code:Code, timers: {tick: {period_ms: 100}}"
+    (tmp_path / "robot_code.py").write_text("class Code:\n    def on_tick(self):\n        self.a\n")
+    entry = "behavior: robot_code:Code, timers: {tick: {period_ms: 100}}"
     system = f"system: a\nnodes:\n  a${{i}}: {{for_each: {{i: 20}}, {entry}}}\n"
     [diagnostic] = diagnostics_in(system, tmp_path)
     assert diagnostic.rule.name == "unknown-attribute"
     assert checked == ["a0"]
+
+
+def test_the_modules_that_a_behavior_imports_are_checked_as_well(tmp_path: Path) -> None:
+    files = {
+        "robot_code.py": "import helper\nfrom tools import units\nclass Code:\n    pass\n",
+        "helper.py": "from tools.units import METER\nfrom math import sqroot\n",
+        "tools/__init__.py": "",
+        "tools/units.py": "METERS = 3\ndef f():\n    return METRES\n",
+        "math.py": "def sqroot(): pass\n",  # does not hide the standard library
+        "unused.py": "import nothing\n",
+    }
+    for path, text in files.items():
+        file = tmp_path / path
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+    system = "system: s\nnodes:\n  n: {behavior: robot_code:Code, on_activate: {log: go}}\n"
+    found = [
+        (Path(item.primary.file.path).name, item.primary.line, item.rule.name, item.message)
+        for item in diagnostics_in(system, tmp_path)
+    ]
+    assert sorted(found) == [
+        ("helper.py", 1, "unknown-import", "module 'tools.units' has no 'METER'"),
+        ("helper.py", 2, "unknown-import", "module 'math' has no 'sqroot'"),
+        ("units.py", 3, "undefined-name", "name 'METRES' is not defined"),
+    ]
+
+
+def test_a_helper_out_of_the_project_is_reported(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere.py").write_text("A = 1\n")
+    project = tmp_path / "project"
+    project.mkdir()
+    (project / "composer.yaml").write_text("nodes: [.]\n")
+    (project / "helper.py").symlink_to(tmp_path / "elsewhere.py")
+    (project / "robot_code.py").write_text("import helper\nclass Code:\n    pass\n")
+    system = "system: s\nnodes:\n  n: {behavior: robot_code:Code, on_activate: {log: go}}\n"
+    (found,) = diagnostics_in(system, project)
+    assert found.message == "module 'helper' is a symbolic link out of the project"
