@@ -15,8 +15,8 @@ RULE = register(
         severity=Severity.ERROR,
         summary="Two nodes have the same name and namespace in ROS.",
         why=(
-            "ROS starts both, with a warning. Then their parameters and lifecycle services cannot "
-            "be told apart, and tools show one node or the other."
+            "ROS starts both, with a warning. Then requests to parameter and lifecycle services "
+            "reach either node, and tools show only one of them."
         ),
         bad="""\
 system: names

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
+
+from composer.fast_dataclass import dataclass
 
 _MICROSECOND_NS = 1000
 _SECOND_NS = 1_000_000_000

@@ -8,10 +8,10 @@ import os
 import re
 import socket
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from composer.fast_dataclass import dataclass
 from composer.run_log.rotation import log_files
 
 FOLDER = "compose"

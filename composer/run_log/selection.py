@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from fnmatch import fnmatchcase
 
+from composer.fast_dataclass import dataclass
 from composer.run_log.record import Record
 
 LEVELS = ("debug", "info", "warn", "error", "fatal")
