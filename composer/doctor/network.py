@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import fcntl
 import os
-import shutil
 import socket
 from collections.abc import Iterator
 from pathlib import Path
 
 from composer.doctor.result import CheckResult, note, ok, warning
-from composer.runtime.process.shared_memory import SHARED_MEMORY
+from composer.runtime.process.shared_memory import (
+    LARGE_SEGMENT_BYTES,
+    MEGABYTE,
+    MIN_FREE_BYTES,
+    SHARED_MEMORY,
+    free_bytes,
+)
 
 AREA = "network"
 #: The flags of net/if.h.
@@ -18,9 +23,6 @@ _UP, _LOOPBACK, _MULTICAST = 0x1, 0x8, 0x1000
 #: The multicast group of DDS discovery. See the DDS Interoperability Protocol, 9.6.1.4.
 _GROUP = "239.255.0.1"
 _PROBE_S = 0.5
-_MEGABYTE = 1_000_000
-#: A Fast DDS participant needs about 0.5 MB; large messages need their size in addition.
-_MIN_SHARED_MEMORY_BYTES = 16 * _MEGABYTE
 
 
 def check_network(
@@ -100,12 +102,14 @@ def _probe() -> bool:
 
 
 def _check_free_space(folder: Path) -> CheckResult:
-    free_bytes = shutil.disk_usage(folder).free
-    if free_bytes >= _MIN_SHARED_MEMORY_BYTES:
-        return ok(AREA, f"shared memory: {free_bytes / _MEGABYTE:.0f} MB free in {folder}")
+    free = free_bytes(folder)
+    if free >= MIN_FREE_BYTES:
+        return ok(AREA, f"shared memory: {free / MEGABYTE:.0f} MB free in {folder}")
     return warning(
         AREA,
-        f"shared memory: only {free_bytes / _MEGABYTE:.1f} MB free in {folder}",
+        f"shared memory: only {free / MEGABYTE:.1f} MB free in {folder}; a system that sends"
+        f" images or point clouds takes {LARGE_SEGMENT_BYTES // MEGABYTE} MB if"
+        f" {MIN_FREE_BYTES // MEGABYTE} MB are free",
         "increase it for the container (docker run --shm-size=1g), remove leftovers"
         " ('fastdds shm clean'), or set FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
     )

@@ -23,13 +23,14 @@ import math
 import os
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 
 import rclpy
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import try_shutdown
+from rclpy.utilities import get_rmw_implementation_identifier, try_shutdown
 
 from composer.model import LogLevel, Node, System
 from composer.model.dependencies import dependency_edges, in_dependency_order
@@ -41,10 +42,12 @@ from composer.runtime.node.node import NodeListener, RunningNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
 from composer.runtime.process.dds_profiles import use_large_system_profile
+from composer.runtime.process.dds_segment import segment_for_large_messages
 from composer.runtime.process.environment import ROS_ARGUMENTS, prepare_environment
 from composer.runtime.process.fast_exit import leave_ros_graph, supports_fast_exit
 from composer.runtime.process.instance_lock import already_running, hold_instance_lock
 from composer.runtime.process.signals import stop_signals
+from composer.runtime.ros.message_sizes import sends_large_messages
 from composer.runtime.supervision import events
 from composer.runtime.supervision.commands import Commands
 from composer.runtime.supervision.events import NodeSummary, Outcome, Report, Reporter
@@ -156,15 +159,25 @@ class Host:
         )
         with hold_instance_lock(namespace), signals:
             self._limit_start()
-            _start_ros()
             try:
-                self._run(namespace)
+                with self._segment():
+                    manager = self._join(namespace)
+                self._run(manager)
             finally:
                 if not self._has_left_graph:  # otherwise there is nothing left to shut down
                     try_shutdown()
         return self._outcome()
 
-    def _run(self, namespace: str) -> None:
+    def _segment(self) -> AbstractContextManager[None]:
+        """Return the block in which this process joins the ROS graph."""
+        if not sends_large_messages(self._system):
+            return nullcontext()
+        warn = partial(self._reporter.log, LogLevel.WARN, "composer")
+        return segment_for_large_messages(os.environ, get_rmw_implementation_identifier(), warn)
+
+    def _join(self, namespace: str) -> ManagerNode:
+        """Join the ROS graph, as the first node of a process does."""
+        _start_ros()
         callbacks = ManagerCallbacks(
             on_command=self._on_command,
             on_older_instance=partial(self._on_older_instance, namespace),
@@ -175,10 +188,12 @@ class Host:
             write_log=self._reporter.log,
         )
         use_sim_time = self._system.use_sim_time
-        try:  # the first node of a process joins the ROS graph
-            manager = ManagerNode(namespace, self._status, callbacks, use_sim_time=use_sim_time)
+        try:
+            return ManagerNode(namespace, self._status, callbacks, use_sim_time=use_sim_time)
         except rclpy_implementation.RCLError as error:
             raise start_refused(error) from error
+
+    def _run(self, manager: ManagerNode) -> None:
         try:
             if self._create(manager.process_context):
                 self._bring_up_and_supervise()

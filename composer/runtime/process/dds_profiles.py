@@ -8,7 +8,7 @@ second. See docs/decisions/0024-fast-dds-profile.md and
 
 from __future__ import annotations
 
-from collections.abc import MutableMapping
+from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 
 from composer.ownership import TrustedUsers
@@ -46,6 +46,11 @@ def use_discovery_profile(environment: MutableMapping[str, str], folder: Path = 
     if user_file.exists() and not environment.get(_SKIP_USER_FILE_VARIABLE):
         return
     environment[_VARIABLE] = str(_PROFILE)
+
+
+def is_own_profile(environment: Mapping[str, str]) -> bool:
+    """Say whether a system uses one of our profiles: the user has not configured Fast DDS."""
+    return environment.get(_VARIABLE) in (str(_PROFILE), str(_PROFILE_FOR_LARGE_SYSTEMS))
 
 
 def use_command_profile(environment: MutableMapping[str, str]) -> None:

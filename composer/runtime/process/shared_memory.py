@@ -1,4 +1,4 @@
-"""Removes shared memory of killed processes that would hang new ones.
+"""Shared memory: how much is free; removes what killed processes left and would hang new ones.
 
 Fast DDS opens or creates a shared memory segment for each port. If a process is killed between
 creating and filling it, every later participant that opens it waits in its constructor forever,
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import stat
 import time
 from pathlib import Path
@@ -20,6 +21,11 @@ from composer.runtime.process.dds_participants import ports_of_domain
 
 #: Where Linux keeps it; shm_open(3).
 SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - nothing is written there
+MEGABYTE = 1024 * 1024
+#: The segment of a process that sends large messages; otherwise it is 0.5 MB.
+LARGE_SEGMENT_BYTES = 16 * MEGABYTE
+#: Such a process needs that much: its other segments, and those of other processes, take the rest.
+MIN_FREE_BYTES = 2 * LARGE_SEGMENT_BYTES
 _PORT = re.compile(r"fastrtps_port(\d{1,9})", re.ASCII)
 #: As shm_open(3) opens it for a participant, and without waiting for the other end of a FIFO.
 _OPEN = os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -52,6 +58,11 @@ def remove_incomplete_ports(domain_id: int, folder: Path = SHARED_MEMORY) -> Non
             if not removable:
                 raise _refusal(path, _description(status))
             _remove(path)
+
+
+def free_bytes(folder: Path = SHARED_MEMORY) -> int:
+    """Return how much shared memory is free; 0 if there is none."""
+    return shutil.disk_usage(folder).free if folder.is_dir() else 0
 
 
 def _status(path: Path) -> os.stat_result | None:
