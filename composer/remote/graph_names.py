@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
 from composer.names import is_hidden
 from composer.remote.name_matching import find_node, full_name, not_found_error
 from composer.remote.session import Deadline, RosError, Session
-from composer.runtime.process.graph_socket import NameAndTypes, visible
+from composer.runtime.process.query_socket import NameAndTypes, visible
+from composer.runtime.ros.node_info import NodeInfo, node_info
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True)
-class NodeInfo:
-    """The endpoints of a node, by name."""
-
-    name: str
-    subscriptions: tuple[NameAndTypes, ...]
-    publishers: tuple[NameAndTypes, ...]
-    services: tuple[NameAndTypes, ...]
-    clients: tuple[NameAndTypes, ...]
-    action_servers: tuple[NameAndTypes, ...]
-    action_clients: tuple[NameAndTypes, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +46,7 @@ class GraphNames:
     def node(self, name: str, *, hidden: bool = False) -> NodeInfo:
         """Return the endpoints of a node. Raises NotFoundError."""
         full_name = self.find_node(name)
-        return self._settled(lambda: self._node_info(full_name, hidden))
+        return self._settled(lambda: node_info(self._graph, full_name, hidden=hidden))
 
     def action(self, name: str) -> ActionInfo:
         """Return the servers and clients of an action. Raises NotFoundError."""
@@ -102,24 +90,10 @@ class GraphNames:
     def _nodes(self) -> tuple[str, ...]:
         return tuple(name for name, _ in self._graph.names("node"))
 
-    def _node_info(self, full_name: str, hidden: bool) -> NodeInfo:
-        namespace, _, name = full_name.rpartition("/")
-        where = (name, namespace or "/")
-        graph = self._graph
-        queries = (
-            graph.subscriptions_of,
-            graph.publishers_of,
-            graph.services_of,
-            graph.clients_of,
-            graph.action_servers_of,
-            graph.action_clients_of,
-        )
-        return NodeInfo(full_name, *(_sorted(query(where), hidden) for query in queries))
-
     def _action_info(self, name: str, types: tuple[str, ...]) -> ActionInfo:
         servers, clients = [], []
         for node in self._nodes():
-            info = self._node_info(node, hidden=True)
+            info = node_info(self._graph, node, hidden=True)
             servers += [node for found, _ in info.action_servers if found == name]
             clients += [node for found, _ in info.action_clients if found == name]
         return ActionInfo(name, types, tuple(servers), tuple(clients))
@@ -130,7 +104,3 @@ def type_mismatch_hint(session: Session, kind: str, name: str, type_name: str) -
     known = dict(session.graph.names(kind)).get(name, ())
     others = [other for other in known if other != type_name]
     return f"other nodes use type {', '.join(others)}, not {type_name}" if others else None
-
-
-def _sorted(found: Iterable[NameAndTypes], hidden: bool) -> tuple[NameAndTypes, ...]:
-    return tuple(sorted(found if hidden else visible(found)))

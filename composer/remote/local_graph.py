@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from composer.runtime.process.graph_socket import NameAndTypes, read_graph, visible
 from composer.runtime.process.instance_lock import local_systems
+from composer.runtime.process.query_socket import GraphView, NameAndTypes, read_graph, visible
 
 #: Longer than a manager waits for its view to become complete.
-_RESPONSE_S = 0.6
+RESPONSE_S = 0.6
 
 
 def local_names(
@@ -16,11 +16,13 @@ def local_names(
 
     None if no system on this computer is certain about them.
     """
-    limit_s = min(_RESPONSE_S, timeout_s)
-    if limit_s <= 0.0:
-        return None
-    views = (read_graph(system, limit_s) for system in local_systems())
-    view = next((view for view in views if view is not None), None)
+    view = local_view(timeout_s)
     if view is None:
         return None
     return view[kind] if hidden else visible(view[kind])
+
+
+def local_view(timeout_s: float) -> GraphView | None:
+    """Return the whole graph; None if no system on this computer is certain about it."""
+    views = (read_graph(system, min(RESPONSE_S, timeout_s)) for system in local_systems())
+    return next((view for view in views if view is not None), None)

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import Parameter as ParameterMessage
-from rcl_interfaces.msg import ParameterDescriptor, ParameterType, ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
     ListParameters,
     SetParameters,
 )
-from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter import Parameter
 
 from composer.diagnostics import suggestion
 from composer.remote.graph_names import GraphNames
@@ -27,23 +25,12 @@ from composer.remote.requests import (
 )
 from composer.remote.session import Deadline, NoResponseError, RosError, Session
 from composer.runtime.ros.manager_protocol import full_parameter_name
+from composer.runtime.ros.parameter_description import ParameterDescription
+from composer.runtime.ros.parameter_values import NOT_SET, description, plain_value
 
 T = TypeVar("T")
 
-_NOT_SET = "not set"
 _LIST_SERVICE = "/list_parameters"
-_TYPES = {
-    ParameterType.PARAMETER_NOT_SET: _NOT_SET,
-    ParameterType.PARAMETER_BOOL: "bool",
-    ParameterType.PARAMETER_INTEGER: "integer",
-    ParameterType.PARAMETER_DOUBLE: "double",
-    ParameterType.PARAMETER_STRING: "string",
-    ParameterType.PARAMETER_BYTE_ARRAY: "byte_array",
-    ParameterType.PARAMETER_BOOL_ARRAY: "bool_array",
-    ParameterType.PARAMETER_INTEGER_ARRAY: "integer_array",
-    ParameterType.PARAMETER_DOUBLE_ARRAY: "double_array",
-    ParameterType.PARAMETER_STRING_ARRAY: "string_array",
-}
 
 
 class UnknownParameterError(RosError):
@@ -56,20 +43,6 @@ class InvalidResponseError(RosError):
 
 class ParameterRejectedError(RosError):
     """The node rejected the value."""
-
-
-@dataclass(frozen=True, slots=True)
-class ParameterDescription:
-    """The description of a parameter. Bounds are None if there are none."""
-
-    name: str
-    type: str
-    description: str
-    constraints: str
-    read_only: bool
-    minimum: float | None
-    maximum: float | None
-    step: float | None
 
 
 class ParameterClient:
@@ -108,7 +81,7 @@ class ParameterClient:
         request = DescribeParameters.Request(names=self._qualified(requested))
         response = self._call(call_with_retries, DescribeParameters, "describe_parameters", request)
         return tuple(
-            _description(name, found)
+            description(name, found)
             for name, found in self._by_name(requested, response.descriptors)
         )
 
@@ -249,18 +222,10 @@ def _manager(session: Session, deadline: Deadline, node: str) -> str | None:
     return found or None
 
 
-def plain_value(value: ParameterValue) -> Any:
-    """Return the value as plain data; byte strings become numbers, unknown types None."""
-    found = parameter_value_to_python(value) if value.type in _TYPES else None
-    if isinstance(found, list):
-        return [item[0] if isinstance(item, bytes) else item for item in found]
-    return found
-
-
 def _message(name: str, value: Any, kind: str) -> ParameterMessage:
     """Return the parameter with its declared type. Raises ParameterRejectedError."""
     try:
-        if kind == _NOT_SET:
+        if kind == NOT_SET:
             return Parameter(name, value=value).to_parameter_msg()
         declared = Parameter.Type[kind.upper()]
         return Parameter(name, declared, _converted(value, kind)).to_parameter_msg()
@@ -280,17 +245,3 @@ def _converted(value: Any, kind: str) -> Any:
             return [bytes([item]) if type(item) is int else item for item in value]
         case _:
             return value
-
-
-def _description(name: str, found: ParameterDescriptor) -> ParameterDescription:
-    bounds = [*found.floating_point_range, *found.integer_range]
-    return ParameterDescription(
-        name=name,
-        type=_TYPES.get(found.type, f"unknown type {found.type}"),
-        description=found.description,
-        constraints=found.additional_constraints,
-        read_only=found.read_only,
-        minimum=bounds[0].from_value if bounds else None,
-        maximum=bounds[0].to_value if bounds else None,
-        step=(bounds[0].step or None) if bounds else None,
-    )

@@ -12,13 +12,13 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.model import PortKind
 from composer.names import is_hidden
-from composer.remote.parameters import plain_value
 from composer.remote.proxies import LIFECYCLE, PARAMETERS, Proxies
 from composer.remote.rate_sampling import RateMeter
 from composer.remote.requests import ServiceCaller
 from composer.remote.session import Deadline, Session
 from composer.runtime.ros.graph import RosGraph
 from composer.runtime.ros.manager_protocol import full_parameter_name
+from composer.runtime.ros.parameter_values import plain_value
 from composer.tree import Plain
 
 #: How long to wait for the responses of nodes; later ones count as unknown.

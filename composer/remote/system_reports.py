@@ -5,17 +5,16 @@ The messages may be those of another version, or of any node that publishes on t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import TypeVar
-
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
 
 from composer.report.display import visible
-from composer.runtime.metrics.diagnostics import finite, from_message
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
+from composer.runtime.metrics.numbers import finite
 
-F = TypeVar("F", CallbackFigures, ChainFigures)
+if TYPE_CHECKING:  # a report may also come from a query, without ROS
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 
 class InvalidReportError(Exception):
@@ -65,41 +64,33 @@ class SystemReport:
     callbacks_at_s: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class CallbackReport:
-    """The timings of callbacks and chains at ``at_s``, in seconds since 1970."""
-
-    callbacks: tuple[CallbackFigures, ...]
-    chains: tuple[ChainFigures, ...]
-    at_s: float
+#: The name, the message and the values of a diagnostic status, as plain data.
+Status: TypeAlias = tuple[str, str, Mapping[str, str]]
 
 
 def parse_state(name: str, message: DiagnosticArray) -> SystemReport:
     """Return the report of the system ``name``. Raises InvalidReportError."""
+    statuses = [(status.name, status.message, report_values(status)) for status in message.status]
+    return system_report(name, statuses)
+
+
+def system_report(name: str, statuses: Iterable[Status]) -> SystemReport:
+    """Return the report of the system ``name`` from its status and those of its nodes.
+
+    Raises InvalidReportError.
+    """
     try:
-        system, *nodes = message.status
-        values = report_values(system)
+        (_, text, values), *nodes = statuses
         return SystemReport(
             name=name,
             activity=values["activity"],
-            message=visible(system.message),
+            message=visible(text),
             host=values["host"],
             pid=values["pid"],
-            nodes=tuple(map(_node_report, nodes)),
+            nodes=tuple(_node_report(node, values) for node, _, values in nodes),
         )
-    except (ValueError, KeyError) as error:
-        raise _invalid(error) from error
-
-
-def parse_callbacks(message: DiagnosticArray) -> CallbackReport:
-    """Return the timings in a message of a manager. Raises InvalidReportError."""
-    try:
-        callbacks, chains = from_message(message)
     except (ValueError, KeyError, TypeError) as error:
-        raise _invalid(error) from error
-    stamp = message.header.stamp
-    at_s = float(stamp.sec + stamp.nanosec * 1e-9)
-    return CallbackReport(tuple(map(_visible, callbacks)), tuple(map(_visible, chains)), at_s)
+        raise invalid_report(error) from error
 
 
 def report_values(status: DiagnosticStatus) -> Mapping[str, str]:
@@ -109,20 +100,24 @@ def report_values(status: DiagnosticStatus) -> Mapping[str, str]:
 
 def reported_node(status: DiagnosticStatus) -> str:
     """Return the full name of the node that a status describes."""
-    return visible(status.name).partition(": ")[2]
+    return _node_name(status.name)
 
 
-def _invalid(error: Exception) -> InvalidReportError:
+def _node_name(status_name: str) -> str:
+    return visible(status_name).partition(": ")[2]
+
+
+def invalid_report(error: Exception) -> InvalidReportError:
+    """Return the error for a message without an expected value, or with an invalid one."""
     problem = "missing" if isinstance(error, KeyError) else "invalid"
     return InvalidReportError(
         f"not a report of this version of ros2-composer ({problem}: {error!s:.80})"
     )
 
 
-def _node_report(status: DiagnosticStatus) -> NodeReport:
-    values = report_values(status)
+def _node_report(status_name: str, values: Mapping[str, str]) -> NodeReport:
     return NodeReport(
-        node=reported_node(status),
+        node=_node_name(status_name),
         state=values["state"],
         desired=values["desired"],
         since_s=finite(values["since"]),
@@ -149,12 +144,3 @@ def _counts(text: str) -> dict[str, int]:
 def _pairs(text: str) -> dict[str, str]:
     """Parse values by name, such as ``/planner=active``."""
     return {name: value for name, _, value in (item.partition("=") for item in text.split())}
-
-
-def _visible(figures: F) -> F:
-    texts = {
-        field: visible(value)
-        for field in figures.__dataclass_fields__
-        if isinstance(value := getattr(figures, field), str)
-    }
-    return replace(figures, **texts)  # type: ignore[arg-type]  # all of them are strings

@@ -16,16 +16,11 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
+from composer.remote.callback_reports import CallbackReport, parse_callbacks
 from composer.remote.name_matching import NotFoundError, not_found_error
 from composer.remote.requests import call_once
 from composer.remote.session import Deadline, NoResponseError, Session
-from composer.remote.system_reports import (
-    CallbackReport,
-    InvalidReportError,
-    SystemReport,
-    parse_callbacks,
-    parse_state,
-)
+from composer.remote.system_reports import InvalidReportError, SystemReport, parse_state
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.ros.manager_protocol import (
     CALLBACKS_QOS,

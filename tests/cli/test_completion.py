@@ -23,8 +23,8 @@ from composer.cli.support.completion import (
     silent,
 )
 from composer.cli.support.system_arguments import complete_system
-from composer.runtime.process.graph_socket import GraphSocket, GraphView
 from composer.runtime.process.instance_lock import hold_instance_lock
+from composer.runtime.process.query_socket import GRAPH, GraphView, QuerySocket
 
 
 def complete(*words: str) -> list[str]:
@@ -65,7 +65,7 @@ def robot(
         "action": (("/navigate", ()), ("/navigate_back", ())),
     }
     with hold_instance_lock("/fleet/robot"):
-        server = GraphSocket("/fleet/robot", lambda: view, lambda _: None)
+        server = QuerySocket("/fleet/robot", {GRAPH: lambda _: view}, lambda _: None)
         yield
         server.close(10.0)
 

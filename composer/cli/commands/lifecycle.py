@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
@@ -13,7 +13,7 @@ from composer.cli.support.completion import complete_node, complete_running_syst
 from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
 from composer.cli.support.output import as_json, say_none_found
-from composer.cli.support.ros import ros_session
+from composer.cli.support.ros import require_ros, ros_session
 from composer.cli.support.terminal import columns, lines, say, write
 
 if TYPE_CHECKING:
@@ -68,19 +68,34 @@ def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False) -> None:
 
     Exit code 1 if a system on this computer does not respond, because its nodes are missing then.
     """
+    known = _local_states(timeout)
+    if known is not None:
+        _write_states(known, json=json)
+        return
     with ros_session("compose lifecycle", timeout) as (session, deadline):
         from composer.remote.lifecycle import LifecycleClient
         from composer.remote.name_matching import check_all_respond
 
         client = LifecycleClient(session, deadline)
         states = client.states(client.nodes())
-        if json:
-            write(as_json(states, indent=2))
-        elif states:
-            write(columns([(name, state or "(no response)") for name, state in states.items()]))
+        _write_states(states, json=json)
         check_all_respond(session)
     if not states and not json:
         say_none_found("lifecycle node")
+
+
+def _write_states(states: Mapping[str, str | None], *, json: bool) -> None:
+    if json:
+        write(as_json(states, indent=2))
+    elif states:
+        write(columns([(name, state or "(no response)") for name, state in states.items()]))
+
+
+def _local_states(timeout: float) -> dict[str, str] | None:
+    require_ros("compose lifecycle")
+    from composer.remote.local_queries import local_states
+
+    return local_states(timeout)
 
 
 @app.command(
@@ -91,8 +106,14 @@ def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False) -> None:
 )
 def get(node: NodeName, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
     """Print the lifecycle state of a node."""
-    with _client(timeout) as client:
-        write(lines([client.state(client.find(node))]))
+    require_ros("compose lifecycle")
+    from composer.remote.local_queries import local_state
+
+    state = local_state(node, timeout)
+    if state is None:
+        with _client(timeout) as client:
+            state = client.state(client.find(node))
+    write(lines([state]))
 
 
 @app.command("list", epilog=examples("compose lifecycle list planner"))

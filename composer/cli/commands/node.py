@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -18,7 +18,7 @@ from composer.cli.support.options import (
     examples,
 )
 from composer.cli.support.output import as_json, say_none_found
-from composer.cli.support.ros import graph_names, ros_session
+from composer.cli.support.ros import graph_names, require_ros, ros_session
 from composer.cli.support.terminal import columns, lines, write
 
 app = typer.Typer(
@@ -74,10 +74,7 @@ def info(
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """Print the topics, services and actions of a node."""
-    with ros_session("compose node", timeout) as (session, deadline):
-        from composer.remote.graph_names import GraphNames
-
-        found = asdict(GraphNames(session, deadline).node(name, hidden=hidden))
+    found = _info(name, timeout, hidden=hidden)
     if json:
         write(as_json(found, indent=2))
         return
@@ -87,3 +84,17 @@ def info(
         rows = [(f"    {item}:", ", ".join(types)) for item, types in found[key]]
         shown += columns(rows).split("\n") if rows else []
     write(lines(shown))
+
+
+def _info(name: str, timeout: float, *, hidden: bool) -> dict[str, Any]:
+    """Return the endpoints of a node: from a running system, or else from the ROS graph."""
+    require_ros("compose node")
+    from composer.remote.local_queries import local_node
+
+    found = local_node(name, timeout, hidden=hidden)
+    if found is not None:
+        return found
+    with ros_session("compose node", timeout) as (session, deadline):
+        from composer.remote.graph_names import GraphNames
+
+        return asdict(GraphNames(session, deadline).node(name, hidden=hidden))

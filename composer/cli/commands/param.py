@@ -14,12 +14,14 @@ from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, HiddenNodes, Json, Timeout, examples
 from composer.cli.support.output import as_json, as_yaml, say_none_found
-from composer.cli.support.ros import ros_session
+from composer.cli.support.ros import require_ros, ros_session
 from composer.cli.support.terminal import columns, lines, say, say_raw, use_color, write
 
 if TYPE_CHECKING:
-    from composer.remote.parameters import ParameterClient, ParameterDescription
+    from composer.remote.local_queries import LocalParameters
+    from composer.remote.parameters import ParameterClient
     from composer.resolve.parameter_files import ParameterFiles
+    from composer.runtime.ros.parameter_description import ParameterDescription
 
 app = typer.Typer(
     help="List, get and set parameters of running nodes.",
@@ -52,6 +54,25 @@ def _parameters(node: str, timeout: float) -> Iterator[ParameterClient]:
         yield ParameterClient(session, deadline, node)
 
 
+@contextmanager
+def _readable(
+    node: str, timeout: float, names: Iterable[str] = ()
+) -> Iterator[ParameterClient | LocalParameters]:
+    """Yield the parameters of a node: from a running system, or else from the node itself.
+
+    Only the latter reports errors, so the former has all of ``names``.
+    """
+    require_ros("compose param")
+    from composer.remote.local_queries import local_parameters
+
+    local = local_parameters(node, timeout)
+    if local is not None and local.described.keys() >= set(names):
+        yield local
+        return
+    with _parameters(node, timeout) as parameters:
+        yield parameters
+
+
 @app.command("list", epilog=examples("compose param list planner", "compose param list"))
 def list_parameters(
     node: Annotated[
@@ -73,7 +94,7 @@ def list_parameters(
     if node is None:
         _list_all(timeout, types=types, hidden=hidden, json=json)
         return
-    with _parameters(node, timeout) as parameters:
+    with _readable(node, timeout) as parameters:
         names = _listed(parameters, parameters.names(), types=types, json=json)
     if json:
         write(as_json(names, indent=2))
@@ -82,7 +103,7 @@ def list_parameters(
 
 
 def _listed(
-    parameters: ParameterClient, names: Sequence[str], *, types: bool, json: bool
+    parameters: ParameterClient | LocalParameters, names: Sequence[str], *, types: bool, json: bool
 ) -> list[Any]:
     """Return the names as they are printed: text, or objects if the JSON has types."""
     if not types:
@@ -94,15 +115,9 @@ def _listed(
 
 
 def _list_all(timeout: float, *, types: bool, hidden: bool, json: bool) -> None:
-    with ros_session("compose param", timeout) as (session, deadline):
-        from composer.remote.parameters import ParameterClient, names_by_node
-
-        found: dict[str, list[Any] | None] = dict(names_by_node(session, deadline, hidden=hidden))
-        if types:
-            for node, known in found.items():
-                if known is not None:
-                    client = ParameterClient(session, deadline, node)
-                    found[node] = _listed(client, known, types=True, json=json)
+    found = _ask_all(timeout, types=types, hidden=hidden, json=json)
+    if found is None:
+        found = _discover_all(timeout, types=types, hidden=hidden, json=json)
     if json:
         write(as_json(found, indent=2))
         return
@@ -117,12 +132,40 @@ def _list_all(timeout: float, *, types: bool, hidden: bool, json: bool) -> None:
             write(lines([f"{node}:", *(f"  {name}" for name in names)]))
 
 
+def _ask_all(
+    timeout: float, *, types: bool, hidden: bool, json: bool
+) -> dict[str, list[Any] | None] | None:
+    """Return the parameters of all nodes if the systems on this computer have them all."""
+    require_ros("compose param")
+    from composer.remote.local_queries import all_local_parameters
+
+    known = all_local_parameters(timeout, hidden=hidden)
+    if known is None:
+        return None
+    return {item.node: _listed(item, item.names(), types=types, json=json) for item in known}
+
+
+def _discover_all(
+    timeout: float, *, types: bool, hidden: bool, json: bool
+) -> dict[str, list[Any] | None]:
+    with ros_session("compose param", timeout) as (session, deadline):
+        from composer.remote.parameters import ParameterClient, names_by_node
+
+        found: dict[str, list[Any] | None] = dict(names_by_node(session, deadline, hidden=hidden))
+        if types:
+            for node, known in found.items():
+                if known is not None:
+                    client = ParameterClient(session, deadline, node)
+                    found[node] = _listed(client, known, types=True, json=json)
+    return found
+
+
 @app.command("get", epilog=examples("compose param get planner max_velocity"))
 def get(
     node: Node, name: Name, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
 ) -> None:
     """Print the value of a parameter."""
-    with _parameters(node, timeout) as parameters:
+    with _readable(node, timeout, [name]) as parameters:
         value = parameters.values([name])[name]
     write(as_json(value) if json else as_yaml(value))
 
@@ -175,7 +218,7 @@ def describe(
 
     With --json, the output is an object for one parameter and an array for several.
     """
-    with _parameters(node, timeout) as parameters:
+    with _readable(node, timeout, names) as parameters:
         described = [_facts(found) for found in parameters.describe(names)]
     if json:
         write(as_json(described[0] if len(described) == 1 else described, indent=2))
@@ -187,7 +230,7 @@ def describe(
 @app.command("dump", epilog=examples("compose param dump planner > planner.yaml"))
 def dump(node: Node, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
     """Print the parameters of a node as a parameter file."""
-    with _parameters(node, timeout) as parameters:
+    with _readable(node, timeout) as parameters:
         values = parameters.values(parameters.names())
     content = {parameters.node: {"ros__parameters": values}}
     write(as_json(content, indent=2) if json else as_yaml(content))

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
 from composer.cli.support.output import as_json
-from composer.cli.support.ros import ros_session
+from composer.cli.support.ros import require_ros, ros_session
 from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
 from composer.cli.support.terminal import columns, lines, write
 
 if TYPE_CHECKING:
-    from composer.remote.process_list import ProcessList
     from composer.remote.system_reports import NodeReport, SystemReport
 
 EPILOGS = {
@@ -23,6 +23,10 @@ EPILOGS = {
         "compose ps --json          print JSON",
     )
 }
+
+#: The reports of systems by their names, and the states of other lifecycle nodes. None stands for a
+#: system or node that did not respond.
+_Listed: TypeAlias = "tuple[Mapping[str, SystemReport | None], Mapping[str, str | None]]"
 
 _HEAD = ("node", "state", "since", "restarts", "errors", "out Hz", "in Hz", "last error")
 
@@ -40,23 +44,42 @@ def ps(
     'compose top' shows as a table.
     """
     name = None if system is None else running_system_name(system)
+    if json:
+        write(_as_json(*_discover(name, timeout, callbacks=True)))
+    else:
+        write(_as_text(*(_ask(name, timeout) or _discover(name, timeout, callbacks=False))))
+
+
+def _ask(name: str | None, timeout: float) -> _Listed | None:
+    """Return what runs if the systems on this computer know that, without callback timings."""
+    require_ros("compose ps")
+    from composer.remote.local_queries import local_report, local_reports
+
+    if name is None:
+        reports = local_reports(timeout)
+        return None if reports is None else (reports, {})
+    report = local_report(name, timeout)
+    return None if report is None else ({report.name: report}, {})
+
+
+def _discover(name: str | None, timeout: float, *, callbacks: bool) -> _Listed:
     with ros_session("compose ps", timeout) as (session, deadline):
         from composer.remote.process_list import list_one, list_processes
 
         if name is None:
-            listed = list_processes(session, deadline, callbacks=json)
+            listed = list_processes(session, deadline, callbacks=callbacks)
         else:
-            listed = list_one(session, deadline, name, callbacks=json)
-    write(_as_json(listed) if json else _as_text(listed))
+            listed = list_one(session, deadline, name, callbacks=callbacks)
+    return listed.systems, listed.others
 
 
-def _as_json(listed: ProcessList) -> str:
+def _as_json(systems: Mapping[str, SystemReport | None], others: Mapping[str, str | None]) -> str:
     content: dict[str, Any] = {
         "systems": [
             {"name": name} | ({"answered": False} if report is None else _report(report))
-            for name, report in listed.systems.items()
+            for name, report in systems.items()
         ],
-        "nodes": [{"node": node, "state": state} for node, state in listed.others.items()],
+        "nodes": [{"node": node, "state": state} for node, state in others.items()],
     }
     return as_json(content, indent=2)
 
@@ -75,10 +98,10 @@ def _report(report: SystemReport) -> dict[str, Any]:
     return content
 
 
-def _as_text(listed: ProcessList) -> str:
-    parts = [_system(name, report) for name, report in listed.systems.items()]
-    if listed.others:
-        rows = [(node, state or "(no response)") for node, state in listed.others.items()]
+def _as_text(systems: Mapping[str, SystemReport | None], others: Mapping[str, str | None]) -> str:
+    parts = [_system(name, report) for name, report in systems.items()]
+    if others:
+        rows = [(node, state or "(no response)") for node, state in others.items()]
         title = "other lifecycle nodes" if parts else "lifecycle nodes"
         parts.append(f"{title}\n{columns(rows)}")
     return "\n\n".join(parts) or "no system is running"

@@ -14,7 +14,7 @@ from composer.cli.support.terminal import keep_stdout_for_data, say
 if TYPE_CHECKING:
     from composer.model import Node, System
     from composer.remote.session import Deadline, Session
-    from composer.runtime.process.graph_socket import NameAndTypes
+    from composer.runtime.process.query_socket import NameAndTypes
 
 
 def require_ros(command: str) -> None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
 
 from rclpy.node import Node
 
 from composer.runtime.process.dds_participants import count_participants
-from composer.runtime.process.graph_socket import KINDS, GraphView
+from composer.runtime.process.query_socket import KINDS, GraphView
 from composer.runtime.ros.graph import SETTLE_S, RosGraph, participant
+from composer.runtime.ros.node_info import node_info
 
 #: How long to wait for a process that has just started; commands wait longer than that.
 _COMPLETE_WITHIN_S = 0.4
@@ -58,11 +62,35 @@ class GraphObserver:
                 return None
             time.sleep(_POLL_S)
 
+    def nodes(self) -> list[str] | None:
+        """Return the nodes that can be meant by a name; None if some may be missing.
+
+        Those of a process that was just killed may be among them.
+        """
+        end_s = time.monotonic() + _COMPLETE_WITHIN_S
+        while True:
+            graph = RosGraph(self._node)
+            names = [name for name, _ in graph.names("node")]
+            local = self._count_local(graph.participants())
+            if local >= count_participants(self._domain_id) and graph.are_nodes_known():
+                return names
+            if time.monotonic() > end_s:
+                return None
+            time.sleep(_POLL_S)
+
+    def node(self, name: str) -> Mapping[str, Any]:
+        """Return the endpoints of a node, including hidden ones."""
+        return asdict(node_info(RosGraph(self._node), name, hidden=True))
+
     def _are_all_known(self, graph: RosGraph, known: frozenset[bytes]) -> bool:
         """Say whether every process on this computer is known, and no ended one is."""
-        host = self._own_host()
-        local = sum(prefix[_HOST] == host for prefix in known)
+        local = self._count_local(known)
         return local == count_participants(self._domain_id) and graph.are_nodes_known()
+
+    def _count_local(self, known: frozenset[bytes]) -> int:
+        """Return how many of the participants are on this computer."""
+        host = self._own_host()
+        return sum(prefix[_HOST] == host for prefix in known)
 
     def _own_host(self) -> bytes | None:
         name = self._node.get_name()

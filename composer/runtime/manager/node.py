@@ -42,13 +42,14 @@ from composer.runtime.executors.loop import Reply, unused_callback
 from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.other_instances import Instance, OtherInstances
 from composer.runtime.manager.proxy_services import ProxyLifecycleService, ProxyParameterStore
+from composer.runtime.manager.queries import ManagerQueries
 from composer.runtime.manager.status_messages import status_message
 from composer.runtime.metrics.diagnostics import Figures, to_message
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.node import RunningNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import ParameterServices
-from composer.runtime.process.graph_socket import GraphSocket
+from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.ros.manager_protocol import (
     CALLBACKS_QOS,
     CALLBACKS_TOPIC,
@@ -149,7 +150,10 @@ class ManagerNode:
         if any(node.left_to_manager for node in status.snapshot().nodes):
             ProxyLifecycleService(self._node, self._loop, host.nodes, self._publish)
         self._graph = GraphObserver(self._node, self._state.topic_name)
-        self._graph_socket = GraphSocket(namespace, self._graph.view, self._on_graph_error)
+        queries = ManagerQueries(
+            self._loop, self._graph, store, self._status_message, lambda: host.nodes().keys()
+        )
+        self._query_socket = QuerySocket(namespace, queries.answers(), self._on_query_error)
         self._loop.start()
         self._loop.call_every(_PERIOD_S, self._tick)
         self._loop.call_soon(self._publish)
@@ -160,7 +164,7 @@ class ManagerNode:
 
         In shared memory, a response would disappear together with the node.
         """
-        self._graph_socket.close(_ENDS_WITHIN_S)
+        self._query_socket.close(_ENDS_WITHIN_S)
         self._status.on_change(lambda: None)
         self._loop.call_soon(self._publish_now)
         if linger:
@@ -232,8 +236,8 @@ class ManagerNode:
         if self._callbacks.get_subscription_count():
             self._publish_callbacks()
 
-    def _on_graph_error(self, error: Exception) -> None:
-        self._node.get_logger().error(f"cannot send the ROS graph to a command: {error!r}")
+    def _on_query_error(self, error: Exception) -> None:
+        self._node.get_logger().error(f"cannot answer a query of a command: {error!r}")
 
     def _publish_callbacks(self) -> None:
         figures: tuple[Figures, ...] = (
@@ -284,8 +288,11 @@ class ManagerNode:
         self._is_waiting = False
         self._publish_now()
 
+    def _status_message(self) -> DiagnosticArray:
+        return status_message(self._status.snapshot(), self._uptime_s, self._host.chains())
+
     def _publish_now(self) -> None:
-        message = status_message(self._status.snapshot(), self._uptime_s, self._host.chains())
+        message = self._status_message()
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._state.publish(message)
         if self._diagnostics.get_subscription_count():

@@ -78,6 +78,7 @@ class ProxyParameterStore(NodeParameterStore):
 
     def __init__(self, manager: Node, nodes: Nodes) -> None:
         super().__init__(manager)
+        self.manager = manager.get_fully_qualified_name()
         self._nodes = nodes
 
     async def list_names(self, prefixes: list[str], depth: int) -> ListParametersResult:
@@ -86,10 +87,19 @@ class ProxyParameterStore(NodeParameterStore):
         result = await super().list_names(prefixes, depth)
         for name, node in self._nodes().items():
             if name in requested or not (requested or node.model.introspection.parameters):
-                names = await node.query(lambda ros_node: ros_node.list_parameters([], 0).names)
+                names = await self.names_of(name)
                 result.prefixes.append(name)
                 result.names += [full_parameter_name(name, parameter) for parameter in names]
         return result
+
+    async def names_of(self, name: str) -> list[str]:
+        """Return the names of the parameters of a node, none if it does not exist."""
+        if name == self.manager:
+            return list(self._node.list_parameters([], 0).names)
+        node = self._nodes().get(name)
+        if node is None:
+            return []
+        return await node.query(lambda ros_node: list(ros_node.list_parameters([], 0).names))
 
     async def value(self, name: str) -> ParameterValue:
         """Return the value of a parameter."""

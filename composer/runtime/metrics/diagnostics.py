@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 from dataclasses import fields
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
+from composer.runtime.metrics.numbers import finite
 
 Figures = CallbackFigures | ChainFigures
 
@@ -34,14 +34,6 @@ def from_message(
         tuple(CallbackFigures(**item) for item in values if "chain" not in item),
         tuple(ChainFigures(**item) for item in values if "chain" in item),
     )
-
-
-def finite(text: str) -> float:
-    """Return a number. Raises ValueError, also for infinity and NaN."""
-    number = float(text)
-    if not math.isfinite(number):
-        raise ValueError(f"'{text}' is not a number")
-    return number
 
 
 _PARSERS: dict[str, Callable[[str], Any]] = {"int": int, "float": finite, "str": str}

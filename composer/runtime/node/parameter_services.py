@@ -167,7 +167,7 @@ class ParameterServices:
     async def _get(self, request: Any, response: Any) -> None:
         values: list[ParameterValue] = []
         items = 0
-        async for value in _each(request.names, self._store.value):
+        async for value in in_slices(request.names, self._store.value):
             items += _items(value)
             if items > MAX_ITEMS:
                 reason = f"more than {MAX_ITEMS} array items and characters in one response"
@@ -177,25 +177,28 @@ class ParameterServices:
         response.values = values if len(values) == len(request.names) else []
 
     async def _get_types(self, request: Any, response: Any) -> None:
-        types = [kind async for kind in _each(request.names, self._store.type_of)]
+        types = [kind async for kind in in_slices(request.names, self._store.type_of)]
         response.types = types if len(types) == len(request.names) else []
 
     async def _describe(self, request: Any, response: Any) -> None:
-        found = [item async for item in _each(request.names, self._store.descriptor)]
+        found = [item async for item in in_slices(request.names, self._store.descriptor)]
         response.descriptors = found if len(found) == len(request.names) else []
 
     async def _set(self, request: Any, response: Any) -> None:
         async def set_one(change: ParameterMessage) -> SetParametersResult:
             return await self._store.set([change])
 
-        response.results = [item async for item in _each(request.parameters, set_one)]
+        response.results = [item async for item in in_slices(request.parameters, set_one)]
 
     async def _set_atomically(self, request: Any, response: Any) -> None:
         response.result = await self._store.set(request.parameters)
 
 
-async def _each(items: Iterable[Any], call: Callable[[Any], Coroutine[Any, Any, T]]) -> Any:
-    """Yield the result of ``call`` for each item, up to the first unknown parameter, in slices."""
+async def in_slices(items: Iterable[Any], call: Callable[[Any], Coroutine[Any, Any, T]]) -> Any:
+    """Yield the result of ``call`` for each item, up to the first unknown parameter.
+
+    Other callbacks of the loop run in between.
+    """
     until_s = monotonic() + _SLICE_S
     for item in items:
         try:

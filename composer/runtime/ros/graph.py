@@ -21,7 +21,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
-from composer.runtime.process.graph_socket import NameAndTypes
+from composer.runtime.process.query_socket import NameAndTypes
 from composer.runtime.ros.endpoints import UNKNOWN_NODE, TopicInfo, topic_info
 
 #: The name and the namespace of a node.

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
 
 import pytest
 import yaml
@@ -14,9 +17,10 @@ from std_msgs.msg import String
 
 from composer.remote.graph_names import GraphNames
 from composer.remote.local_graph import local_names
+from composer.remote.local_queries import local_node, local_parameters, local_reports
 from composer.remote.session import Deadline, Session
-from composer.runtime.process.graph_socket import KINDS
-from tests.ros.support.commands import PATIENCE_S, hand_written, listed, output_of, running
+from composer.runtime.process.query_socket import KINDS
+from tests.ros.support.commands import PATIENCE_S, compose, hand_written, listed, output_of, running
 from tests.ros.support.in_process import Peer, wait_until
 
 
@@ -34,6 +38,43 @@ def session(monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     with Session() as session:
         yield session
+
+
+#: Commands that a running system answers, and one that it leaves to the ROS graph.
+ANSWERED = (
+    ("ps",),
+    ("ps", "pipeline"),
+    ("lifecycle", "nodes"),
+    ("lifecycle", "get", "planner"),
+    ("node", "info", "planner"),
+    ("node", "info", "planner", "--include-hidden"),
+    ("param", "list", "--param-type"),
+    ("param", "list", "planner", "--json"),
+    ("param", "get", "motor_controller", "waypoints"),
+    ("param", "describe", "planner", "max_velocity", "use_sim_time"),
+    ("param", "dump", "/pipeline/manager"),
+    ("param", "get", "planner", "max_velocit"),
+)
+
+
+def test_a_running_system_answers_as_the_graph_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    wait_until(lambda: local_reports(PATIENCE_S), "the reports")
+    planner = local_parameters("planner", PATIENCE_S)
+    assert planner is not None
+    assert planner.values(["max_velocity"]) == {"max_velocity": 1.0}
+    assert local_node("planner", PATIENCE_S, hidden=False)
+    with ThreadPoolExecutor(4) as pool:
+        from_system = list(pool.map(lambda words: compose(*words), ANSWERED))
+        monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))  # as if the system ran elsewhere
+        from_graph = list(pool.map(lambda words: compose(*words), ANSWERED))
+    hide = partial(re.sub, r"\d+\.?\d* *", "0 ")  # rates, durations and the width of columns
+    for words, found, expected in zip(ANSWERED, from_system, from_graph, strict=True):
+        assert hide(found.stdout) == hide(expected.stdout), words
+        assert found.stderr == expected.stderr, words
+        assert found.returncode == expected.returncode, words
 
 
 def test_the_manager_sees_the_same_graph_as_a_new_node(session: Session, peer: Peer) -> None:

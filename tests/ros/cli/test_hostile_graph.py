@@ -10,7 +10,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from std_srvs.srv import Trigger
 
-from composer.remote.system_reports import InvalidReportError, parse_callbacks, parse_state
+from composer.remote.callback_reports import parse_callbacks
+from composer.remote.system_reports import InvalidReportError, parse_state
 from composer.runtime.metrics.diagnostics import to_message
 from composer.runtime.metrics.figures import CallbackFigures
 from composer.runtime.ros.manager_protocol import CALLBACKS_QOS, STATE_QOS

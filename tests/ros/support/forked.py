@@ -62,6 +62,9 @@ class ForkedCommand:
         work = (str(cwd or Path.cwd()), environment, list(arguments))
         self._process = _context.Process(target=_run, args=(*work, out, error), daemon=False)
         self._process.start()
+        # Whenever a process starts, multiprocessing looks at all others in this set: if one of them
+        # ends while another thread waits for it, that thread gets 255 as its exit code.
+        multiprocessing.process._children.discard(self._process)  # type: ignore[attr-defined]
         out.close()
         error.close()
         assert self._process.pid is not None

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -7,9 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.process import graph_socket
-from composer.runtime.process.graph_socket import GraphSocket, GraphView, read_graph, visible
+from composer.runtime.process import query_socket
 from composer.runtime.process.instance_lock import socket_path
+from composer.runtime.process.query_socket import (
+    GRAPH,
+    GraphView,
+    QuerySocket,
+    ask,
+    read_graph,
+    visible,
+)
 
 VIEW: GraphView = {
     "node": (("/a", ()), ("/_hidden", ())),
@@ -31,11 +39,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyP
 @pytest.fixture
 def serve() -> Iterator[Callable[[Callable[[], GraphView | None]], list[Exception]]]:
     """Serve a view as the system /robot; return the list of errors."""
-    sockets: list[GraphSocket] = []
+    sockets: list[QuerySocket] = []
 
     def start(view: Callable[[], GraphView | None]) -> list[Exception]:
         errors: list[Exception] = []
-        sockets.append(GraphSocket("/robot", view, errors.append))
+        sockets.append(QuerySocket("/robot", {GRAPH: lambda _: view()}, errors.append))
         return errors
 
     yield start
@@ -79,13 +87,27 @@ def test_an_error_is_reported_and_the_next_command_served(
     assert read_graph("/robot", LIMIT_S) == VIEW
 
 
+@pytest.mark.parametrize("line", [b"", b"\n", b"[1, 2]\n", b"{}\n", b'["unknown", 1]\n', b"\xff\n"])
+def test_an_unknown_query_has_no_answer(line: bytes, serve: Callable[..., list[Exception]]) -> None:
+    errors = serve(lambda: VIEW)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
+        connection.settimeout(LIMIT_S)
+        connection.connect(str(socket_path("/robot")))
+        connection.sendall(line)
+        connection.shutdown(socket.SHUT_WR)
+        assert connection.recv(1) == b""
+    assert ask("/robot", "unknown", None, LIMIT_S) is None
+    assert ask("/robot", GRAPH, None, LIMIT_S) is not None
+    assert errors == []
+
+
 def test_the_view_of_another_discovery_range_is_not_used(
     serve: Callable[..., list[Exception]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     serve(lambda: VIEW)
     # Server and client share an environment here: each reads it once, the server first.
     ranges = iter([["LOCALHOST"], ["SUBNET"]])
-    monkeypatch.setattr(graph_socket, "_environment", lambda: next(ranges))
+    monkeypatch.setattr(query_socket, "_environment", lambda: next(ranges))
     assert read_graph("/robot", LIMIT_S) is None
 
 
@@ -112,7 +134,7 @@ def test_the_socket_of_a_killed_process_is_replaced(
 
 
 def test_no_file_is_left_at_the_end(folder: Path) -> None:
-    server = GraphSocket("/robot", lambda: VIEW, lambda _: None)
+    server = QuerySocket("/robot", {GRAPH: lambda _: VIEW}, lambda _: None)
     assert len(list(folder.iterdir())) == 1
     server.close(LIMIT_S)
     assert list(folder.iterdir()) == []
@@ -120,7 +142,7 @@ def test_no_file_is_left_at_the_end(folder: Path) -> None:
 
 def test_a_name_too_long_for_a_socket_is_accepted() -> None:
     system = "/" + "x" * 150
-    server = GraphSocket(system, lambda: VIEW, lambda _: None)
+    server = QuerySocket(system, {GRAPH: lambda _: VIEW}, lambda _: None)
     assert read_graph(system, LIMIT_S) is None
     server.close(LIMIT_S)
 

@@ -1,9 +1,10 @@
-"""The ROS graph as a running system sees it, for commands of the same user on this computer.
+"""Queries of commands to the running systems of the same user on this computer.
 
-A command that joins the graph itself imports rclpy and waits for discovery, which takes about a
-second. The manager of a running system discovered the graph long ago. It sends its view, as one
-JSON document, to each connection to a Unix socket next to the instance lock, and null if its view
-may be incomplete. See docs/decisions/0042-graph-socket.md.
+A command that joins the ROS graph itself imports rclpy and waits for discovery, which takes about a
+second. The manager of a running system discovered the graph long ago, and knows the states and
+parameters of its nodes. It listens on a Unix socket next to the instance lock. A command sends the
+name of a query and an argument as one line of JSON, and receives the answer as one JSON document,
+with null if the manager is not certain. See docs/decisions/0042-query-socket.md.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import threading
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from composer.names import is_hidden
 from composer.runtime.process.instance_lock import socket_path
@@ -26,6 +27,9 @@ NameAndTypes = tuple[str, tuple[str, ...]]
 GraphView: TypeAlias = Mapping[str, tuple[NameAndTypes, ...]]
 
 KINDS = ("node", "topic", "service", "action")
+#: The queries: the view of the graph, its nodes, the endpoints of one node, the status of the
+#: system, and the parameters of its nodes. See :mod:`composer.runtime.manager.queries`.
+GRAPH, NODES, NODE, STATUS, PARAMETERS = "graph", "nodes", "node", "status", "parameters"
 #: Processes that differ in one of these variables may see different graphs.
 _VARIABLES = (
     "RMW_IMPLEMENTATION",
@@ -35,8 +39,11 @@ _VARIABLES = (
     "ROS_SECURITY_ENABLE",
     "ROS_STATIC_PEERS",
 )
-_SEND_WITHIN_S = 1.0
+_TRANSFER_WITHIN_S = 1.0
 _READ_BYTES = 65_536
+_MAX_QUERY_BYTES = 65_536
+#: Answers a query: returns plain data for JSON, or None if it is not certain.
+Answer: TypeAlias = Callable[[Any], Any]
 
 
 def visible(names: Iterable[NameAndTypes]) -> tuple[NameAndTypes, ...]:
@@ -44,27 +51,27 @@ def visible(names: Iterable[NameAndTypes]) -> tuple[NameAndTypes, ...]:
     return tuple(item for item in names if not is_hidden(item[0]))
 
 
-class GraphSocket:
-    """Serves the view of a system from a thread of its own, one connection at a time."""
+class QuerySocket:
+    """Answers queries from a thread of its own, one at a time."""
 
     def __init__(
         self,
         system: str,
-        view: Callable[[], GraphView | None],
+        answers: Mapping[str, Answer],
         on_error: Callable[[Exception], None],
     ) -> None:
-        """``system`` is the namespace of the manager; ``view`` is called per connection.
+        """``system`` is the namespace of the manager; ``answers`` are the queries by name.
 
         If there cannot be a socket, as with a very long name, commands join the graph themselves.
         """
-        self._view = view
+        self._answers = answers
         self._on_error = on_error
         self._path = socket_path(system)
         self._listener = None if self._path is None else _listen(self._path)
         self._thread: threading.Thread | None = None
         if self._listener is not None:
             self._thread = threading.Thread(
-                target=self._serve, args=(self._listener,), name="graph socket", daemon=True
+                target=self._serve, args=(self._listener,), name="query socket", daemon=True
             )
             self._thread.start()
 
@@ -86,30 +93,62 @@ class GraphSocket:
             except OSError:  # closed
                 return
             with connection:
+                connection.settimeout(_TRANSFER_WITHIN_S)
                 try:
-                    connection.settimeout(_SEND_WITHIN_S)
-                    connection.sendall(_encoded(self._view()))
+                    self._respond(connection)
                 except OSError:  # the command has ended
                     continue
                 except Exception as error:  # the next command may fare better
                     self._on_error(error)
 
+    def _respond(self, connection: socket.socket) -> None:
+        try:
+            name, argument = json.loads(_read_line(connection))
+            answer = self._answers[name]
+        except (ValueError, TypeError, KeyError):  # of a command of another version
+            return
+        document = {"environment": _environment(), "answer": answer(argument)}
+        connection.sendall(json.dumps(document).encode())
 
-def read_graph(system: str, timeout_s: float) -> GraphView | None:
-    """Return the graph as a system on this computer sees it.
+
+def ask(system: str, query: str, argument: Any, timeout_s: float) -> Any:
+    """Return the answer of a system on this computer, as plain data.
 
     None if it does not respond in time, is not certain, or may see another graph than this process.
     """
     path = socket_path(system)
-    if path is None:
+    if path is None or timeout_s <= 0.0:
         return None
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
             connection.settimeout(timeout_s)
             connection.connect(str(path))
-            return _decoded(b"".join(iter(lambda: connection.recv(_READ_BYTES), b"")))
+            connection.sendall(json.dumps([query, argument]).encode() + b"\n")
+            document = json.loads(b"".join(iter(lambda: connection.recv(_READ_BYTES), b"")))
+        return document["answer"] if document["environment"] == _environment() else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def read_graph(system: str, timeout_s: float) -> GraphView | None:
+    """Return the graph as a system on this computer sees it; None as for :func:`ask`."""
+    graph = ask(system, GRAPH, None, timeout_s)
+    try:
+        return graph and {
+            kind: tuple((name, tuple(types)) for name, types in graph[kind]) for kind in KINDS
+        }
+    except (ValueError, KeyError, TypeError):
+        return None
+
+
+def _read_line(connection: socket.socket) -> bytes:
+    line = b""
+    while not line.endswith(b"\n") and len(line) < _MAX_QUERY_BYTES:
+        received = connection.recv(_READ_BYTES)
+        if not received:
+            break
+        line += received
+    return line
 
 
 def _listen(path: Path) -> socket.socket | None:
@@ -126,15 +165,3 @@ def _listen(path: Path) -> socket.socket | None:
 
 def _environment() -> list[str]:
     return [os.environ.get(name, "") for name in _VARIABLES]
-
-
-def _encoded(view: GraphView | None) -> bytes:
-    return json.dumps({"environment": _environment(), "graph": view}).encode()
-
-
-def _decoded(data: bytes) -> GraphView | None:
-    document = json.loads(data)
-    graph = document["graph"]
-    if graph is None or document["environment"] != _environment():
-        return None
-    return {kind: tuple((name, tuple(types)) for name, types in graph[kind]) for kind in KINDS}

@@ -1,0 +1,174 @@
+"""What running systems on this computer know about themselves, without joining the ROS graph.
+
+Each function returns None if no system on this computer is certain: the command has to join the
+graph then, which also produces the errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from composer.names import is_hidden
+from composer.remote.local_graph import RESPONSE_S, local_view
+from composer.remote.system_reports import InvalidReportError, SystemReport, system_report
+from composer.runtime.process.instance_lock import local_systems
+from composer.runtime.process.query_socket import (
+    NODE,
+    NODES,
+    PARAMETERS,
+    STATUS,
+    GraphView,
+    ask,
+    visible,
+)
+from composer.runtime.ros.parameter_description import ParameterDescription
+
+_STATE_SERVICE, _STATE_TYPE = "/get_state", "lifecycle_msgs/srv/GetState"
+_LIST_SERVICE, _LIST_TYPE = "/list_parameters", "rcl_interfaces/srv/ListParameters"
+_MANAGER_SERVICE = "/manager/is_active"
+
+
+@dataclass(frozen=True, slots=True)
+class LocalParameters:
+    """The parameters of a node, with the methods of a ParameterClient that read."""
+
+    node: str
+    described: Mapping[str, tuple[ParameterDescription, Any]]
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of all parameters, sorted."""
+        return tuple(sorted(self.described))
+
+    def values(self, names: Iterable[str]) -> dict[str, Any]:
+        """Return the values of parameters, None if not set."""
+        return {name: self.described[name][1] for name in names}
+
+    def describe(self, names: Iterable[str]) -> tuple[ParameterDescription, ...]:
+        """Return the descriptions of parameters."""
+        return tuple(self.described[name][0] for name in names)
+
+
+def local_node(name: str, timeout_s: float, *, hidden: bool) -> dict[str, Any] | None:
+    """Return the endpoints of a node, by the names of the fields of NodeInfo."""
+    full_name = _find(name, timeout_s)
+    if full_name is None:
+        return None
+    answers = (ask(system, NODE, full_name, RESPONSE_S) for system in local_systems())
+    found: dict[str, Any] | None = next((answer for answer in answers if answer), None)
+    if found is None or hidden:
+        return found
+    return {
+        key: visible(map(tuple, value)) if isinstance(value, list) else value
+        for key, value in found.items()
+    }
+
+
+def local_parameters(name: str, timeout_s: float) -> LocalParameters | None:
+    """Return the parameters of a node of a system on this computer."""
+    full_name = _find(name, timeout_s)
+    if full_name is None:
+        return None
+    return _ask_parameters([full_name], timeout_s).get(full_name)
+
+
+def all_local_parameters(timeout_s: float, *, hidden: bool) -> list[LocalParameters] | None:
+    """Return the parameters of all nodes in the graph, if systems on this computer have them all.
+
+    Nodes that are hidden are left out unless ``hidden``.
+    """
+    view = local_view(timeout_s)
+    if view is None:
+        return None
+    known = _ask_parameters(None, timeout_s)
+    serving = _servers(view, _LIST_SERVICE, _LIST_TYPE)
+    if not serving <= known.keys():
+        return None
+    return [known[node] for node in sorted(known) if hidden or not is_hidden(node)]
+
+
+def local_report(name: str, timeout_s: float) -> SystemReport | None:
+    """Return the report of a running system, by its full name or the last part."""
+    systems = [system for system in local_systems() if f"/{system}".endswith(f"/{name}")]
+    return _ask_report(systems[0], timeout_s) if len(systems) == 1 else None
+
+
+def local_reports(timeout_s: float) -> dict[str, SystemReport] | None:
+    """Return the reports of all systems, if no others and no other lifecycle nodes run."""
+    view = local_view(timeout_s)
+    if view is None:
+        return None
+    reports = {system: _ask_report(system, timeout_s) for system in sorted(local_systems())}
+    found = {system: report for system, report in reports.items() if report is not None}
+    managers = {
+        name.removesuffix(_MANAGER_SERVICE)
+        for name, _ in view["service"]
+        if name.endswith(_MANAGER_SERVICE)
+    }
+    nodes = {node.node for report in found.values() for node in report.nodes}
+    lifecycle_nodes = _servers(view, _STATE_SERVICE, _STATE_TYPE)
+    complete = len(found) == len(reports) and managers <= found.keys() and lifecycle_nodes <= nodes
+    return found if complete else None
+
+
+def local_states(timeout_s: float) -> dict[str, str] | None:
+    """Return the state of each lifecycle node, if systems on this computer have them all."""
+    reports = local_reports(timeout_s)
+    if reports is None:
+        return None
+    states = {node.node: node.state for report in reports.values() for node in report.nodes}
+    return dict(sorted(states.items()))
+
+
+def local_state(name: str, timeout_s: float) -> str | None:
+    """Return the state of a node of a system on this computer."""
+    full_name = _find(name, timeout_s)
+    if full_name is None:
+        return None
+    reports = (_ask_report(system, timeout_s) for system in local_systems())
+    nodes = (node for report in reports if report is not None for node in report.nodes)
+    return next((node.state for node in nodes if node.node == full_name), None)
+
+
+def _ask_report(system: str, timeout_s: float) -> SystemReport | None:
+    answer = ask(system, STATUS, None, min(RESPONSE_S, timeout_s))
+    try:
+        return None if answer is None else system_report(system, answer)
+    except InvalidReportError:
+        return None
+
+
+def _ask_parameters(nodes: list[str] | None, timeout_s: float) -> dict[str, LocalParameters]:
+    known: dict[str, LocalParameters] = {}
+    for system in local_systems():
+        answer = ask(system, PARAMETERS, nodes, min(RESPONSE_S, timeout_s)) or {}
+        for node, parameters in answer.items():
+            known[node] = LocalParameters(
+                node,
+                {
+                    facts["name"]: (ParameterDescription(**facts), value)
+                    for facts, value in parameters
+                },
+            )
+    return known
+
+
+def _find(name: str, timeout_s: float) -> str | None:
+    """Return the full name of the only node that ``name`` refers to."""
+    limit_s = min(RESPONSE_S, timeout_s)
+    answers = (ask(system, NODES, None, limit_s) for system in local_systems())
+    nodes: list[str] = next((answer for answer in answers if answer), [])
+    if name in nodes:
+        return name if nodes.count(name) == 1 else None
+    matches = [] if name.startswith("/") else [node for node in nodes if node.endswith(f"/{name}")]
+    return matches[0] if len(matches) == 1 else None
+
+
+def _servers(view: GraphView, suffix: str, type_name: str) -> set[str]:
+    """Return the nodes with a service of that name and type."""
+    return {
+        name.removesuffix(suffix)
+        for name, types in view["service"]
+        if name.endswith(suffix) and type_name in types
+    }

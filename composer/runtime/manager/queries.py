@@ -1,0 +1,88 @@
+"""What the manager of a system answers to queries of commands on this computer.
+
+See :mod:`composer.runtime.process.query_socket`, on whose thread the methods are called.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import asdict
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+
+from composer.runtime.executors.event_loop import EventLoop
+from composer.runtime.manager.graph_view import GraphObserver
+from composer.runtime.manager.proxy_services import ProxyParameterStore
+from composer.runtime.node.parameter_services import in_slices
+from composer.runtime.process.query_socket import GRAPH, NODE, NODES, PARAMETERS, STATUS, Answer
+from composer.runtime.ros.manager_protocol import full_parameter_name
+from composer.runtime.ros.parameter_values import description, plain_value
+
+#: Commands wait a little longer. A node that hangs does not answer.
+_PARAMETERS_WITHIN_S = 0.4
+
+
+class ManagerQueries:
+    """Answers queries with plain data, or with None if the answer is not certain."""
+
+    def __init__(
+        self,
+        loop: EventLoop,
+        graph: GraphObserver,
+        parameters: ProxyParameterStore,
+        status: Callable[[], DiagnosticArray],
+        nodes: Callable[[], Collection[str]],
+    ) -> None:
+        """``nodes()`` returns the full names of the system's nodes."""
+        self._loop = loop
+        self._graph = graph
+        self._parameters = parameters
+        self._status = status
+        self._nodes = nodes
+
+    def answers(self) -> Mapping[str, Answer]:
+        """Return the queries by name."""
+        return {
+            GRAPH: lambda _: self._graph.view(),
+            NODES: lambda _: self._graph.nodes(),
+            NODE: lambda name: self._graph.node(str(name)),
+            STATUS: lambda _: self._system_status(),
+            PARAMETERS: self._node_parameters,
+        }
+
+    def _system_status(self) -> list[Any]:
+        """Return the name, the message and the values of the system and of each node."""
+        return [
+            [item.name, item.message, {value.key: value.value for value in item.values}]
+            for item in self._status().status
+        ]
+
+    def _node_parameters(self, requested: Any) -> dict[str, list[Any]] | None:
+        """Return descriptions and values of the parameters of the system's nodes and manager.
+
+        ``requested`` are full names of nodes, None for all. Other nodes are left out.
+        """
+        known = (self._parameters.manager, *self._nodes())
+        names = [name for name in known if requested is None or name in requested]
+        done = threading.Event()
+        future = self._loop.run_task(self._collect(names))
+        future.add_done_callback(lambda _: done.set())
+        if not done.wait(_PARAMETERS_WITHIN_S):
+            future.cancel()
+            return None
+        return future.result()
+
+    async def _collect(self, nodes: list[str]) -> dict[str, list[Any]]:
+        return {node: await self._of_node(node) for node in nodes}
+
+    async def _of_node(self, node: str) -> list[Any]:
+        store = self._parameters
+
+        async def one(parameter: str) -> list[Any]:
+            name = parameter if node == store.manager else full_parameter_name(node, parameter)
+            described = description(parameter, await store.descriptor(name))
+            return [asdict(described), plain_value(await store.value(name))]
+
+        return [item async for item in in_slices(await store.names_of(node), one)]

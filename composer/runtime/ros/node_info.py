@@ -1,0 +1,41 @@
+"""The endpoints of a node in the ROS graph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from composer.runtime.process.query_socket import NameAndTypes, visible
+from composer.runtime.ros.graph import RosGraph
+
+
+@dataclass(frozen=True, slots=True)
+class NodeInfo:
+    """The endpoints of a node, by name."""
+
+    name: str
+    subscriptions: tuple[NameAndTypes, ...]
+    publishers: tuple[NameAndTypes, ...]
+    services: tuple[NameAndTypes, ...]
+    clients: tuple[NameAndTypes, ...]
+    action_servers: tuple[NameAndTypes, ...]
+    action_clients: tuple[NameAndTypes, ...]
+
+
+def node_info(graph: RosGraph, full_name: str, *, hidden: bool) -> NodeInfo:
+    """Return the endpoints of a node; those of ROS itself only if ``hidden``."""
+    namespace, _, name = full_name.rpartition("/")
+    where = (name, namespace or "/")
+    queries = (
+        graph.subscriptions_of,
+        graph.publishers_of,
+        graph.services_of,
+        graph.clients_of,
+        graph.action_servers_of,
+        graph.action_clients_of,
+    )
+    return NodeInfo(full_name, *(_sorted(query(where), hidden) for query in queries))
+
+
+def _sorted(found: Iterable[NameAndTypes], hidden: bool) -> tuple[NameAndTypes, ...]:
+    return tuple(sorted(found if hidden else visible(found)))
