@@ -1,10 +1,8 @@
 """Find the name that a misspelled one was most likely meant to be.
 
 Few names are all compared. Of many names, only those next to it in alphabetical order are, read
-forwards and
-backwards: most typos leave the beginning or the end of a name unchanged, and the time hardly grows
-with
-the number of names.
+forwards and backwards: most typos leave the beginning or the end of a name unchanged, and the time
+hardly grows with the number of names.
 """
 
 from __future__ import annotations

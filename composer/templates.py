@@ -1,12 +1,9 @@
 """Templates: values evaluated at run time, with ``{expression}`` in their texts.
 
 In a text, ``{expression}`` is replaced by its value, and ``{expression:.2f}`` by its formatted
-value
-(Python's format specification with at most two digits of width and precision). ``{{`` and ``}}``
-are
-braces. A text with a single ``{expression}`` and nothing else keeps the type of the value. A text
-with
-a ``${variable}`` without value is not changed.
+value (Python's format specification with at most two digits of width and precision). ``{{`` and
+``}}`` are braces. A text with a single ``{expression}`` and nothing else keeps the type of the
+value. A text with a ``${variable}`` without value is not changed.
 """
 
 from __future__ import annotations

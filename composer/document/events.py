@@ -1,8 +1,7 @@
 """YAML events, from libyaml where PyYAML was built with it, else from PyYAML's own parser.
 
 This reads events only: YAML composers are recursive, and libyaml's crashes the process on deeply
-nested
-input. Events come one by one, so that a consumer can stop the parser early.
+nested input. Events come one by one, so that a consumer can stop the parser early.
 """
 
 from __future__ import annotations

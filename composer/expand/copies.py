@@ -4,8 +4,7 @@
       for_each: {index: [0, 1, 2]}
 
 Each name takes its values one after the other, in the entry and in the name of the node. Several
-names
-give one copy per combination. A number N stands for the values 0 to N - 1.
+names give one copy per combination. A number N stands for the values 0 to N - 1.
 """
 
 from __future__ import annotations

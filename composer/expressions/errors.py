@@ -7,8 +7,7 @@ class ExpressionError(Exception):
     """The text is not a valid expression.
 
     ``offset`` and ``length`` are the invalid part in characters of the source; ``hint`` says how to
-    fix
-    it, if that is clear.
+    fix it, if that is clear.
     """
 
     def __init__(self, message: str, offset: int = 0, length: int = 1, hint: str | None = None):

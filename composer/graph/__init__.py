@@ -1,8 +1,7 @@
 """Diagrams of systems and of running ROS graphs.
 
 Systems (``declared``) or a snapshot of a ROS graph (``live``) become a scene, a view (``views/``)
-turns a scene
-into a graph, and a renderer turns the graph into a file format.
+turns a scene into a graph, and a renderer turns the graph into a file format.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Order the boxes on the ranks with the barycenter method.
 
 Sweeps over the ranks in both directions move every box to the mean position of its neighbors;
-groups move as a
-whole. The order with the fewest crossings is kept and improved by transposing neighbors.
+groups move as a whole. The order with the fewest crossings is kept and improved by transposing
+neighbors.
 """
 
 from __future__ import annotations
