@@ -64,8 +64,8 @@ class QosProfile:
 #: ``sensor_data``, ``services_default`` and ``parameters`` are those of rmw/qos_profiles.h.
 #: ``command`` and ``state`` are two common patterns: commands that must arrive, and a latest value
 #: that late joiners get. In ROS, ``system_default`` leaves the choice to the middleware, and Fast
-#: DDS chooses differently for publishers (reliable, transient local) and subscriptions (best effort,
-#: volatile). A declared system is explicit, so here it is rclpy's default for topics.
+#: DDS chooses differently for publishers (reliable, transient local) and subscriptions (best
+#: effort, volatile). A declared system is explicit, so here it is rclpy's default for topics.
 PRESETS: Mapping[str, QosProfile] = {
     "sensor_data": QosProfile(depth=5, reliability=Reliability.BEST_EFFORT),
     "command": QosProfile(),
