@@ -87,7 +87,7 @@ def test_wrong_arguments_are_a_usage_error_on_stderr(arguments: list[str]) -> No
 @pytest.mark.parametrize("option", ["--for", "--timeout", "--grace"])
 @pytest.mark.parametrize("value", ["nan", "inf", "1e300"])
 def test_nan_infinity_and_huge_durations_are_usage_errors(option: str, value: str) -> None:
-    done = compose("run", "pipeline", "--dry-run", option, value)
+    done = compose("run", "systems/pipeline.yaml", "--dry-run", option, value)
     assert (done.code, done.out) == (2, "")
     assert f"'{option}': " in done.err
 
@@ -106,11 +106,11 @@ def redirected(to: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 def test_standard_streams_can_be_closed() -> None:
     for closed in (">&-", "2>&-", "<&- >&- 2>&-"):
-        done = redirected(closed, "run", "pipeline", "--dry-run")
+        done = redirected(closed, "run", "systems/pipeline.yaml", "--dry-run")
         assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("arguments", [["rule"], ["--help"], ["graph", "pipeline"]])
+@pytest.mark.parametrize("arguments", [["rule"], ["--help"], ["graph", "systems/pipeline.yaml"]])
 def test_a_full_disk_is_not_an_internal_error(arguments: list[str]) -> None:
     done = redirected("> /dev/full", *arguments)
     assert done.returncode == 1

@@ -8,9 +8,11 @@ import pytest
 from tests.cli.compose import compose
 from tests.unit.support.fleets import fleet_text
 
+PIPELINE = "systems/pipeline.yaml"
+
 
 def test_the_default_is_a_mermaid_diagram_on_stdout() -> None:
-    done = compose("graph", "pipeline")
+    done = compose("graph", PIPELINE)
     assert (done.code, done.err) == (0, "")
     assert "flowchart LR" in done.out
     assert "/sensor_data" in done.out
@@ -28,31 +30,31 @@ def test_the_default_is_a_mermaid_diagram_on_stdout() -> None:
 )
 def test_the_file_suffix_selects_the_format(name: str, begin: str, tmp_path: Path) -> None:
     target = tmp_path / name
-    done = compose("graph", "pipeline", "-o", str(target))
+    done = compose("graph", PIPELINE, "-o", str(target))
     assert (done.code, done.out, done.err) == (0, "", f"wrote {target}\n")
     assert target.read_text(encoding="utf-8").startswith(begin)
 
 
 def test_an_unknown_file_suffix_is_a_usage_error(tmp_path: Path) -> None:
-    done = compose("graph", "pipeline", "-o", str(tmp_path / "p.doc"))
+    done = compose("graph", PIPELINE, "-o", str(tmp_path / "p.doc"))
     assert done.code == 2
     assert ".svg" in done.err
 
 
 def test_the_format_option_overrides_the_suffix(tmp_path: Path) -> None:
     target = tmp_path / "p.txt"
-    assert compose("graph", "pipeline", "-o", str(target), "-f", "dot").code == 0
+    assert compose("graph", PIPELINE, "-o", str(target), "-f", "dot").code == 0
     assert target.read_text(encoding="utf-8").startswith("digraph ")
 
 
 def test_an_unwritable_file_is_reported(tmp_path: Path) -> None:
-    done = compose("graph", "pipeline", "-o", str(tmp_path / "no" / "p.svg"))
+    done = compose("graph", PIPELINE, "-o", str(tmp_path / "no" / "p.svg"))
     assert done.code == 1
     assert "No such file or directory" in done.err
 
 
 def test_views() -> None:
-    done = compose("graph", "pipeline", "--view", "lifecycle", "-f", "json")
+    done = compose("graph", PIPELINE, "--view", "lifecycle", "-f", "json")
     edges = json.loads(done.out)["edges"]
     assert [(edge["source"], edge["target"]) for edge in edges] == [
         ("node:/planning/planner", "node:/control/motor_controller")
@@ -83,7 +85,7 @@ def test_an_unknown_system_name_lists_the_examples() -> None:
 
 
 def test_several_systems_are_drawn_in_one_diagram() -> None:
-    done = compose("graph", "minimal", "talker_listener", "-f", "json")
+    done = compose("graph", "systems/minimal.yaml", "talker_listener", "-f", "json")
     data = json.loads(done.out)
     assert data["title"] == "minimal + talker_listener"
     assert {"node:/talker", "node:/listener"} <= {vertex["key"] for vertex in data["vertices"]}
@@ -98,11 +100,11 @@ def test_systems_and_live_are_mutually_exclusive() -> None:
 
 def test_missing_graphviz_is_reported_if_requested(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
-    done = compose("graph", "pipeline", "-f", "svg", "--layout", "graphviz")
+    done = compose("graph", PIPELINE, "-f", "svg", "--layout", "graphviz")
     assert (done.code, done.out) == (1, "")
     assert "Graphviz is not installed" in done.err
     assert "--layout bundled" in done.err
-    assert compose("graph", "pipeline", "-f", "svg").out.startswith("<svg ")
+    assert compose("graph", PIPELINE, "-f", "svg").out.startswith("<svg ")
 
 
 def test_a_diagram_too_large_for_mermaid_prints_a_warning(tmp_path: Path) -> None:

@@ -9,9 +9,11 @@ import pytest
 
 from tests.cli.compose import compose
 
+PIPELINE = "systems/pipeline.yaml"
+
 
 def test_a_dry_run_prints_the_plan_with_its_causes() -> None:
-    done = compose("run", "pipeline", "--dry-run")
+    done = compose("run", PIPELINE, "--dry-run")
     assert (done.code, done.err) == (0, "")
     assert "#2 configure /planning/planner: motor_controller depends on it\n" in done.out
     assert len(done.out.splitlines()) == 6
@@ -19,11 +21,17 @@ def test_a_dry_run_prints_the_plan_with_its_causes() -> None:
 
 def test_options_change_the_plan() -> None:
     done = compose(
-        "run", "pipeline", "--dry-run", "--autostart", "inactive", "--namespace", "/robot1"
+        "run",
+        PIPELINE,
+        "--dry-run",
+        "--autostart",
+        "inactive",
+        "--namespace",
+        "/robot1",
     )
     assert "activate" not in done.out
     assert "#1 configure /robot1/perception/sensor_simulator: " in done.out
-    assert compose("run", "pipeline", "--dry-run", "--autostart", "unconfigured").out == ""
+    assert compose("run", PIPELINE, "--dry-run", "--autostart", "unconfigured").out == ""
 
 
 @pytest.mark.parametrize("comment", ["", "  # compose: ignore[unknown-node] two will come"])
@@ -40,10 +48,10 @@ def test_a_system_with_errors_is_rejected_even_with_ignore_comments(
 
 
 def test_parameter_overrides_are_validated() -> None:
-    done = compose("run", "pipeline", "--dry-run", "--set", "planner.max_velocty=1.0")
+    done = compose("run", PIPELINE, "--dry-run", "--set", "planner.max_velocty=1.0")
     assert done.code == 1
     assert "did you mean 'max_velocity'?" in done.err
-    assert compose("run", "pipeline", "--dry-run", "--set", "planner.max_velocity=0.5").code == 0
+    assert compose("run", PIPELINE, "--dry-run", "--set", "planner.max_velocity=0.5").code == 0
 
 
 def test_paths_that_are_not_files_are_reported(tmp_path: Path) -> None:
@@ -68,7 +76,7 @@ def test_a_folder_is_a_usage_error(tmp_path: Path) -> None:
 
 def test_without_rclpy_the_hint_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("composer.cli.support.ros.find_spec", lambda name: None)
-    for command in (["run", "pipeline"], ["lifecycle", "nodes"]):
+    for command in (["run", PIPELINE], ["lifecycle", "nodes"]):
         done = compose(*command)
         assert (done.code, done.out) == (1, "")
         assert 'pip install "ros2-composer[ros]"' in done.err

@@ -32,14 +32,14 @@ def differences(done: subprocess.CompletedProcess[str]) -> list[str]:
 
 
 def test_a_system_without_differences(pipeline: Running) -> None:
-    done = compose("diff", "pipeline")
+    done = compose("diff", "systems/pipeline.yaml")
     assert (done.returncode, done.stdout) == (0, "")
     assert done.stderr == "pipeline: runs as declared\n"
 
 
 def test_a_changed_parameter_is_reported_with_its_declaration(pipeline: Running) -> None:
     assert compose("param", "set", PLANNER, "max_velocity", "0.5").returncode == 0
-    done = compose("diff", "pipeline")
+    done = compose("diff", "systems/pipeline.yaml")
     assert done.returncode == 1
     assert differences(done) == [f"{PLANNER}: parameter max_velocity is 0.5, declared 1.0"]
     assert "declared at " in done.stdout
@@ -52,7 +52,7 @@ def test_a_cleaned_up_node_is_reported_with_its_missing_endpoints(
 ) -> None:
     for transition in ("deactivate", "cleanup"):
         assert compose("lifecycle", "set", PLANNER, transition).returncode == 0
-    done = compose("diff", "pipeline")
+    done = compose("diff", "systems/pipeline.yaml")
     assert done.returncode == 1
     assert differences(done) == [
         f"{PLANNER}: lifecycle state is unconfigured, declared active",
@@ -69,7 +69,7 @@ def test_an_external_publisher_of_another_type_is_reported(pipeline: Running) ->
         " declared nav_msgs/msg/Odometry"
     )
     with hand_written(INTRUDER):
-        done = compose("diff", "pipeline", "--json")
+        done = compose("diff", "systems/pipeline.yaml", "--json")
         assert done.returncode == 1
         data = json.loads(done.stdout)
         assert (data["system"], data["clean"]) == ("pipeline", False)
@@ -78,12 +78,12 @@ def test_an_external_publisher_of_another_type_is_reported(pipeline: Running) ->
             "/intruder: the node exists, but is not declared",
         ]
         assert [item["kind"] for item in data["drift"]] == ["wrong type", "extra node"]
-        ignoring = compose("diff", "pipeline", "--ignore", "/intr*")
+        ignoring = compose("diff", "systems/pipeline.yaml", "--ignore", "/intr*")
         assert (ignoring.returncode, differences(ignoring)) == (1, [conflict])
 
 
 def test_watch_prints_new_and_resolved_differences(pipeline: Running) -> None:
-    watch = start("diff", "pipeline", "--watch", "--grace", "1.5")
+    watch = start("diff", "systems/pipeline.yaml", "--watch", "--grace", "1.5")
     try:
         assert watch.stdout is not None
         assert compose("param", "set", PLANNER, "max_velocity", "0.7").returncode == 0
@@ -107,13 +107,13 @@ def test_a_starting_system_is_not_reported(tmp_path: Path) -> None:
     with running(tmp_path / "log.txt", "talker_listener"):
         # On a busy machine, a start may take longer than the default grace time.
         limits = ("--grace", "15", "--timeout", "25")
-        done = compose("diff", "talker_listener", "--ignore", "/*/*", *limits)
+        done = compose("diff", "systems/talker_listener.yaml", "--ignore", "/*/*", *limits)
         assert (done.returncode, done.stdout) == (0, "")
 
 
 def test_an_empty_graph_is_reported_in_time() -> None:
     started_s = time.monotonic()
-    done = compose("diff", "talker_listener", "--timeout", "4", "--ignore", "*")
+    done = compose("diff", "systems/talker_listener.yaml", "--timeout", "4", "--ignore", "*")
     assert time.monotonic() - started_s < 20.0
     assert done.returncode == 1
     assert differences(done) == [

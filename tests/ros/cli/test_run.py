@@ -29,7 +29,7 @@ def states_in(text: str) -> list[str]:
 
 
 def test_a_system_comes_up_in_order_stops_and_prints_a_summary() -> None:
-    done = compose("run", "pipeline", "--for", "2")
+    done = compose("run", "systems/pipeline.yaml", "--for", "2")
     assert (done.returncode, done.stdout) == (0, "")
     shown = states_in(done.stderr)
     assert shown[3:6] == [
@@ -156,13 +156,13 @@ def test_run_in_the_background_gets_the_same_options(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr("composer.cli.support.process.run_in_background", start)
     options = ("--fail-on-error", "--check-mutation", "--no-tracing", "--use-sim-time")
-    assert in_process("run", "pipeline", "--wait", *options).code == 0
+    assert in_process("run", "systems/pipeline.yaml", "--wait", *options).code == 0
     assert set(options) < set(given)
 
 
 def test_an_invalid_environment_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "-1")
-    for arguments in (["run", "minimal", "--for", "1"], ["lifecycle", "nodes"]):
+    for arguments in (["run", "systems/minimal.yaml", "--for", "1"], ["lifecycle", "nodes"]):
         done = compose(*arguments)
         assert done.returncode == 1
         assert "compose: ROS_DOMAIN_ID is '-1'" in done.stderr
@@ -227,7 +227,7 @@ class Slow:
 
 sys.meta_path.insert(0, Slow())
 from composer.cli import main
-sys.exit(main(["run", "pipeline"]))
+sys.exit(main(["run", "systems/pipeline.yaml"]))
 """
 
 
