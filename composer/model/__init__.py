@@ -4,6 +4,15 @@ The model does not check anything. A reference to a missing entity stays as writ
 report it.
 """
 
+from composer.model.implementation import (
+    BehaviorReference,
+    Executable,
+    ExecutableKind,
+    External,
+    HostedClass,
+    ImplementationKind,
+    LifecycleKind,
+)
 from composer.model.introspection import DEFAULT_INTROSPECTION, Introspection
 from composer.model.periods import Period, PeriodError, PeriodUnit
 from composer.model.ports import (
@@ -33,7 +42,6 @@ from composer.model.supervision import (
 )
 from composer.model.system import (
     DEFAULT_EXECUTOR,
-    BehaviorReference,
     Chain,
     Channel,
     Connection,
@@ -67,11 +75,17 @@ __all__ = [
     "Dependency",
     "Endpoint",
     "Event",
+    "Executable",
+    "ExecutableKind",
     "Executor",
     "ExecutorKind",
+    "External",
     "FeedbackSteps",
+    "HostedClass",
+    "ImplementationKind",
     "Introspection",
     "Isolation",
+    "LifecycleKind",
     "LogLevel",
     "NamedQos",
     "Node",

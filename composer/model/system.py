@@ -9,6 +9,13 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 from composer.fast_dataclass import dataclass
+from composer.model.implementation import (
+    BehaviorReference,
+    Executable,
+    External,
+    HostedClass,
+    ImplementationKind,
+)
 from composer.model.introspection import DEFAULT_INTROSPECTION, Introspection
 from composer.model.periods import PeriodError
 from composer.model.ports import (
@@ -69,25 +76,6 @@ class Dependency:
 
 
 @dataclass(frozen=True, slots=True)
-class BehaviorReference:
-    """``module:Class``: Python next to the YAML file or the node types, or installed."""
-
-    text: Located[str]
-    folder: Path  # the folder of the YAML file; searched first
-    node_folders: tuple[Path, ...] = ()  # the folders of node types; searched next
-
-    @property
-    def module(self) -> str:
-        """The part before the colon."""
-        return self.text.value.partition(":")[0]
-
-    @property
-    def class_name(self) -> str:
-        """The part after the colon, or an empty text."""
-        return self.text.value.partition(":")[2]
-
-
-@dataclass(frozen=True, slots=True)
 class UnknownKey:
     """A key of a node that its node type does not have."""
 
@@ -127,6 +115,9 @@ class Node:
     type_files: tuple[Path, ...] = field(default=(), compare=False)  # its own and its base types'
     description: str = ""
     behavior: BehaviorReference | None = None
+    hosted_class: HostedClass | None = None
+    executable: Executable | None = None
+    external: External | None = None  # takes precedence over the implementation of its type
     parameters: tuple[Parameter, ...] = ()
     ports: tuple[Port, ...] = ()
     timers: tuple[Timer, ...] = ()
@@ -149,6 +140,19 @@ class Node:
     def ros_name(self) -> Located[str]:
         """The name of the node in ROS, without its namespace."""
         return self.name if self.own_name is None else self.own_name
+
+    @property
+    def implementation(self) -> ImplementationKind:
+        """What implements the node."""
+        if self.external is not None:
+            return ImplementationKind.EXTERNAL
+        if self.executable is not None:
+            return ImplementationKind.EXECUTABLE
+        if self.hosted_class is not None:
+            return ImplementationKind.CLASS
+        if self.behavior is not None:
+            return ImplementationKind.BEHAVIOR
+        return ImplementationKind.DECLARATIVE
 
     @property
     def full_name(self) -> str:

@@ -27,6 +27,7 @@ class FaultKind(StrEnum):
     SILENCE = "silence"
     CALLBACK = "callback"  # took too long and was interrupted
     ERRORS = "errors"  # too many of them
+    ENDED = "ended"  # a process or an external node, by itself
     LOST = "lost"  # a callback does not return and cannot be interrupted
 
 

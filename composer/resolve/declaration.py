@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from composer.diagnostics import Diagnostic
 from composer.fast_dataclass import dataclass
 from composer.model import (
-    BehaviorReference,
     Parameter,
     PeriodUnit,
     Port,
@@ -15,13 +12,13 @@ from composer.model import (
     Timer,
     UnknownKey,
 )
-from composer.project import Project
+from composer.resolve.implementation import Implementation, read_implementation
 from composer.resolve.parameters import read_parameters
 from composer.resolve.ports import read_ports, read_timers
 from composer.resolve.qos import QosTable
 from composer.resolve.reactions import NODE_EVENTS, Events, node_reactions
 from composer.resolve.source_folders import SourceFolders
-from composer.resolve.tree_values import entries, key, plain_text, text
+from composer.resolve.tree_values import entries, key, plain_text
 from composer.source import Located
 from composer.tree import Entry, Mapping, Plain, Tree, plain
 
@@ -31,7 +28,7 @@ class Declaration:
     """What all nodes of one type with the same variables share."""
 
     description: str
-    behavior: BehaviorReference | None
+    implementation: Implementation
     parameters: tuple[Parameter, ...]
     ports: tuple[Port, ...]
     timers: tuple[Timer, ...]
@@ -44,12 +41,9 @@ def declare(
     tree: Mapping, folders: SourceFolders, qos: QosTable, diagnostics: list[Diagnostic]
 ) -> Declaration:
     """Read the declaration of a node type or an inline node."""
-    behavior = text(tree.get("behavior"))
     return Declaration(
         description=plain_text(tree.get("description")),
-        behavior=_behavior(behavior, folders.folder(behavior.span))
-        if behavior is not None
-        else None,
+        implementation=read_implementation(tree, folders),
         parameters=read_parameters(tree.get("parameters")),
         ports=read_ports(tree, qos, diagnostics),
         timers=read_timers(tree, diagnostics),
@@ -59,19 +53,18 @@ def declare(
     )
 
 
-def _behavior(reference: Located[str], folder: Path) -> BehaviorReference:
-    return BehaviorReference(reference, folder, Project.at(folder).node_folders)
-
-
 _REFINED_SECTIONS = (*(kind.section for kind in PortKind), "timers")
 _REPLACED_KEYS = ("description", *(name for name, _ in NODE_EVENTS))
+_OVERLAID_KEYS = ("state", "arguments", "executable")
 _PERIOD_KEYS = frozenset(unit.value for unit in PeriodUnit)
 
 
 def refines(instance: Mapping) -> bool:
     """Return whether a node of a system changes more of its type than parameter values."""
     return any(
-        entry.name in _REFINED_SECTIONS or entry.name in _REPLACED_KEYS or entry.name == "state"
+        entry.name in _REFINED_SECTIONS
+        or entry.name in _REPLACED_KEYS
+        or entry.name in _OVERLAID_KEYS
         for entry in instance
     )
 
@@ -87,8 +80,9 @@ def refined(declared: Mapping, instance: Mapping) -> Mapping:
         if entry.name in _REFINED_SECTIONS:
             if entry.name in changed:
                 changed[entry.name] = _refined_section(changed[entry.name], entry)
-        elif entry.name == "state":
-            changed["state"] = _overlaid(changed["state"], entry) if "state" in changed else entry
+        elif entry.name in _OVERLAID_KEYS:
+            name = entry.name
+            changed[name] = _overlaid(changed[name], entry) if name in changed else entry
         elif entry.name in _REPLACED_KEYS:
             changed[entry.name] = entry
     return Mapping(tuple(changed.values()), declared.span)

@@ -21,6 +21,7 @@ from composer.model import (
 from composer.names import expand_name, join
 from composer.resolve.connections import PortConnection, PortConnections, connection_of
 from composer.resolve.declaration import Declaration, declare, refined, refines, unknown_keys
+from composer.resolve.implementation import Implementation, read_external
 from composer.resolve.node_options import read_introspection, read_supervision
 from composer.resolve.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides
@@ -61,7 +62,7 @@ class _Declared:
     type_files: tuple[Path, ...] = ()
 
 
-_NOTHING = Declaration("", None, (), (), (), (), ())
+_NOTHING = Declaration("", Implementation(), (), (), (), (), ())
 
 
 def resolve_node(entry: Entry, context: SystemContext) -> Node:
@@ -84,6 +85,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
     parameters, unknown = with_values(own, given, complete=made.complete)
     remappings = _remappings(tree.get("remappings"))
     lifecycle = tree.get("lifecycle")
+    external = read_external(tree.entry("external"))
     lifecycle = lifecycle if isinstance(lifecycle, Mapping) else Mapping((), tree.span)
     return Node(
         name=key(entry),
@@ -94,7 +96,10 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         type_found=made.type_found,
         type_files=made.type_files,
         description=plain_text(tree.get("description")) or declared.description,
-        behavior=declared.behavior,
+        behavior=declared.implementation.behavior,
+        hosted_class=declared.implementation.hosted_class,
+        executable=declared.implementation.executable,
+        external=external,
         parameters=parameters,
         ports=place_ports(
             declared.ports,

@@ -116,7 +116,9 @@ def resolve_node_type(
         namespace=namespace,
         span=span,
         description=declared.description,
-        behavior=declared.behavior,
+        behavior=declared.implementation.behavior,
+        hosted_class=declared.implementation.hosted_class,
+        executable=declared.implementation.executable,
         parameters=parameters,
         ports=place_ports(
             declared.ports, NodeNames(name.value, name.value, namespace.value), (), {}

@@ -38,7 +38,7 @@ from composer.names import join
 from composer.plan import Fault, Plan
 from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
 from composer.runtime.manager.other_instances import Instance
-from composer.runtime.node.node import NodeListener, RunningNode
+from composer.runtime.node.managed_node import ManagedNode, NodeListener
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
 from composer.runtime.process.dds_profiles import use_large_system_profile
@@ -310,6 +310,7 @@ class Host:
             self._node_set.keep_entities()
         stop_within_s = self._options.stop_within_s
         self._tear_down_end_s = time.monotonic() + stop_within_s
+        self._node_set.limit_end(self._tear_down_end_s)
         if self._is_created:
             limit_s = _STEP_SHARE * stop_within_s
             if not self._supervisor.tear_down(self._down, self._tear_down_end_s, limit_s):
@@ -362,7 +363,7 @@ def _start_ros() -> None:
         raise start_refused(error) from error
 
 
-def _summary(node: RunningNode) -> NodeSummary:
+def _summary(node: ManagedNode) -> NodeSummary:
     counters = node.statistics
     return NodeSummary(
         node=node.full_name,

@@ -46,7 +46,7 @@ from composer.runtime.manager.queries import ManagerQueries
 from composer.runtime.manager.status_messages import status_message
 from composer.runtime.metrics.diagnostics import Figures, to_message
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
-from composer.runtime.node.node import RunningNode
+from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import ParameterServices
 from composer.runtime.process.query_socket import QuerySocket
@@ -91,7 +91,7 @@ class ManagerCallbacks:
     update_status: Callable[[], None]
     callbacks: Callable[[], tuple[CallbackFigures, ...]]
     chains: Callable[[], tuple[ChainFigures, ...]]
-    nodes: Callable[[], Mapping[str, RunningNode]]
+    nodes: Callable[[], Mapping[str, ManagedNode]]
     write_log: Write
 
 

@@ -27,7 +27,7 @@ from rclpy.node import Node
 
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.loop import Reply, unused_callback
-from composer.runtime.node.node import RunningNode
+from composer.runtime.node.managed_node import InProcessNode, ManagedNode
 from composer.runtime.node.parameter_services import (
     NodeParameterStore,
     UnknownParameterError,
@@ -38,7 +38,7 @@ from composer.runtime.node.parameter_services import (
 from composer.runtime.ros.manager_protocol import CHANGE_STATE, full_parameter_name
 
 #: Returns the nodes of the system by their full names.
-Nodes = Callable[[], Mapping[str, RunningNode]]
+Nodes = Callable[[], Mapping[str, ManagedNode]]
 
 
 class ProxyLifecycleService:
@@ -86,6 +86,8 @@ class ProxyParameterStore(NodeParameterStore):
         requested = set(prefixes)
         result = await super().list_names(prefixes, depth)
         for name, node in self._nodes().items():
+            if not isinstance(node, InProcessNode):
+                continue  # it has parameter services of its own
             if name in requested or not (requested or node.model.introspection.parameters):
                 names = await self.names_of(name)
                 result.prefixes.append(name)
@@ -138,7 +140,7 @@ class ProxyParameterStore(NodeParameterStore):
         if not any(_is_of_node(change.name) for change in changes):
             return await super().set(changes)
         names = {change.name.partition(".")[0] for change in changes}
-        nodes = [self._nodes().get(name) for name in names]
+        nodes = [self._local(name) for name in names]
         if len(nodes) != 1 or nodes[0] is None:
             shown = ", ".join(sorted(names))
             return SetParametersResult(
@@ -150,9 +152,13 @@ class ProxyParameterStore(NodeParameterStore):
         ]
         return await nodes[0].query(lambda ros_node: set_parameters(ros_node, own))
 
-    def _find(self, name: str) -> tuple[RunningNode | None, str]:
-        node, _, parameter = name.partition(".")
-        return self._nodes().get(node), parameter
+    def _find(self, name: str) -> tuple[InProcessNode | None, str]:
+        name, _, parameter = name.partition(".")
+        return self._local(name), parameter
+
+    def _local(self, name: str) -> InProcessNode | None:
+        node = self._nodes().get(name)
+        return node if isinstance(node, InProcessNode) else None
 
 
 def _is_of_node(name: str) -> bool:

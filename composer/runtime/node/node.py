@@ -10,13 +10,13 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from time import monotonic
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node as RosNode
 
 from composer.behavior import TransitionFailed
-from composer.model import BehaviorReference, Event, LogLevel, Node, PeriodError
+from composer.model import BehaviorReference, Event, Node, PeriodError
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log
 from composer.runtime.callbacks.mutation_check import MessageSnapshots, MutationCheck
@@ -36,6 +36,7 @@ from composer.runtime.node.behavior_loader import (
 )
 from composer.runtime.node.entities import NodeEntities, RunningPort
 from composer.runtime.node.lifecycle import Lifecycle
+from composer.runtime.node.managed_node import NodeListener
 from composer.runtime.node.options import NodeOptions
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.node.parameter_services import NodeParameterStore, ParameterServices
@@ -56,24 +57,11 @@ class WrongReturn(Exception):
     """A lifecycle handler returned something other than None, True or False."""
 
 
-class NodeListener(Protocol):
-    """Receives what a node reports, on the threads of the node's loop. It must not block."""
-
-    def on_transition_end(self, result: TransitionOutcome) -> None:
-        """Receive the end of a transition."""
-
-    def on_error(self, callback: str, text: str) -> None:
-        """Receive an error of user code, at most once a second for each callback."""
-
-    def on_error_limit(self, text: str) -> None:
-        """Receive that the node has exceeded its ``max_errors``, once per activation."""
-
-    def write_log(self, level: LogLevel, logger: str, message: str) -> None:
-        """Receive a line of the log."""
-
-
 class RunningNode:
-    """One node of a running system. Create it before its loop is started, or on the loop."""
+    """The :class:`.ManagedNode` of a behavior or of reactions alone.
+
+    Create it before its loop is started, or on the loop.
+    """
 
     def __init__(
         self,
@@ -90,6 +78,7 @@ class RunningNode:
         #: When, by ``time.monotonic()``, the work of its last transition started.
         self.transition_started_s = 0.0
         self.statistics = Statistics() if statistics is None else statistics
+        self.transition_timeout_s = options.transition_timeout_s
         self._listener = listener
         self._system_is_up = options.system_is_up
         self._ros = make_ros_node(model)
@@ -166,6 +155,14 @@ class RunningNode:
     def sent(self, publisher: str) -> int:
         """Return how many messages a publisher has sent."""
         return self.statistics.publisher(publisher).count
+
+    def limit_end(self, end_s: float) -> None:
+        """Do nothing: transitions have a time limit, and the loop interrupts callbacks."""
+
+    @property
+    def callback_owners(self) -> tuple[object, ...]:
+        """The objects by which a running callback on a stack is recognized as the node's."""
+        return (self, *self.contexts)
 
     @property
     def contexts(self) -> tuple[NodeContext, NodeContext]:

@@ -11,7 +11,7 @@ from types import FrameType
 
 from composer.model import PrimaryState
 from composer.plan import Fault, FaultKind
-from composer.runtime.node.node import RunningNode
+from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.runtime.supervision.main_queue import CallbackHanging, LoopRecovered, NodeEvent
 from composer.runtime.supervision.node_set import NodeSet
@@ -131,7 +131,7 @@ class HealthMonitor:
                 observed.node = name
                 observed.limit_s = self._limit_s(observed.callback, name, node)
 
-    def _limit_s(self, callback: RunningCallback, name: str, node: RunningNode) -> float:
+    def _limit_s(self, callback: RunningCallback, name: str, node: ManagedNode) -> float:
         """Return the time limit of a callback; handlers of transitions have one of their own."""
         if callback.in_transition:
             return self._node_set.timeout_s(name) + _TRANSITION_MARGIN_S
@@ -185,7 +185,7 @@ class _NodeSilence:
         for topic, limit in watch.topics:
             self._silences.append(_Silence(topic.value, limit.value / 1000.0))
         self._has_failed = False
-        self._activation: tuple[RunningNode, int] | None = None
+        self._activation: tuple[ManagedNode, int] | None = None
 
     @property
     def has_limits(self) -> bool:
@@ -228,7 +228,7 @@ class _Silence:
         """Forget earlier checks."""
         self.sent = -1
 
-    def check(self, node: RunningNode, now_s: float) -> str | None:
+    def check(self, node: ManagedNode, now_s: float) -> str | None:
         """Return a text if the silence exceeds the limit."""
         sent = node.statistics.sent if self.publisher is None else node.sent(self.publisher)
         node_now_s = node.now_s()

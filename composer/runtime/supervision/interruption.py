@@ -24,6 +24,7 @@ from composer.runtime.executors.stacks import (
     gc_paused,
     stacks_of,
 )
+from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.node import RunningNode
 from composer.runtime.ports.mailbox import Mailbox
 
@@ -58,13 +59,13 @@ class RunningCallback:
     in_transition: bool
     _callers: Sequence[FrameType]  # from the frame that calls it, outward
 
-    def node(self, nodes: Iterable[RunningNode]) -> RunningNode | None:
+    def node(self, nodes: Iterable[ManagedNode]) -> ManagedNode | None:
         """Return the node among ``nodes`` that it belongs to. Call this once per callback.
 
         Reading the variables of a frame again releases their earlier values, which may run Python
         code while the frame is read.
         """
-        owners = {id(part): node for node in nodes for part in (node, *node.contexts)}
+        owners = {id(part): node for node in nodes for part in node.callback_owners}
         with gc_paused():
             for frame in self._callers:
                 subject = frame.f_locals.get("self")

@@ -46,6 +46,13 @@ class LoopRecovered:
 
 
 @dataclass(frozen=True, slots=True)
+class NodeReturned:
+    """An external node that had disappeared is there again. ``node`` is a key."""
+
+    node: str
+
+
+@dataclass(frozen=True, slots=True)
 class Command:
     """A command for the system, see :mod:`.commands`. Call ``answer(success, message)`` once.
 
@@ -57,7 +64,7 @@ class Command:
     nodes: tuple[str, ...] = ()
 
 
-NodeEvent: TypeAlias = Fault | NodeMoved | CallbackHanging | LoopRecovered
+NodeEvent: TypeAlias = Fault | NodeMoved | CallbackHanging | LoopRecovered | NodeReturned
 Item: TypeAlias = NodeEvent | Command
 
 

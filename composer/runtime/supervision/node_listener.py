@@ -6,7 +6,7 @@ from composer.model import LogLevel, Node, PrimaryState
 from composer.plan import Fault, FaultKind
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.supervision import events
-from composer.runtime.supervision.main_queue import Item, MainQueue, NodeMoved
+from composer.runtime.supervision.main_queue import Item, MainQueue, NodeMoved, NodeReturned
 from composer.runtime.supervision.shared_desired_state import SharedDesiredState
 from composer.runtime.supervision.status import Status
 
@@ -76,6 +76,15 @@ class SupervisionListener:
         """Report that the node has exceeded its ``max_errors``."""
         serial = self._desired.value.serial
         self._main_queue.put(Fault(self._name, FaultKind.ERRORS, text, serial))
+
+    def on_ended(self, text: str) -> None:
+        """Report that a node outside the process has ended or disappeared by itself."""
+        serial = self._desired.value.serial
+        self._main_queue.put(Fault(self._name, FaultKind.ENDED, text, serial))
+
+    def on_returned(self) -> None:
+        """Report that a node that had disappeared by itself is there again."""
+        self._main_queue.put(NodeReturned(self._name))
 
     def write_log(self, level: LogLevel, logger: str, message: str) -> None:
         """Report a line of the log."""

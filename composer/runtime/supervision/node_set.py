@@ -26,7 +26,8 @@ from composer.runtime.intra_process.eligibility import shared_channels
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, chain_figures, figures
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node.node import NodeListener, RunningNode
+from composer.runtime.node.managed_node import ManagedNode, NodeListener
+from composer.runtime.node.node import RunningNode
 from composer.runtime.node.options import NodeOptions, ProcessContext
 from composer.runtime.node.outcome import FINALIZED
 from composer.runtime.node.parameters import ParameterError
@@ -80,7 +81,7 @@ class NodeSet:
         self._router = LocalRouter({})
         self._chains = Chains(system, tracing=options.tracing)
         self._process: ProcessContext  # set by create()
-        self.nodes: dict[str, RunningNode] = {}
+        self.nodes: dict[str, ManagedNode] = {}
         self.loops: dict[str, Loop] = {}
         #: The loops with a callback that does not return; their nodes cannot do anything.
         self.hung: set[str] = set()
@@ -116,7 +117,7 @@ class NodeSet:
 
     def timeout_s(self, name: str) -> float:
         """Return the time limit of a node's transitions."""
-        return self._timeout_s(self.nodes[name].model)
+        return self.nodes[name].transition_timeout_s
 
     def states(self) -> Mapping[str, PrimaryState]:
         """Return the states of the nodes that can be moved, by their keys.
@@ -170,6 +171,11 @@ class NodeSet:
             return f"cannot be created again: {describe(error)}"
         return None
 
+    def limit_end(self, end_s: float) -> None:
+        """Tell the nodes that the system shuts down until ``end_s`` (monotonic)."""
+        for node in self.nodes.values():
+            node.limit_end(end_s)
+
     def keep_entities(self) -> None:
         """Do not destroy entities from now on: the end of the process does."""
         self._keeps_entities = True
@@ -204,13 +210,13 @@ class NodeSet:
                 self.nodes[name].destroy()
         return complete
 
-    def _replace(self, old: RunningNode, is_outdated: Callable[[], bool]) -> RunningNode:
+    def _replace(self, old: ManagedNode, is_outdated: Callable[[], bool]) -> ManagedNode:
         if is_outdated():
             return old
         old.destroy()
         return self._make(old.model, old)
 
-    def _make(self, node: Node, before: RunningNode | None = None) -> RunningNode:
+    def _make(self, node: Node, before: ManagedNode | None = None) -> ManagedNode:
         executor = self._executor_of(node)
         name = executor.name.value
         if name not in self.loops:

@@ -46,6 +46,7 @@ from composer.runtime.supervision.main_queue import (
     MainQueue,
     NodeEvent,
     NodeMoved,
+    NodeReturned,
 )
 from composer.runtime.supervision.plan_executor import ExecutionOptions, PlanExecutor, StepFailed
 from composer.runtime.supervision.shared_desired_state import SharedDesiredState
@@ -216,6 +217,8 @@ class Supervisor:
                 self._on_callback_hanging(hanging)
             case LoopRecovered() as recovered:
                 self._on_loop_recovered(recovered)
+            case NodeReturned(node=name):
+                self._on_returned(name)
 
     def restart(self, restart: Restart) -> None:
         """Restart a failed node, unless an external transition comes first."""
@@ -280,6 +283,13 @@ class Supervisor:
         for name in self._abandoned.pop(recovered.loop, ()):
             self.shared.update(partial(DesiredState.release, node=name))
         self._reconcile_settled(f"executor '{recovered.loop}' runs again")
+
+    def _on_returned(self, name: str) -> None:
+        """Bring an external node up again that had disappeared, and what depends on it."""
+        if name in self.desired.down:
+            self.shared.update(partial(DesiredState.release, node=name))
+            full_name = self._node_set.nodes[name].full_name
+            self._reconcile_settled(f"{full_name} is there again")
 
     def _is_outdated(self, fault: Fault) -> bool:
         """Return whether the node has left the state in which it failed."""

@@ -1,0 +1,118 @@
+"""What the supervision knows of a node, whatever implements it and wherever it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol, TypeVar, runtime_checkable
+
+from rclpy.node import Node as RosNode
+
+from composer.model import LogLevel, Node
+from composer.runtime.executors.futures import Future
+from composer.runtime.executors.loop import Loop
+from composer.runtime.metrics.statistics import Statistics
+from composer.runtime.node.outcome import TransitionOutcome
+
+T = TypeVar("T")
+
+
+class NodeListener(Protocol):
+    """Receives what a node reports, on the threads of the node's loop. It must not block."""
+
+    def on_transition_end(self, result: TransitionOutcome) -> None:
+        """Receive the end of a transition."""
+
+    def on_error(self, callback: str, text: str) -> None:
+        """Receive an error of user code, at most once a second for each callback."""
+
+    def on_error_limit(self, text: str) -> None:
+        """Receive that the node has exceeded its ``max_errors``, once per activation."""
+
+    def on_ended(self, text: str) -> None:
+        """Receive that a node outside the process has ended or disappeared by itself."""
+
+    def on_returned(self) -> None:
+        """Receive that a node that had disappeared by itself is there again."""
+
+    def write_log(self, level: LogLevel, logger: str, message: str) -> None:
+        """Receive a line of the log."""
+
+
+class ManagedLifecycle(Protocol):
+    """The transitions of a node. The coroutines run on the node's loop and raise nothing."""
+
+    @property
+    def available(self) -> Mapping[str, int]:
+        """The ids of the transitions that can be requested now, by name. Thread-safe."""
+
+    async def change(self, transition: str) -> TransitionOutcome:
+        """Run an external ``transition`` as soon as no other one runs."""
+
+    async def run_step(self, transition: str, is_outdated: Callable[[], bool]) -> TransitionOutcome:
+        """Run the ``transition`` of a plan as soon as no other one runs.
+
+        If ``is_outdated()`` then, do not run it: an external transition came first.
+        """
+
+    def fail_request(self) -> None:
+        """Answer a pending request of an external node: its transition hangs. Thread-safe."""
+
+
+class ManagedNode(Protocol):
+    """A node of a running system. Methods may be called from any thread unless they say else."""
+
+    model: Node
+    loop: Loop
+    statistics: Statistics
+    activations: int  # how often it became active
+    #: When, by ``time.monotonic()``, the work of its last transition started.
+    transition_started_s: float
+
+    @property
+    def lifecycle(self) -> ManagedLifecycle:
+        """Its transitions."""
+
+    @property
+    def full_name(self) -> str:
+        """The name ROS knows the node by."""
+
+    @property
+    def state(self) -> str:
+        """The label of the lifecycle state."""
+
+    @property
+    def transition_timeout_s(self) -> float:
+        """How long a transition may take before it counts as stuck."""
+
+    @property
+    def callback_owners(self) -> Sequence[object]:
+        """The objects by which a running callback on a stack is recognized as the node's."""
+
+    def now_s(self) -> float:
+        """Return the node's time in seconds."""
+
+    def sent(self, publisher: str) -> int:
+        """Return how many messages a publisher has sent."""
+
+    def count_errors(self) -> None:
+        """Count errors as faults from now on: the system is up."""
+
+    def block(self) -> None:
+        """Block all ports of a failed node until its next transition."""
+
+    def limit_end(self, end_s: float) -> None:
+        """Know that the system shuts down and that nothing may last longer than ``end_s``."""
+
+    def keep_entities(self) -> None:
+        """Do not destroy ports from now on: the end of the process does."""
+
+    def destroy(self) -> None:
+        """Destroy the node in any state, on its loop or once that has stopped."""
+
+
+@runtime_checkable
+class InProcessNode(ManagedNode, Protocol):
+    """A node with a ROS node in this process."""
+
+    def query(self, function: Callable[[RosNode], T]) -> Future[T]:
+        """Return the result of ``function(ROS node)``, which is called on the node's loop."""
