@@ -13,7 +13,11 @@ from composer.model.implementation import (
     ImplementationKind,
     LifecycleKind,
 )
-from composer.model.introspection import DEFAULT_INTROSPECTION, Introspection
+from composer.model.introspection import (
+    DEFAULT_INTROSPECTION,
+    DRIVEN_BY_MANAGER,
+    Introspection,
+)
 from composer.model.periods import Period, PeriodError, PeriodUnit
 from composer.model.ports import (
     USE_SIM_TIME,
@@ -65,6 +69,7 @@ __all__ = [
     "DEFAULT_EXECUTOR",
     "DEFAULT_INTROSPECTION",
     "DEFAULT_SUPERVISION",
+    "DRIVEN_BY_MANAGER",
     "USE_SIM_TIME",
     "BehaviorReference",
     "Chain",

@@ -28,3 +28,5 @@ class Introspection:
 
 
 DEFAULT_INTROSPECTION = Introspection()
+#: A node outside the process: the manager starts and ends it, all else it has itself.
+DRIVEN_BY_MANAGER = Introspection(lifecycle_services=False)

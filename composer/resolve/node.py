@@ -9,6 +9,7 @@ from pathlib import Path
 from composer.diagnostics import Diagnostic
 from composer.fast_dataclass import dataclass
 from composer.model import (
+    DRIVEN_BY_MANAGER,
     USE_SIM_TIME,
     Dependency,
     Node,
@@ -115,7 +116,9 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         depends_on=_dependencies(lifecycle.get("depends_on")),
         autostart=state(lifecycle.get("autostart")),
         supervision=read_supervision(lifecycle, context.supervision),
-        introspection=read_introspection(
+        introspection=DRIVEN_BY_MANAGER
+        if external is not None or declared.implementation.executable is not None
+        else read_introspection(
             declared.introspection, context.introspection, tree.get("introspection")
         ),
         unknown=(*made.unknown, *unknown),

@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
@@ -32,7 +32,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import get_rmw_implementation_identifier, try_shutdown
 
-from composer.model import LogLevel, Node, System
+from composer.model import LogLevel, Node, PrimaryState, System
 from composer.model.dependencies import dependency_edges, in_dependency_order
 from composer.names import join
 from composer.plan import Fault, Plan
@@ -61,6 +61,7 @@ from composer.runtime.supervision.supervisor import Supervisor
 #: The longest share of the time for the tear-down that one step may take.
 _STEP_SHARE = 0.6
 _URGENT_S = 0.2
+_REACHED = {"configure": PrimaryState.INACTIVE, "activate": PrimaryState.ACTIVE}
 #: This many nodes can be destroyed one by one within half a second.
 _FEW_NODES = 20
 #: Joining the ROS graph takes a tenth of a second, on a busy machine some tenths.
@@ -249,7 +250,7 @@ class Host:
             self._fail(f"{failed.partition(':')[0]} failed")
         if self._main_queue.stopping:
             return False
-        self._supervisor.set_goals(self._node_set.states(), serial)
+        self._supervisor.set_goals(self._reached(), serial)
         self._status.set_activity("running")
         self._reporter.report(
             events.BroughtUp(
@@ -257,6 +258,14 @@ class Host:
             )
         )
         return True
+
+    def _reached(self) -> Mapping[str, PrimaryState]:
+        """Return the states that the bring-up has reached, also of nodes that have failed since."""
+        states = dict(self._node_set.states())
+        for step in self._up.steps:
+            if step.node in self._supervisor.desired.unhandled:
+                states[step.node] = _REACHED.get(step.transition, states[step.node])
+        return states
 
     def _supervise(self) -> None:
         run_for_s = self._options.run_for_s

@@ -45,6 +45,11 @@ WARNING_PERIOD_S = 10.0
 Write: TypeAlias = Callable[[LogLevel, str, str], None]
 
 
+def severity(level: LogLevel) -> int:
+    """Return the number of a level, which is greater the more severe it is."""
+    return _SEVERITIES[level]
+
+
 class Log:
     """A behavior's ``log``: to the console of the process, and to /rosout.
 

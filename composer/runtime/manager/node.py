@@ -128,7 +128,7 @@ class ManagerNode:
         ParameterServices(self._node, store, self._log.warn)
         self._loop.add_node(self._node)
         simulated_time = SimTimeSource(self._node, self._loop, self._log.warn)
-        self.process_context = ProcessContext(simulated_time, EventCounts(self._loop))
+        self.process_context = ProcessContext(self._node, simulated_time, EventCounts(self._loop))
         self._clock = NodeTime(self._node, self._loop, simulated_time)
         self._node.set_parameters([Parameter(USE_SIM_TIME_NAME, value=use_sim_time)])
         self._diagnostics = self._publisher(_DIAGNOSTICS, 10, self._publish)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rclpy.node import Node as RosNode
+
 from composer.model import LogLevel
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
@@ -14,8 +16,9 @@ from composer.runtime.intra_process.router import LocalRouter
 
 @dataclass(frozen=True, slots=True)
 class ProcessContext:
-    """What all nodes of the process share, on the loop of the manager node."""
+    """What all nodes of the process share: the manager node, and what runs on its loop."""
 
+    manager: RosNode
     simulated_time: SimTimeSource
     events: EventCounts
 

@@ -77,10 +77,17 @@ class SupervisionListener:
         serial = self._desired.value.serial
         self._main_queue.put(Fault(self._name, FaultKind.ERRORS, text, serial))
 
-    def on_ended(self, text: str) -> None:
-        """Report that a node outside the process has ended or disappeared by itself."""
-        serial = self._desired.value.serial
-        self._main_queue.put(Fault(self._name, FaultKind.ENDED, text, serial))
+    def on_ended(self, text: str, state: str) -> None:
+        """Report that a node outside the process has ended by itself, and its new state.
+
+        No plan moves the node until the supervisor has handled the fault.
+        """
+        fault = Fault(self._name, FaultKind.ENDED, text, self._desired.value.serial)
+        self._desired.update(lambda desired: desired.await_fault(fault))
+        self._status.set_state(self._name, state)
+        at_s = self._reporter.elapsed_s
+        self._reporter.report(events.StateChanged(at_s, self._full_name, "end", state))
+        self._main_queue.put(fault)
 
     def on_returned(self) -> None:
         """Report that a node that had disappeared by itself is there again."""

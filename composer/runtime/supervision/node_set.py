@@ -19,6 +19,10 @@ from composer.model import (
 )
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
+from composer.runtime.children.child_processes import ChildProcesses
+from composer.runtime.children.executable_node import ExecutableNode
+from composer.runtime.children.external_node import ExternalNode
+from composer.runtime.children.outside_node import OutsideContext
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.factory import log_exception, make_loop, place_threads
 from composer.runtime.executors.loop import Loop
@@ -35,6 +39,8 @@ from composer.runtime.supervision.interruption import RunningCallback, running_c
 from composer.source import Located
 
 _PRIMARY_STATES = {state.value: state for state in PrimaryState}
+#: The loop on which all nodes outside the process are driven.
+_OUTSIDE = "nodes outside the process"
 _LOOP_ENDS_WITHIN_S = 0.2
 #: Time for a loop to remove the entities of a node, on a busy machine.
 _NODE_REMOVED_WITHIN_S = 0.005
@@ -86,6 +92,7 @@ class NodeSet:
         #: The loops with a callback that does not return; their nodes cannot do anything.
         self.hung: set[str] = set()
         self._keeps_entities = False
+        self._children = ChildProcesses()
         #: What Linux or the middleware does not allow, each with a hint.
         self.warnings: list[str] = []
 
@@ -172,7 +179,7 @@ class NodeSet:
         return None
 
     def limit_end(self, end_s: float) -> None:
-        """Tell the nodes that the system shuts down until ``end_s`` (monotonic)."""
+        """Pass on that the system shuts down until ``end_s`` (monotonic)."""
         for node in self.nodes.values():
             node.limit_end(end_s)
 
@@ -200,6 +207,7 @@ class NodeSet:
         Return False if some are left to the end of the process: Fast DDS takes longer for each
         endpoint the more there are, seconds for 100 nodes, and a hung loop never ends.
         """
+        self._children.close()
         if self._keeps_entities:
             return False
         complete = not self.hung
@@ -217,10 +225,12 @@ class NodeSet:
         return self._make(old.model, old)
 
     def _make(self, node: Node, before: ManagedNode | None = None) -> ManagedNode:
+        statistics = (
+            Statistics(tracing=self._options.tracing) if before is None else before.statistics
+        )
+        if not node.implementation.in_process:
+            return self._make_outside(node, statistics)
         executor = self._executor_of(node)
-        name = executor.name.value
-        if name not in self.loops:
-            self.loops[name] = make_loop(executor, _log_exception)
         options = NodeOptions(
             chains=self._chains,
             router=self._router,
@@ -231,10 +241,31 @@ class NodeSet:
             transition_timeout_s=self._timeout_s(node),
             system_is_up=before is not None,
         )
-        statistics = (
-            Statistics(tracing=self._options.tracing) if before is None else before.statistics
+        loop = self._loop_of(executor)
+        return RunningNode(node, loop, options, self._make_listener(node), statistics)
+
+    def _make_outside(self, node: Node, statistics: Statistics) -> ManagedNode:
+        name = Located(_OUTSIDE, node.span)
+        context = OutsideContext(
+            loop=self._loop_of(Executor(name, ExecutorKind.EVENTS, node.span)),
+            manager=self._process.manager,
+            children=self._children,
+            listener=self._make_listener(node),
+            statistics=statistics,
+            timeout_s=self._timeout_s(node),
+            log_level=self._options.log_level,
         )
-        return RunningNode(node, self.loops[name], options, self._make_listener(node), statistics)
+        if node.external is not None:
+            return ExternalNode(node, node.external, context)
+        if node.executable is not None:
+            return ExecutableNode(node, node.executable, context)
+        raise AssertionError(f"{node.full_name} runs in this process")
+
+    def _loop_of(self, executor: Executor) -> Loop:
+        name = executor.name.value
+        if name not in self.loops:
+            self.loops[name] = make_loop(executor, _log_exception)
+        return self.loops[name]
 
     def _timeout_s(self, node: Node) -> float:
         override_s = self._options.transition_timeout_s

@@ -1,0 +1,123 @@
+"""A node that something else starts: it is awaited and observed, but never started or ended."""
+
+from __future__ import annotations
+
+from functools import partial
+from time import monotonic
+
+from composer.model import External, LifecycleKind, Node
+from composer.runtime.children.outside_node import (
+    ACTIVE,
+    INACTIVE,
+    UNCONFIGURED,
+    OutsideContext,
+    OutsideNode,
+    TransitionRefused,
+    missing_text,
+)
+from composer.runtime.children.presence import NodePresence
+from composer.runtime.children.remote_lifecycle import NotAnswered, RemoteLifecycle
+
+_PERIOD_S = 0.5
+_NOTHING_EARLIER: frozenset[bytes] = frozenset()
+#: The states of the node itself in which its service is asked for a transition.
+_STARTS = {
+    "configure": UNCONFIGURED,
+    "activate": INACTIVE,
+    "deactivate": ACTIVE,
+    "cleanup": INACTIVE,
+}
+
+
+class ExternalNode(OutsideNode):
+    """The :class:`.ManagedNode` of an external node.
+
+    It is active once its ports are in the ROS graph. It is driven by its lifecycle services only if
+    it is declared as managed, and never shut down.
+    """
+
+    def __init__(self, model: Node, external: External, context: OutsideContext) -> None:
+        super().__init__(model, context)
+        self._external = external
+        self._manager = context.manager
+        self._presence = NodePresence(self._manager, model)
+        self._remote: RemoteLifecycle | None = None
+        self._is_lost = False  # it disappeared, and its return has not been reported
+        self._timer = self.loop.call_every(_PERIOD_S, self._check)
+
+    @property
+    def transition_timeout_s(self) -> float:
+        """How long a transition may take, including the time until the node appears."""
+        return self._timeout_s + self._external.ready_timeout_s
+
+    def destroy(self) -> None:
+        """Stop to observe the node."""
+        self._timer.cancel()
+        self._close_remote()
+
+    @property
+    def _is_managed(self) -> bool:
+        return self._external.lifecycle is LifecycleKind.MANAGED
+
+    async def _work(self, transition: str) -> None:
+        if self._is_managed and transition != "shutdown":
+            await self._work_managed(transition)
+        elif transition == "activate":
+            await self._await_ports()
+        if transition in ("cleanup", "shutdown"):
+            self._close_remote()
+
+    async def _await_ports(self) -> None:
+        presence = self._presence
+        end_s = monotonic() + self._external.ready_timeout_s
+        if not await self._until(lambda: presence.has_node() and not presence.missing(), end_s):
+            self._refuse_absent(missing_text(presence.missing()), INACTIVE)
+        self._is_lost = False
+
+    async def _work_managed(self, transition: str) -> None:
+        if transition == "configure":
+            await self._connect()
+        if self._remote is None:
+            raise TransitionRefused("it is not connected", UNCONFIGURED)
+        end_s = monotonic() + self._timeout_s
+        try:
+            state = await self._remote.state(end_s)
+            if state == _STARTS[transition]:  # otherwise, something else has moved it already
+                success, state = await self._remote.change(transition, end_s)
+                if not success:
+                    raise TransitionRefused(f"its service reports a failure; it is {state}", state)
+        except NotAnswered as error:
+            text = f"{error} within {self._timeout_s:g} s"
+            raise TransitionRefused(text, UNCONFIGURED) from error
+
+    async def _connect(self) -> None:
+        service = f"{self.full_name}/change_state"
+        self._close_remote()
+        has_service = partial(self._presence.has_service, service, _NOTHING_EARLIER)
+        end_s = monotonic() + self._external.ready_timeout_s
+        if not await self._until(has_service, end_s):
+            self._refuse_absent(f"it has no service {service}", UNCONFIGURED)
+        self._remote = RemoteLifecycle(self._manager, self.loop, self.full_name, self._on_event)
+        self._is_lost = False
+
+    def _refuse_absent(self, missing: str, state: str) -> None:
+        limit = f"after {self._external.ready_timeout_s:g} s"
+        raise TransitionRefused(f"{missing} {limit}; start it, or see 'ros2 node list'", state)
+
+    def _close_remote(self) -> None:
+        if self._remote is not None:
+            self._remote.close()
+            self._remote = None
+
+    def _check(self) -> None:
+        """Notice that the node disappears, and that it returns."""
+        if self._lock.is_held or self.state not in (UNCONFIGURED, INACTIVE, ACTIVE):
+            return
+        is_used = self.state == ACTIVE or self._remote is not None
+        if is_used and not self._presence.has_node():
+            self._is_lost = True
+            self._close_remote()
+            self._fail("it has disappeared from the ROS graph")
+        elif self._is_lost and self._presence.has_node() and not self._presence.missing():
+            self._is_lost = False
+            self._listener.on_returned()

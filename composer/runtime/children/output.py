@@ -1,0 +1,84 @@
+"""The output of a child process as lines of a log: bounded, whatever the process writes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from composer.model import LogLevel
+
+_LONGEST_LINE = 2000  # bytes
+_CUT = b" ..."
+#: More lines than this within a second are dropped: nobody reads them, and the log has to go on.
+_MAX_LINES_PER_S = 500
+#: The format that the composer asks the loggers of ROS for, see ``CONSOLE_FORMAT``.
+_ROS_LINE = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[([^\]\s]+)\]:? (.*)", re.DOTALL)
+_COLORS = re.compile(rb"\x1b\[[0-9;]*m")
+
+
+class OutputLines:
+    """Splits the output of a process into lines, and passes them on as text."""
+
+    def __init__(self, on_line: Callable[[str], None]) -> None:
+        self._on_line = on_line
+        self._rest = b""
+        self._is_cut = False  # the rest of a line that was cut is dropped
+        self._second = -1
+        self._lines = 0
+        self._dropped = 0
+
+    def add(self, data: bytes, now_s: float) -> None:
+        """Add what was read at a time of ``time.monotonic()``."""
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        for line in lines:
+            self._pass_on(line, now_s)
+        if len(self._rest) > _LONGEST_LINE:
+            if not self._is_cut:
+                self._emit(self._rest[:_LONGEST_LINE] + _CUT)
+            self._is_cut = True
+            self._rest = b""
+
+    def finish(self) -> None:
+        """Pass on the last line if it has no end, and what was dropped."""
+        if self._rest and not self._is_cut:
+            self._emit(self._rest)
+        self._rest = b""
+        self._report_dropped()
+
+    def _pass_on(self, line: bytes, now_s: float) -> None:
+        if self._is_cut:
+            self._is_cut = False
+            return
+        second = int(now_s)
+        if second != self._second:
+            self._second, self._lines = second, 0
+            self._report_dropped()
+        self._lines += 1
+        if self._lines > _MAX_LINES_PER_S:
+            self._dropped += 1
+        elif len(line) > _LONGEST_LINE:
+            self._emit(line[:_LONGEST_LINE] + _CUT)
+        else:
+            self._emit(line)
+
+    def _report_dropped(self) -> None:
+        if self._dropped:
+            dropped, self._dropped = self._dropped, 0
+            self._on_line(f"({dropped} lines were dropped: more than {_MAX_LINES_PER_S} a second)")
+
+    def _emit(self, line: bytes) -> None:
+        text = _COLORS.sub(b"", line).decode(errors="backslashreplace").rstrip("\r")
+        if text.strip():
+            self._on_line(text)
+
+
+def parse_line(text: str, *, is_error: bool) -> tuple[LogLevel, str | None, str]:
+    """Return the level, the logger and the message of a line.
+
+    A line that no ROS logger has written has the level of its stream, and no logger.
+    """
+    found = _ROS_LINE.fullmatch(text)
+    if found is None:
+        return LogLevel.WARN if is_error else LogLevel.INFO, None, text
+    severity, logger, message = found.groups()
+    return LogLevel(severity.lower()), logger, message

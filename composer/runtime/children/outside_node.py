@@ -1,0 +1,279 @@
+"""A node outside the process, as the supervision sees it."""
+
+# ruff: noqa: B027  (methods that most or all of these nodes need not implement)
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from time import monotonic
+
+from lifecycle_msgs.msg import Transition
+from rclpy.node import Node as RosNode
+
+from composer.model import LogLevel, Node, Port
+from composer.runtime.children.child_processes import ChildProcesses
+from composer.runtime.children.remote_lifecycle import GOALS, PRIMARY_STATES
+from composer.runtime.executors.exceptions import describe
+from composer.runtime.executors.futures import Cancelled, Future
+from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.tasks import sleep
+from composer.runtime.metrics.statistics import Statistics
+from composer.runtime.node.managed_node import NodeListener
+from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
+
+UNCONFIGURED, INACTIVE, ACTIVE = "unconfigured", "inactive", "active"
+_DURING = {
+    "configure": "configuring",
+    "activate": "activating",
+    "deactivate": "deactivating",
+    "cleanup": "cleaningup",
+    "shutdown": "shuttingdown",
+}
+_TRANSITIONS = {state: transition for transition, state in _DURING.items()}
+_AVAILABLE: dict[str, Mapping[str, int]] = {
+    UNCONFIGURED: {
+        "configure": Transition.TRANSITION_CONFIGURE,
+        "shutdown": Transition.TRANSITION_UNCONFIGURED_SHUTDOWN,
+    },
+    INACTIVE: {
+        "activate": Transition.TRANSITION_ACTIVATE,
+        "cleanup": Transition.TRANSITION_CLEANUP,
+        "shutdown": Transition.TRANSITION_INACTIVE_SHUTDOWN,
+    },
+    ACTIVE: {
+        "deactivate": Transition.TRANSITION_DEACTIVATE,
+        "shutdown": Transition.TRANSITION_ACTIVE_SHUTDOWN,
+    },
+}
+_POLL_S = 0.02
+_MAX_MISSING = 3
+
+
+class TransitionRefused(Exception):
+    """A transition has failed. ``state`` is the state of the node now."""
+
+    def __init__(self, reason: str, state: str) -> None:
+        super().__init__(reason)
+        self.state = state
+
+
+@dataclass(frozen=True, slots=True)
+class OutsideContext:
+    """What a node outside the process uses in this process.
+
+    ``manager`` is the ROS node that observes and calls it; ``timeout_s`` the limit of each of its
+    transitions.
+    """
+
+    loop: Loop
+    manager: RosNode
+    children: ChildProcesses
+    listener: NodeListener
+    statistics: Statistics
+    timeout_s: float
+    log_level: LogLevel
+
+
+class OutsideNode(ABC):
+    """A :class:`.ManagedNode` of another process, and its :class:`.ManagedLifecycle`.
+
+    A subclass does the work of transitions, on the loop.
+    """
+
+    def __init__(self, model: Node, context: OutsideContext) -> None:
+        self.model = model
+        self.loop = context.loop
+        self.activations = 0
+        self.transition_started_s = 0.0
+        self.statistics = context.statistics
+        self._timeout_s = context.timeout_s
+        self._listener = context.listener
+        self._logger = model.full_name.strip("/").replace("/", ".")
+        self._state = UNCONFIGURED
+        self._external_transition = ""  # one that another tool has started
+        self._lock = _TransitionLock()
+        self._end_s: float | None = None
+
+    # --- the managed node
+
+    @property
+    def lifecycle(self) -> OutsideNode:
+        """Its transitions."""
+        return self
+
+    @property
+    def full_name(self) -> str:
+        """The name ROS knows the node by."""
+        return self.model.full_name
+
+    @property
+    def state(self) -> str:
+        """The label of the lifecycle state."""
+        return self._state
+
+    @property
+    def transition_timeout_s(self) -> float:
+        """How long a transition may take before it counts as stuck."""
+        return self._timeout_s
+
+    @property
+    def callback_owners(self) -> tuple[object, ...]:
+        """Nothing: its callbacks run elsewhere."""
+        return ()
+
+    def now_s(self) -> float:
+        """Return the system time in seconds."""
+        return time.time()
+
+    def sent(self, publisher: str) -> int:
+        """Return how many messages a publisher has sent, as far as this process knows."""
+        return self.statistics.publisher(publisher).count
+
+    def count_errors(self) -> None:
+        """Do nothing: its errors are not known."""
+
+    def block(self) -> None:
+        """Do nothing: its callbacks are not known."""
+
+    def limit_end(self, end_s: float) -> None:
+        """Let nothing last longer than ``end_s`` from now on."""
+        self._end_s = end_s
+
+    def keep_entities(self) -> None:
+        """Do nothing: it has none in this process."""
+
+    @abstractmethod
+    def destroy(self) -> None:
+        """End the process of the node, if it has one, without waiting for that."""
+
+    # --- the lifecycle
+
+    @property
+    def available(self) -> Mapping[str, int]:
+        """The ids of the transitions that can be requested now, by name."""
+        return _AVAILABLE.get(self._state, {})
+
+    async def change(self, transition: str) -> TransitionOutcome:
+        """Run an external ``transition`` as soon as no other one runs. Raises nothing."""
+        await self._lock.acquire()
+        return await self._run(transition, external=True)
+
+    async def run_step(self, transition: str, is_outdated: Callable[[], bool]) -> TransitionOutcome:
+        """Run the ``transition`` of a plan as soon as no other one runs. Raises nothing."""
+        await self._lock.acquire()
+        if is_outdated():
+            self._lock.release()
+            reason = "an external transition came first"
+            return TransitionOutcome(
+                transition, self._state, success=False, reason=reason, external=False, outdated=True
+            )
+        return await self._run(transition, external=False)
+
+    def fail_request(self) -> None:
+        """Do nothing: requests of external nodes do not pass through this process."""
+
+    async def _run(self, transition: str, *, external: bool) -> TransitionOutcome:
+        """Run a transition; the lock has been acquired, and is released at the end."""
+        try:
+            result = await self._transition(transition, external=external)
+        finally:
+            self._lock.release()
+        self._on_settled()
+        return result
+
+    async def _transition(self, transition: str, *, external: bool) -> TransitionOutcome:
+        start = self._state
+        if transition not in self.available:
+            names = ", ".join(self.available) or "none"
+            reason = f"refused: the node is {start}; available transitions: {names}"
+            return TransitionOutcome(transition, start, success=False, reason=reason)
+        self.transition_started_s = monotonic()
+        self._state = _DURING[transition]
+        state, reason = start, "its executor has stopped"
+        try:
+            await self._work(transition)
+            state, reason = GOALS[transition], ""
+        except TransitionRefused as refusal:
+            state, reason = refusal.state, str(refusal)
+        except Cancelled:
+            raise
+        except Exception as error:
+            reason = describe(error)
+        finally:
+            self._state = state
+        self.activations += state == ACTIVE
+        result = TransitionOutcome(
+            transition, state, success=not reason, reason=reason, external=external
+        )
+        self._listener.on_transition_end(result)
+        return result
+
+    @abstractmethod
+    async def _work(self, transition: str) -> None:
+        """Do the work of a transition. Raises TransitionRefused."""
+
+    def _on_settled(self) -> None:
+        """React to what happened during a transition."""
+
+    def _fail(self, reason: str, state: str = UNCONFIGURED) -> None:
+        """Report that the node has ended by itself, and is in ``state`` now."""
+        self._state = state
+        self._listener.on_ended(reason, state)
+
+    def _on_event(self, start: str, goal: str) -> None:
+        """Follow a transition that another tool has requested from the node itself."""
+        if self._lock.is_held or self._state == FINALIZED:
+            return
+        self._external_transition = _TRANSITIONS.get(start, self._external_transition)
+        self._state = goal
+        if goal not in PRIMARY_STATES or not self._external_transition:
+            return
+        transition, self._external_transition = self._external_transition, ""
+        success = goal == GOALS[transition]
+        reason = "" if success else f"'{transition}' failed"
+        self.activations += goal == ACTIVE
+        self._listener.on_transition_end(
+            TransitionOutcome(transition, goal, success=success, reason=reason)
+        )
+
+    async def _until(self, condition: Callable[[], bool], end_s: float) -> bool:
+        """Wait for ``condition()`` until ``end_s`` (monotonic); return its value."""
+        while not condition():
+            if monotonic() >= end_s:
+                return False
+            await sleep(self.loop, _POLL_S)
+        return True
+
+
+def missing_text(ports: Iterable[Port]) -> str:
+    """Return which ports a node does not have, in words; without ports, the node is missing."""
+    names = [f"{port.kind} {port.full_name}" for port in ports]
+    if not names:
+        return "it is not in the ROS graph"
+    more = len(names) - _MAX_MISSING
+    return f"it has no {', '.join(names[:_MAX_MISSING])}" + (f" and {more} more" * (more > 0))
+
+
+class _TransitionLock:
+    """Lets one transition run at a time. For tasks of one loop."""
+
+    def __init__(self) -> None:
+        self._current: Future[None] | None = None
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a transition runs."""
+        return self._current is not None
+
+    async def acquire(self) -> None:
+        while self._current is not None:
+            await self._current
+        self._current = Future()
+
+    def release(self) -> None:
+        current, self._current = self._current, None
+        if current is not None:
+            current.set_result(None)

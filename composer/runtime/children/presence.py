@@ -1,0 +1,94 @@
+"""Whether a node of another process is in the ROS graph, with the ports that it declares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from rclpy.node import Node as RosNode
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from composer.model import Node, Port, PortKind
+from composer.runtime.ros.graph import RosGraph, participant
+
+#: Topics that nearly every node publishes.
+_COMMON_TOPICS = ("/rosout", "/parameter_events")
+#: The service that every action server has.
+_SEND_GOAL = "/_action/send_goal"
+
+
+class NodePresence:
+    """The endpoints of one node, as the manager node has discovered them.
+
+    DDS shows a killed process for 20 s more. An endpoint has the prefix of its participant, so the
+    endpoints of an earlier process can be ignored: those of :meth:`participants` at its start.
+    """
+
+    def __init__(self, manager: RosNode, model: Node) -> None:
+        self._manager = manager
+        self._model = model
+        self._name = (model.name.value, model.namespace.value)
+
+    def participants(self) -> frozenset[bytes]:
+        """Return the prefixes of the participants with this node, as far as they are known."""
+        found = [
+            endpoint
+            for topic in _COMMON_TOPICS
+            for endpoint in self._manager.get_publishers_info_by_topic(topic)
+        ]
+        for port in self._model.ports:
+            found += self._endpoints(port)
+        return frozenset(map(participant, self._own(found)))
+
+    def has_node(self, earlier: frozenset[bytes] = frozenset()) -> bool:
+        """Return whether the node is in the graph, and not only as part of ``earlier``."""
+        if self.participants() - earlier:
+            return True
+        return not earlier and self._name in RosGraph(self._manager).nodes()
+
+    def missing(self, earlier: frozenset[bytes] = frozenset()) -> tuple[Port, ...]:
+        """Return the declared ports that the node does not have yet."""
+        return tuple(
+            port
+            for port in self._model.ports
+            if all(
+                participant(endpoint) in earlier for endpoint in self._own(self._endpoints(port))
+            )
+        )
+
+    def has_service(self, service: str, earlier: frozenset[bytes]) -> bool:
+        """Return whether the node provides a service, by its full name."""
+        return any(
+            participant(endpoint) not in earlier for endpoint in self._own(self._servers(service))
+        )
+
+    def _own(self, endpoints: Iterable[TopicEndpointInfo]) -> Iterator[TopicEndpointInfo]:
+        for endpoint in endpoints:
+            if (endpoint.node_name, endpoint.node_namespace) == self._name:
+                yield endpoint
+
+    def _endpoints(self, port: Port) -> list[TopicEndpointInfo]:
+        """Return the endpoints of all nodes that are like the port."""
+        name = port.full_name
+        match port.kind:
+            case PortKind.PUBLISHER:
+                return list(self._manager.get_publishers_info_by_topic(name))
+            case PortKind.SUBSCRIPTION:
+                return list(self._manager.get_subscriptions_info_by_topic(name))
+            case PortKind.SERVICE:
+                return self._servers(name)
+            case PortKind.CLIENT:
+                return self._clients(name)
+            case PortKind.ACTION_SERVER:
+                return self._servers(name + _SEND_GOAL)
+            case PortKind.ACTION_CLIENT:
+                return self._clients(name + _SEND_GOAL)
+
+    # A service is a pair of DDS topics: its server reads requests, its clients write them.
+
+    def _servers(self, service: str) -> list[TopicEndpointInfo]:
+        topic = f"rq{service}Request"
+        return list(self._manager.get_subscriptions_info_by_topic(topic, no_mangle=True))
+
+    def _clients(self, service: str) -> list[TopicEndpointInfo]:
+        topic = f"rq{service}Request"
+        return list(self._manager.get_publishers_info_by_topic(topic, no_mangle=True))
