@@ -14,7 +14,7 @@ from composer.analysis.behaviors import (
 from composer.analysis.context import Context
 from composer.behavior_source import BehaviorSource, Call, published_port
 from composer.fast_dataclass import dataclass
-from composer.model import Node, Port, PortKind, Reaction, Timer
+from composer.model import ImplementationKind, Node, Port, PortKind, Reaction, Timer
 
 _ENTRIES = ("on_", "accept_")
 
@@ -41,7 +41,7 @@ def causes(context: Context) -> Causes:
     found: dict[tuple[str, str], tuple[Cause, ...]] = {}
     for node in context.system.nodes:
         source = sources.get(node.name.value)
-        if source is None and node.behavior is not None:
+        if source is None and node.implementation is not ImplementationKind.DECLARATIVE:
             continue
         if source is not None and not (source.class_found and source.complete):
             continue

@@ -10,7 +10,7 @@ from composer.drift.drift import Drift, DriftKind
 from composer.drift.endpoints import compare_endpoints, conflicting_endpoints
 from composer.drift.parameters import compare_parameters
 from composer.drift.snapshot import ObservedNode, Snapshot
-from composer.model import Node, PrimaryState, System
+from composer.model import ExecutableKind, LifecycleKind, Node, PrimaryState, System
 from composer.plan import bring_up
 
 _MANAGER = "manager"
@@ -45,15 +45,35 @@ def _differences(
     others = [node for node in snapshot.nodes if node.full_name not in declared]
     for node in system.nodes:
         observed = snapshot.node(node.full_name)
+        state = states[node.name.value]
         if observed is None:
+            if _may_be_absent(node, state):
+                continue
             yield _missing(node, [other for other in others if not other.is_hidden])
         else:
-            yield from _of_node(node, observed, states[node.name.value])
+            yield from _of_node(node, observed, state)
     for other in others:
         yield from conflicting_endpoints(system, other)
         is_expected = other.is_hidden or _is_manager(system, other)
         if not is_expected and not any(fnmatchcase(other.full_name, glob) for glob in ignored):
             yield Drift(DriftKind.EXTRA_NODE, other.full_name)
+
+
+def _may_be_absent(node: Node, state: str) -> bool:
+    """Return whether a node has no process in ``state``, or has had one that is done."""
+    executable = node.executable
+    if executable is None or node.external is not None:
+        return False
+    if executable.kind is ExecutableKind.TASK:
+        return True
+    is_managed = executable.lifecycle is LifecycleKind.MANAGED
+    return state == "unconfigured" or (state == "inactive" and not is_managed)
+
+
+def _has_lifecycle(node: Node) -> bool:
+    """Return whether the node itself is a lifecycle node, as far as it is declared."""
+    outside = node.external or node.executable
+    return outside is None or outside.lifecycle is LifecycleKind.MANAGED
 
 
 def _is_manager(system: System, other: ObservedNode) -> bool:
@@ -94,7 +114,7 @@ def _of_state(node: Node, observed: ObservedNode, state: str) -> Iterator[Drift]
         yield Drift(
             DriftKind.NO_ANSWER, node.full_name, "lifecycle state", state, span=node.name.span
         )
-    elif observed.state != state:
+    elif observed.state != state and (observed.state or _has_lifecycle(node)):
         live = shown(observed.state) if observed.state else "none: it is not a lifecycle node"
         yield Drift(
             DriftKind.WRONG_STATE,

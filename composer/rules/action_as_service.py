@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.diagnostics import Diagnostic, Rule, Severity, register
-from composer.model import PortKind
+from composer.model import ImplementationKind, PortKind
 
 RULE = register(
     Rule(
@@ -44,7 +44,7 @@ nodes:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the action servers that are declared entirely in YAML."""
     for node in context.system.nodes:
-        if node.behavior is not None:
+        if node.implementation is not ImplementationKind.DECLARATIVE:
             continue
         for port in node.ports_of(PortKind.ACTION_SERVER):
             if port.result is not None and port.feedback is None:

@@ -8,7 +8,7 @@ from composer.analysis.behaviors import handlers
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
 from composer.diagnostics import Diagnostic, Rule, Severity, register
-from composer.model import Node, PortKind
+from composer.model import ImplementationKind, Node, PortKind
 
 RULE = register(
     Rule(
@@ -35,6 +35,7 @@ nodes:
     )
 )
 
+_DECLARATIVE = ImplementationKind.DECLARATIVE
 _HINTS = {
     "timer": "add 'publish', 'call', 'set' or 'log'",
     PortKind.SERVICE.value: "add 'respond'",
@@ -46,7 +47,11 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Check the nodes that have no behavior."""
     affected = context.once(earlier_errors).nodes
     for node in context.system.nodes:
-        if node.behavior is None and node.complete and node.name.value not in affected:
+        if (
+            node.implementation is _DECLARATIVE
+            and node.complete
+            and node.name.value not in affected
+        ):
             yield from _node(node)
 
 

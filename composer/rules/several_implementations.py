@@ -17,20 +17,26 @@ RULE = register(
         summary="A node has more than one of behavior, class and executable.",
         why="Only one of them can be the node. What each of them offers is declared by the ports.",
         bad="""\
+# file: system.yaml
 system: lights
 nodes:
   lamp:
     behavior: lamp:Lamp
-    executable: {package: lamp_driver, name: driver}
+    executable: {command: [sh, driver.sh]}
 # file: lamp.py
 class Lamp:
     pass
+# file: driver.sh
+exec driver
 """,
         good="""\
+# file: system.yaml
 system: lights
 nodes:
   lamp:
-    executable: {package: lamp_driver, name: driver}
+    executable: {command: [sh, driver.sh]}
+# file: driver.sh
+exec driver
 """,
     )
 )

@@ -12,7 +12,15 @@ from composer.graph.scenes.diagnostics import DiagnosticIndex
 from composer.graph.scenes.facts import node_facts, port_facts
 from composer.graph.scenes.rates import publishing_rates_hz
 from composer.graph.scenes.scene import ExecutorGroup, Scene, SceneNode, ScenePort, Wait
-from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, System
+from composer.model import (
+    DEFAULT_EXECUTOR,
+    Executor,
+    ExecutorKind,
+    ImplementationKind,
+    Node,
+    Port,
+    System,
+)
 from composer.model.dependencies import dependency_edges
 from composer.plan import bring_up
 
@@ -82,10 +90,11 @@ def _with_duplicate(scene_node: SceneNode) -> SceneNode:
 
 
 def _note(node: Node, system: System, several: bool) -> str:
-    """Return the note of a node: its type if it differs from its name, and its system."""
+    """Return the note of a node: its type if it differs from its name, its kind, its system."""
     type_name = node.type_name.value if node.type_name is not None else ""
     labels = type_name if type_name != node.ros_name.value else ""
-    return " · ".join(filter(None, (labels, system.name.value if several else "")))
+    kind = node.implementation.value if node.implementation in _NOTED else ""
+    return " · ".join(filter(None, (labels, kind, system.name.value if several else "")))
 
 
 def _scene_port(port: Port, rate_hz: float | None, diagnostics: DiagnosticIndex) -> ScenePort:
@@ -119,12 +128,24 @@ def _groups(system: System, several: bool) -> Iterator[ExecutorGroup]:
     declared = {executor.name.value: executor for executor in system.executors}
     prefix = f"{system.name.value} · " if several else ""
     for name in dict.fromkeys([*declared, *map(_executor_name, system.nodes)]):
-        label = f"{prefix}{name}: {_kind(declared.get(name))}"
+        kind = _kind(declared.get(name))
+        label = f"{prefix}{name}" if name in _OUTSIDE.values() else f"{prefix}{name}: {kind}"
         yield ExecutorGroup(_executor_key(system, name), label)
 
 
 def _executor_name(node: Node) -> str:
+    if not node.implementation.in_process:
+        return _OUTSIDE[node.implementation]
     return node.executor.value if node.executor is not None else DEFAULT_EXECUTOR
+
+
+#: The kinds of nodes that are noted on them.
+_NOTED = (ImplementationKind.CLASS, ImplementationKind.EXECUTABLE, ImplementationKind.EXTERNAL)
+#: The groups of nodes that no executor runs.
+_OUTSIDE = {
+    ImplementationKind.EXECUTABLE: "child processes",
+    ImplementationKind.EXTERNAL: "external nodes",
+}
 
 
 def _executor_key(system: System, executor: str) -> str:

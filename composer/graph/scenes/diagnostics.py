@@ -59,6 +59,10 @@ def _node_spans(node: Node) -> Iterator[Span]:
         yield node.type_name.span
     if node.behavior is not None:
         yield node.behavior.text.span
+    if node.hosted_class is not None:
+        yield node.hosted_class.reference.text.span
+    if node.executable is not None:
+        yield from (node.executable.span, *(key.span for key in node.executable.given))
     if node.executor is not None:
         yield node.executor.span
     for dependency in node.depends_on:

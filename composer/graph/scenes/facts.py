@@ -33,7 +33,10 @@ def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
         "full_name": node.full_name,
         "type": node.type_name.value if node.type_name is not None else None,
         "behavior": node.behavior.text.value if node.behavior is not None else None,
-        "executor": node.executor.value if node.executor is not None else DEFAULT_EXECUTOR,
+        "class": node.hosted_class.reference.text.value if node.hosted_class is not None else None,
+        "executable": str(node.executable) if node.executable is not None else None,
+        "external": node.external is not None or None,
+        "executor": _executor(node),
         "description": node.description or None,
         "declared_at": str(node.span),
         "depends_on": [
@@ -50,6 +53,12 @@ def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
         },
     }
     return _non_empty(facts)
+
+
+def _executor(node: Node) -> str | None:
+    if not node.implementation.in_process:
+        return None
+    return node.executor.value if node.executor is not None else DEFAULT_EXECUTOR
 
 
 def port_facts(port: Port, rate_hz: float | None) -> Details:
