@@ -157,6 +157,7 @@ class ChildProcesses:
                     str(folder),
                 ],
                 stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,  # Ctrl-C is for the composer
             )

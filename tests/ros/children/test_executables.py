@@ -1,0 +1,305 @@
+"""Executables as nodes of a system: Python programs as users have them, unmodified."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lifecycle_msgs.srv import GetState
+from std_msgs.msg import String
+
+from composer.runtime.host import HostOptions
+from composer.runtime.supervision.events import (
+    BroughtUp,
+    NodeFailed,
+    Restarted,
+    RollingBack,
+    StateChanged,
+)
+from tests.ros.support.in_process import (
+    Peer,
+    RunningSystem,
+    end_limit_s,
+    running,
+    wait_until,
+)
+
+PROGRAMS = Path(__file__).parents[1] / "programs"
+DRIVER = f"[{sys.executable}, {PROGRAMS / 'driver.py'}]"
+MANAGED = f"[{sys.executable}, {PROGRAMS / 'managed_driver.py'}]"
+ROBOT = f"""
+system: robot
+namespace: robot
+lifecycle: {{on_failure: restart, restart: {{backoff_ms: 100}}}}
+nodes:
+  driver:
+    namespace: left
+    executable: {{command: {DRIVER}, arguments: [--fast, 3]}}
+    parameters:
+      rate: {{type: double, default: 50}}
+      gains: {{type: double_array, default: [1, 2.5]}}
+      label: {{type: string, default: "007"}}
+    remappings: {{~/echo: /echo}}
+    publishers:
+      words: {{type: std_msgs/msg/String}}
+      echo: {{type: std_msgs/msg/String, topic: ~/echo, external: true}}
+    subscriptions: {{orders: {{type: std_msgs/msg/String, external: true}}}}
+    services: {{reset: {{type: std_srvs/srv/Trigger}}}}
+    action_servers: {{navigate: {{type: composer_interfaces/action/Navigate}}}}
+  camera:
+    executable: {{command: {MANAGED}, lifecycle: managed}}
+    publishers: {{words: {{type: std_msgs/msg/String}}}}
+  listener:
+    lifecycle: {{depends_on: [driver, camera]}}
+    subscriptions:
+      words: {{type: std_msgs/msg/String, log: "{{message.data}}"}}
+connections:
+  - {{topic: /words, from: [driver.words, camera.words], to: listener.words}}
+  - {{service: /reset_driver, server: driver.reset}}
+  - {{action: /drive, server: driver.navigate}}
+"""
+
+
+def pid_of(system: RunningSystem, node: str) -> int:
+    pid = system.node(node).pid
+    assert pid is not None
+    return int(pid)
+
+
+def has_ended(pid: int) -> bool:
+    return not Path("/proc", str(pid)).exists()
+
+
+def wait_for_failure(system: RunningSystem, node: str) -> NodeFailed:
+    def failures() -> list[NodeFailed]:
+        return [event for event in system.reported(NodeFailed) if event.node == node]
+
+    wait_until(failures, f"a fault of {node}")
+    return failures()[0]
+
+
+def printed_by(*words: str) -> str:
+    """Return what the driver prints about itself, started with ``words`` as ``ros2 run`` would."""
+    process = subprocess.Popen(
+        [sys.executable, PROGRAMS / "driver.py", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        return process.stdout.readline().strip()
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(10)
+
+
+def test_up_and_down_in_order_with_names_and_parameters(tmp_path: Path, peer: Peer) -> None:
+    with running(ROBOT, tmp_path) as system:
+        states = [text for text in system.states() if text.endswith(" active")]
+        assert states[-1] == "/robot/listener active"
+        assert len(states) == 3
+        pids = [pid_of(system, name) for name in ("driver", "camera")]
+
+        by_hand = printed_by(
+            *("--fast", "3", "--ros-args", "-r", "__node:=driver", "-r", "__ns:=/robot/left"),
+            *("-r", "words:=/words", "-r", "~/echo:=/echo", "-r", "reset:=/reset_driver"),
+            *("-p", "rate:=50.0", "-p", "gains:=[1.0,2.5]", "-p", "label:='007'"),
+            *("--log-level", "info"),
+        )
+        assert "/words /echo /reset_driver" in by_hand
+        assert by_hand in system.log()  # a line of stdout
+        assert "ready" in system.log()  # a line of its logger, with its level and name
+        system.wait_for_log("tick")
+        system.wait_for_log("managed")
+
+        # As other ROS nodes see it.
+        echoed = peer.listen(String, "/echo")
+        orders = peer.publisher(String, "/robot/left/orders")
+        orders.publish(String(data="go"))
+        wait_until(lambda: [message.data for message in echoed] == ["go"], "the echo")
+        wait_until(lambda: "/drive/_action/send_goal" in services(peer), "the action")
+        assert "/robot/left/navigate/_action/send_goal" not in services(peer)
+        outcome = system.stop()
+    assert outcome.exit_code == 0
+    assert all(map(has_ended, pids))
+    downs = [text for text in system.states() if not text.endswith(" active")]
+    assert downs.index("/robot/listener unconfigured") < downs.index("/robot/camera finalized")
+
+
+def services(peer: Peer) -> set[str]:
+    return {name for name, _ in peer.node.get_service_names_and_types()}
+
+
+@pytest.mark.parametrize("name", ["driver", "camera"])
+def test_kill_is_noticed_and_dependents_pause_until_the_restart(name: str, tmp_path: Path) -> None:
+    with running(ROBOT, tmp_path) as system:
+        full_name = system.node(name).full_name
+        killed_s = time.monotonic()
+        os.kill(pid_of(system, name), signal.SIGKILL)
+        failed = wait_for_failure(system, full_name)
+        noticed_s = system.host._reporter._started_at_s + failed.elapsed_s - killed_s
+        assert noticed_s < 0.1 * max(1.0, os.getloadavg()[0])
+        assert failed.reason == "its process was ended by SIGKILL"
+        assert failed.consequence == "restart 1 in 0.1 s"
+        wait_until(lambda: system.node("listener").state == "inactive", "the pause")
+        wait_until(lambda: system.reported(Restarted), "the restart")
+        states = {node: system.node(node).state for node in ("driver", "camera", "listener")}
+        assert set(states.values()) == {"active"}
+        changes = [text for text in system.states("/robot/listener")]
+        assert changes[-2:] == ["/robot/listener inactive", "/robot/listener active"]
+
+
+def test_external_transitions_of_a_managed_executable(tmp_path: Path, peer: Peer) -> None:
+    with running(ROBOT, tmp_path) as system:
+        pid = pid_of(system, "camera")
+        assert peer.change("/robot/camera", "deactivate")
+        wait_until(lambda: system.node("camera").state == "inactive", "the state")
+        assert peer.change("/robot/camera", "activate")
+        wait_until(lambda: system.node("camera").state == "active", "the state")
+        system.change("camera", "deactivate", "cleanup")
+        wait_until(lambda: has_ended(pid), "the end of the process")
+        system.change("camera", "configure", "activate")
+        response = peer.call(GetState, "/robot/camera/get_state")
+        assert response.current_state.label == "active"
+        assert pid_of(system, "camera") != pid
+        assert not system.reported(NodeFailed)
+
+
+def test_a_process_that_ignores_signals_is_killed_in_time(tmp_path: Path) -> None:
+    text = f"""
+system: robot
+nodes:
+  driver:
+    executable: {{command: {DRIVER}, arguments: [--stubborn], sigterm_timeout_ms: 5000}}
+    publishers: {{words: {{type: std_msgs/msg/String, external: true}}}}
+"""
+    with running(text, tmp_path, options=HostOptions()) as system:
+        pid = pid_of(system, "driver")
+        began_s = time.monotonic()
+        outcome = system.stop()
+        assert time.monotonic() - began_s < end_limit_s()
+    assert has_ended(pid)
+    assert outcome.exit_code == 0
+
+
+FAILING = """
+system: robot
+nodes:
+  first: {on_activate: {log: first is active}}
+  second:
+    executable: EXECUTABLE
+    PORTS
+    lifecycle: {depends_on: [first]}
+"""
+
+
+@pytest.mark.parametrize(
+    ("executable", "ports", "reason"),
+    [
+        ("{command: [sh, -c, exit 3]}", "", "activate failed: its process exited with status 3"),
+        (
+            f"{{command: {DRIVER}, ready_timeout_ms: 1500}}",
+            "publishers: {other: {type: std_msgs/msg/String, external: true}}",
+            "activate failed: it has no publisher /other after 1.5 s",
+        ),
+        ("{command: [/nowhere/x]}", "", "configure failed: there is no program '/nowhere/x'"),
+        (
+            f"{{command: {MANAGED}, lifecycle: managed}}",
+            "parameters: {refuse: {type: string, default: activate}}",
+            "activate failed: its service reports a failure; it is inactive",
+        ),
+        (
+            f"{{command: {MANAGED}, lifecycle: managed}}",
+            "parameters: {refuse: {type: string, default: exit}}",
+            "activate failed: its process exited with status 4",
+        ),
+        ("{command: [sh, -c, exit 5], kind: task}", "", "its process exited with status 5"),
+        (
+            "{command: [sh, -c, sleep 60], kind: task, ready_timeout_ms: 300}",
+            "",
+            "activate failed: still running after 0.3 s",
+        ),
+    ],
+)
+def test_failed_starts_are_rolled_back(
+    executable: str, ports: str, reason: str, tmp_path: Path
+) -> None:
+    text = FAILING.replace("EXECUTABLE", executable).replace("PORTS", ports)
+    with running(text, tmp_path) as system:
+        outcome = system.end()
+    assert outcome.exit_code == 1
+    assert reason in str(system.reported(RollingBack)[0])
+    assert system.states("/first")[-2:] == ["/first unconfigured", "/first finalized"]
+    assert not system.reported(BroughtUp)
+
+
+def test_a_task_is_done_before_its_dependents_start(tmp_path: Path) -> None:
+    text = """
+system: robot
+nodes:
+  calibrate:
+    executable: {command: [sh, -c, "echo calibrated > result"], kind: task}
+  arm: {lifecycle: {depends_on: [calibrate]}, on_configure: {log: arm}}
+"""
+    with running(text, tmp_path) as system:
+        assert tmp_path.joinpath("result").read_text(encoding="utf-8") == "calibrated\n"
+        changes = [event.node for event in system.reported(StateChanged)][-2:]
+        assert changes == ["/calibrate", "/arm"]
+        assert system.node("calibrate").state == "active"
+        assert not system.reported(NodeFailed)
+
+
+EXTERNAL = """
+system: robot
+nodes:
+  lidar:
+    external: {ready_timeout_ms: TIMEOUT}
+    publishers: {scan: {type: std_msgs/msg/String}}
+    services: {reset: {type: std_srvs/srv/Trigger}}
+  filter:
+    lifecycle: {depends_on: [lidar]}
+    subscriptions: {scan: {type: std_msgs/msg/String, log: "{message.data}"}}
+"""
+
+
+def test_an_external_node_is_awaited_and_observed(tmp_path: Path) -> None:
+    process = start_external()
+    try:
+        with running(EXTERNAL.replace("TIMEOUT", "20000"), tmp_path) as system:
+            assert system.states()[-2:] == ["/lidar active", "/filter active"]
+            system.wait_for_log("tick")
+            process.send_signal(signal.SIGINT)
+            process.wait(10)
+            failed = wait_for_failure(system, "/lidar")
+            assert failed.reason == "it has disappeared from the ROS graph"
+            wait_until(lambda: system.node("filter").state == "inactive", "the pause")
+            process = start_external()
+            wait_until(lambda: system.node("filter").state == "active", "the return")
+            system.stop()
+            assert process.poll() is None  # never ended by the system
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_an_absent_external_node_fails_the_bring_up(tmp_path: Path) -> None:
+    with running(EXTERNAL.replace("TIMEOUT", "300"), tmp_path) as system:
+        assert system.end().exit_code == 1
+    reason = str(system.reported(RollingBack)[0])
+    assert "it has no publisher /scan, service /reset after 0.3 s" in reason
+
+
+def start_external() -> subprocess.Popen[Any]:
+    names = ("-r", "__node:=lidar", "-r", "words:=scan", "-p", "rate:=20.0")
+    return subprocess.Popen(
+        [sys.executable, PROGRAMS / "driver.py", "--ros-args", *names],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )

@@ -1,0 +1,194 @@
+"""Child processes: their output, their end, and that none is left behind. No ROS."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from composer.runtime.children.child_processes import (
+    Child,
+    ChildProcesses,
+    Command,
+    StartFailed,
+)
+
+PATIENCE_S = 10.0
+MARK = "COMPOSER_TEST_MARK"
+#: A composer with three children: a polite one, one that ignores everything but SIGKILL, and one
+#: with a grandchild that has left the process group.
+COMPOSER = """
+import sys, time
+from composer.runtime.children.child_processes import ChildProcesses, Command
+children = ChildProcesses()
+mark = {MARK: sys.argv[1]}
+polite = "echo polite; exec sleep 60"
+stubborn = "trap '' INT TERM HUP; echo stubborn; while true; do sleep 0.1; done"
+daemon = "setsid sleep 60 & echo daemon; exec sleep 60"
+for script in (polite, stubborn, daemon):
+    children.start(
+        Command(["sh", "-c", script], mark), lambda text, _: print(text, flush=True)
+    )
+time.sleep(60)
+""".replace("MARK", repr(MARK))
+
+
+def wait_until(condition: Callable[[], object], what: str) -> float:
+    """Wait until ``condition()`` is true; return how long it took, in seconds."""
+    began_s = time.monotonic()
+    while not condition():
+        assert time.monotonic() < began_s + PATIENCE_S, f"timed out: {what}"
+        time.sleep(0.002)
+    return time.monotonic() - began_s
+
+
+def marked(mark: str) -> list[int]:
+    """Return the processes with a mark in their environment."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            environment = (folder / "environ").read_bytes()
+            state = (folder / "stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
+        except OSError:
+            continue
+        if f"{MARK}={mark}\0".encode() in environment and state != "Z":
+            found.append(int(folder.name))
+    return found
+
+
+@pytest.fixture
+def children() -> Iterator[ChildProcesses]:
+    processes = ChildProcesses()
+    try:
+        yield processes
+    finally:
+        processes.close()
+
+
+@contextmanager
+def composer(mark: str) -> Iterator[subprocess.Popen[str]]:
+    """Run a composer with three children, and wait for them."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", COMPOSER, mark], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stdout is not None
+        said = {process.stdout.readline().strip() for _ in range(3)}
+        assert said == {"polite", "stubborn", "daemon"}
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def start(children: ChildProcesses, script: str, lines: list[tuple[str, bool]]) -> Child:
+    return children.start(
+        Command(["sh", "-c", script]), lambda text, is_error: lines.append((text, is_error))
+    )
+
+
+def test_output_and_status(children: ChildProcesses) -> None:
+    lines: list[tuple[str, bool]] = []
+    child = start(children, "echo out; echo error >&2; exit 3", lines)
+    wait_until(child.ended.done, "the end")
+    assert child.ended.result() == 3
+    assert sorted(lines) == [("error", True), ("out", False)]
+
+
+def test_environment_folder_and_no_input(children: ChildProcesses, tmp_path: Path) -> None:
+    lines: list[str] = []
+    command = Command(["sh", "-c", "cat; pwd; echo $SIZE"], {"SIZE": "12"}, tmp_path)
+    child = children.start(command, lambda text, _: lines.append(text))
+    wait_until(child.ended.done, "the end")
+    assert lines == [str(tmp_path), "12"]
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [(["/nowhere/program"], "No such file"), (["/etc/passwd"], "Permission denied")],
+)
+def test_a_program_that_cannot_start(
+    children: ChildProcesses, words: list[str], reason: str
+) -> None:
+    child = children.start(Command(words), lambda *_: None)
+    wait_until(child.started.done, "an answer")
+    with pytest.raises(StartFailed, match=reason):
+        child.started.result()
+    assert child.ended.cancelled()
+
+
+@pytest.mark.parametrize(
+    ("script", "status", "least_s"),
+    [
+        ("trap 'exit 7' INT; echo ready; while true; do sleep 0.01; done", 7, 0.0),
+        ("trap '' INT; trap 'exit 8' TERM; echo ready; while true; do sleep 0.01; done", 8, 0.2),
+        ("trap '' INT TERM; echo ready; while true; do sleep 0.01; done", -9, 0.4),
+    ],
+)
+def test_ends_in_order(children: ChildProcesses, script: str, status: int, least_s: float) -> None:
+    lines: list[tuple[str, bool]] = []
+    child = start(children, script, lines)
+    wait_until(lambda: lines, "the trap")
+    children.end(child, 0.2, 0.2)
+    took_s = wait_until(child.ended.done, "the end")
+    assert child.ended.result() == status
+    assert least_s <= took_s < least_s + 2.0
+
+
+def test_a_kill_is_noticed_at_once(children: ChildProcesses) -> None:
+    child = start(children, "exec sleep 60", [])
+    wait_until(child.started.done, "the start")
+    times_s = []
+    os.kill(child.started.result(), signal.SIGKILL)
+    times_s.append(wait_until(child.ended.done, "the end"))
+    assert child.ended.result() == -9
+    assert times_s[0] < 0.1 * max(1.0, os.getloadavg()[0])
+
+
+def test_the_rest_of_a_group_ends_with_its_leader(children: ChildProcesses) -> None:
+    lines: list[tuple[str, bool]] = []
+    child = start(children, "sleep 60 & echo $!; exec sleep 60", lines)
+    wait_until(lambda: lines, "the number of the grandchild")
+    os.kill(child.started.result(), signal.SIGKILL)
+    grandchild = Path("/proc", lines[0][0])
+    wait_until(lambda: not grandchild.exists(), "the end of the grandchild")
+
+
+def test_nothing_is_left_after_close(tmp_path: Path) -> None:
+    children = ChildProcesses()
+    folder = children.prepare()
+    child = start(children, "trap '' INT TERM; while true; do sleep 0.1; done", [])
+    wait_until(child.started.done, "the start")
+    children.close()
+    assert child.ended.done()
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_no_orphan_whatever_ends_the_composer(number: signal.Signals) -> None:
+    mark = f"{os.getpid()}-{number.name}-{time.monotonic_ns()}"
+    with composer(mark) as process:
+        assert len(marked(mark)) >= 4
+        process.send_signal(number)
+        process.wait(PATIENCE_S)
+        wait_until(lambda: not marked(mark), "the end of all children")
+
+
+def test_no_child_survives_the_launcher(children: ChildProcesses) -> None:
+    child = start(children, "exec sleep 60", [])
+    wait_until(child.started.done, "the start")
+    launcher = children._launcher
+    assert launcher is not None
+    launcher.kill()
+    wait_until(child.ended.done, "the end")
+    wait_until(lambda: not Path("/proc", str(child.pid)).exists(), "the death of the child")
+    again = start(children, "exit 0", [])  # by a new launcher
+    wait_until(again.ended.done, "the end")
+    assert again.ended.result() == 0

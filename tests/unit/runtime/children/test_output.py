@@ -1,0 +1,67 @@
+"""The output of child processes: lines, whatever the process writes."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from composer.model import LogLevel
+from composer.runtime.children.output import OutputLines, parse_line
+
+
+def lines_of(*chunks: bytes, now_s: float = 0.0) -> list[str]:
+    found: list[str] = []
+    output = OutputLines(found.append)
+    for chunk in chunks:
+        output.add(chunk, now_s)
+    output.finish()
+    return found
+
+
+@pytest.mark.parametrize(
+    ("chunks", "lines"),
+    [
+        ([b"one\ntwo\n"], ["one", "two"]),
+        ([b"on", b"e\ntw", b"o"], ["one", "two"]),
+        ([b"one\r\n\n  \n"], ["one"]),
+        ([b"\x1b[31mred\x1b[0m\n"], ["red"]),
+        ([b"bad \xff\n"], ["bad \\xff"]),
+        ([b"x" * 5000 + b"\nnext\n"], ["x" * 2000 + " ...", "next"]),
+        ([b"x" * 3000, b"x" * 3000, b"\nnext\n"], ["x" * 2000 + " ...", "next"]),
+    ],
+)
+def test_lines(chunks: list[bytes], lines: list[str]) -> None:
+    assert lines_of(*chunks) == lines
+
+
+def test_a_flood_is_cut_and_counted() -> None:
+    found: list[str] = []
+    output = OutputLines(found.append)
+    output.add(b"again\n" * 5000, 1.0)
+    output.add(b"later\n", 2.0)
+    assert found.count("again") == 500
+    assert found[500:] == ["(4500 lines were dropped: more than 500 a second)", "later"]
+
+
+@given(st.lists(st.binary(max_size=3000), max_size=8))
+def test_any_output_becomes_short_lines(chunks: list[bytes]) -> None:
+    for line in lines_of(*chunks):
+        assert "\n" not in line
+        assert len(line) <= 4 * 2000 + 4  # each byte that is no UTF-8 becomes four characters
+
+
+@pytest.mark.parametrize(
+    ("text", "is_error", "expected"),
+    [
+        ("plain", False, (LogLevel.INFO, None, "plain")),
+        ("plain", True, (LogLevel.WARN, None, "plain")),
+        ("[ERROR] [robot.arm] it hurts", True, (LogLevel.ERROR, "robot.arm", "it hurts")),
+        ("[INFO] [arm]: ready", True, (LogLevel.INFO, "arm", "ready")),
+        ("[NOTE] [arm] ready", False, (LogLevel.INFO, None, "[NOTE] [arm] ready")),
+    ],
+)
+def test_lines_of_ros_loggers(
+    text: str, is_error: bool, expected: tuple[LogLevel, str | None, str]
+) -> None:
+    assert parse_line(text, is_error=is_error) == expected
