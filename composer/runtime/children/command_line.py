@@ -46,7 +46,7 @@ def make_command(
         *_program(executable, {**environment, **own}),
         *(word.value for word in executable.arguments),
         "--ros-args",
-        *("-r", f"__node:={node.name.value}", "-r", f"__ns:={node.namespace.value}"),
+        *("-r", f"__node:={node.ros_name.value}", "-r", f"__ns:={node.namespace.value}"),
         *(word for rule in remappings(node) for word in ("-r", rule)),
         *("--log-level", _LOG_LEVEL.get(log_level, log_level.value)),
     )
@@ -61,7 +61,7 @@ def make_command(
 
 def remappings(node: Node) -> Iterator[str]:
     """Yield the remapping rules of a node: those of its ports, then those without a port."""
-    name, namespace = node.name.value, node.namespace.value
+    name, namespace = node.ros_name.value, node.namespace.value
     remapped: set[str] = set()
     for port in node.ports:
         declared = port.ros_name.value

@@ -26,7 +26,7 @@ class NodePresence:
     def __init__(self, manager: RosNode, model: Node) -> None:
         self._manager = manager
         self._model = model
-        self._name = (model.name.value, model.namespace.value)
+        self._name = (model.ros_name.value, model.namespace.value)
 
     def participants(self) -> frozenset[bytes]:
         """Return the prefixes of the participants with this node, as far as they are known."""

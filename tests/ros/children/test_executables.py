@@ -152,7 +152,7 @@ def test_kill_is_noticed_and_dependents_pause_until_the_restart(name: str, tmp_p
         wait_until(lambda: system.reported(Restarted), "the restart")
         states = {node: system.node(node).state for node in ("driver", "camera", "listener")}
         assert set(states.values()) == {"active"}
-        changes = [text for text in system.states("/robot/listener")]
+        changes = system.states("/robot/listener")
         assert changes[-2:] == ["/robot/listener inactive", "/robot/listener active"]
 
 
