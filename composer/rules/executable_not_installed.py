@@ -23,7 +23,7 @@ RULE = register(
 system: lights
 nodes:
   lamp:
-    executable: {package: lamp_driver_of_nobody, name: driver}
+    executable: {package: lamp_driver_for_mars, name: driver}
 """,
         good="""\
 system: lights

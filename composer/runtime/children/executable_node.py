@@ -211,7 +211,7 @@ class ExecutableNode(OutsideNode):
         self._close_remote()
         if child is None:
             return
-        self._child = None  # its end is no fault
+        self._child = None  # its end is expected
         terminate_s, kill_s = self._end_limits_s
         self._children.end(child, terminate_s, kill_s)
         end_s = monotonic() + terminate_s + kill_s + _KILLED_WITHIN_S

@@ -9,7 +9,7 @@ from composer.model import LogLevel
 
 _LONGEST_LINE = 2000  # bytes
 _CUT = b" ..."
-#: More lines than this within a second are dropped: nobody reads them, and the log has to go on.
+#: More lines than this within a second are dropped: they cannot be read, and the log has to go on.
 _MAX_LINES_PER_S = 500
 #: The format that the composer asks the loggers of ROS for, see ``CONSOLE_FORMAT``.
 _ROS_LINE = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[([^\]\s]+)\]:? (.*)", re.DOTALL)

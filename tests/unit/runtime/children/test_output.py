@@ -48,7 +48,7 @@ def test_a_flood_is_cut_and_counted() -> None:
 def test_any_output_becomes_short_lines(chunks: list[bytes]) -> None:
     for line in lines_of(*chunks):
         assert "\n" not in line
-        assert len(line) <= 4 * 2000 + 4  # each byte that is no UTF-8 becomes four characters
+        assert len(line) <= 4 * 2000 + 4  # each invalid byte becomes four characters
 
 
 @pytest.mark.parametrize(
