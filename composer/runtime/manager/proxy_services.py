@@ -95,10 +95,10 @@ class ProxyParameterStore(NodeParameterStore):
         return result
 
     async def names_of(self, name: str) -> list[str]:
-        """Return the names of the parameters of a node, none if it does not exist."""
+        """Return the names of the parameters of a node, none if it is not in this process."""
         if name == self.manager:
             return list(self._node.list_parameters([], 0).names)
-        node = self._nodes().get(name)
+        node = self._local(name)
         if node is None:
             return []
         return await node.query(lambda ros_node: list(ros_node.list_parameters([], 0).names))
