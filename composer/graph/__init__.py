@@ -7,9 +7,9 @@ turns a scene into a graph, and a renderer turns the graph into a file format.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from enum import StrEnum
 
 from composer.diagnostics import Diagnostic
+from composer.diagram_options import View
 from composer.drift import Snapshot
 from composer.graph.diagram import Graph
 from composer.graph.scenes import declared, live
@@ -18,16 +18,7 @@ from composer.graph.scenes.scene import Scene
 from composer.graph.views import connections, deployment, lifecycle, nodes, states
 from composer.model import System
 
-
-class View(StrEnum):
-    """The views of a system."""
-
-    NODES = "nodes"
-    CONNECTIONS = "connections"
-    LIFECYCLE = "lifecycle"
-    DEPLOYMENT = "deployment"
-    STATES = "states"
-
+__all__ = ["View", "build_graph", "live_scene_of", "scene_of"]
 
 _VIEWS: dict[View, Callable[[Scene], Graph]] = {
     View.NODES: nodes.build,

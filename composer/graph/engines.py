@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from enum import StrEnum
 
+from composer.diagram_options import Engine
 from composer.graph import graphviz
 from composer.graph.diagram import Graph
 from composer.graph.layout import Layout, Point, Rectangle, Size, Sizes, arrange
 from composer.graph.measure import sizes
 
-
-class Engine(StrEnum):
-    """The layout engine. ``bundled`` gives the same bytes on every machine."""
-
-    AUTO = "auto"
-    GRAPHVIZ = "graphviz"
-    BUNDLED = "bundled"
+__all__ = ["Engine", "has_overlaps", "lay_out"]
 
 
 def lay_out(graph: Graph, engine: Engine) -> Layout:

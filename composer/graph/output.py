@@ -3,24 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from enum import StrEnum
 
+from composer.diagram_options import Engine, Format
 from composer.graph.diagram import Graph
-from composer.graph.engines import Engine, lay_out
+from composer.graph.engines import lay_out
 from composer.graph.formats import dot, html, json, mermaid, png, svg
 
 __all__ = ["Engine", "Format", "render"]
-
-
-class Format(StrEnum):
-    """The format of a diagram."""
-
-    MERMAID = "mermaid"
-    DOT = "dot"
-    SVG = "svg"
-    PNG = "png"
-    JSON = "json"
-    HTML = "html"
 
 
 _TEXTS: dict[Format, Callable[[Graph], str]] = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +12,7 @@ from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import Timeout, examples, finite
 from composer.cli.support.system_arguments import complete_system, load_system, system_file
 from composer.cli.support.terminal import say, write_bytes
+from composer.diagram_options import FORMATS_BY_SUFFIX, Engine, Format, View
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
@@ -31,50 +31,8 @@ EPILOGS = {
     )
 }
 
-
-class DiagramFormat(StrEnum):
-    """The same as composer.graph.output.Format, which is slow to import."""
-
-    MERMAID = "mermaid"
-    DOT = "dot"
-    SVG = "svg"
-    PNG = "png"
-    JSON = "json"
-    HTML = "html"
-
-
-class DiagramView(StrEnum):
-    """The same as composer.graph.View, which is slow to import."""
-
-    NODES = "nodes"
-    CONNECTIONS = "connections"
-    LIFECYCLE = "lifecycle"
-    DEPLOYMENT = "deployment"
-    STATES = "states"
-
-
-class LayoutEngine(StrEnum):
-    """The same as composer.graph.engines.Engine, which is slow to import."""
-
-    AUTO = "auto"
-    GRAPHVIZ = "graphviz"
-    BUNDLED = "bundled"
-
-
-_FORMATS = {
-    ".mmd": DiagramFormat.MERMAID,
-    ".mermaid": DiagramFormat.MERMAID,
-    ".dot": DiagramFormat.DOT,
-    ".gv": DiagramFormat.DOT,
-    ".svg": DiagramFormat.SVG,
-    ".png": DiagramFormat.PNG,
-    ".json": DiagramFormat.JSON,
-    ".html": DiagramFormat.HTML,
-    ".htm": DiagramFormat.HTML,
-}
-
 #: Views of what only a file declares.
-_DECLARED_ONLY = (DiagramView.LIFECYCLE, DiagramView.DEPLOYMENT)
+_DECLARED_ONLY = (View.LIFECYCLE, View.DEPLOYMENT)
 _LIVE_TIMEOUT_S = 10.0
 _MEASURE_S = 2.0
 
@@ -101,7 +59,7 @@ def graph(
         ),
     ] = None,
     output_format: Annotated[
-        DiagramFormat | None,
+        Format | None,
         typer.Option(
             "--format",
             "-f",
@@ -110,20 +68,20 @@ def graph(
         ),
     ] = None,
     view: Annotated[
-        DiagramView,
+        View,
         typer.Option(
             help="What to draw. nodes: nodes and their connections. connections: ports and QoS."
             " lifecycle: dependencies between nodes. deployment: nodes by executor. states:"
             " lifecycle states. An HTML page contains all views and opens with this one.",
         ),
-    ] = DiagramView.NODES,
+    ] = View.NODES,
     layout: Annotated[
-        LayoutEngine,
+        Engine,
         typer.Option(
             help="Layout engine for svg, png and html. auto uses Graphviz if it is installed, else"
             " bundled. bundled has the same output on every machine.",
         ),
-    ] = LayoutEngine.AUTO,
+    ] = Engine.AUTO,
     live: Annotated[
         bool, typer.Option("--live", help="Draw the running ROS graph instead of a file.")
     ] = False,
@@ -143,7 +101,7 @@ def graph(
     Parts with errors or warnings are marked in red. ROS is needed only with --live.
     """
     chosen = output_format or _format_of(output)
-    if output is None and chosen is DiagramFormat.PNG and sys.stdout.isatty():
+    if output is None and chosen is Format.PNG and sys.stdout.isatty():
         raise UsageError("refusing to write a PNG to a terminal", hint="use -o FILE.png")
     if bool(systems) == live:
         raise UsageError("specify either systems or --live", hint="see 'compose graph --help'")
@@ -189,9 +147,7 @@ def _live(timeout_s: float, measure_s: float) -> Scene:
             return live_scene_of(snapshot, observer.rates(deadline, measure_s))
 
 
-def _drawn(
-    scene: Scene, form: DiagramFormat, view: DiagramView, layout: LayoutEngine, *, live: bool
-) -> bytes:
+def _drawn(scene: Scene, form: Format, view: View, layout: Engine, *, live: bool) -> bytes:
     from composer import graph as graphs
     from composer.graph import output
     from composer.graph.formats import mermaid
@@ -199,28 +155,27 @@ def _drawn(
     from composer.graph.graphviz import GraphvizFailed
 
     views = [view]
-    if form is DiagramFormat.HTML:
-        views = [each for each in DiagramView if not (live and each in _DECLARED_ONLY)]
-    pictures = [graphs.build_graph(scene, graphs.View(each.value)) for each in views]
-    if form is DiagramFormat.MERMAID and mermaid.is_too_large(pictures[0]):
+    if form is Format.HTML:
+        views = [each for each in View if not (live and each in _DECLARED_ONLY)]
+    pictures = [graphs.build_graph(scene, each) for each in views]
+    if form is Format.MERMAID and mermaid.is_too_large(pictures[0]):
         say("warning: Mermaid refuses to render a diagram of this size; use html or svg instead")
-    target = (output.Format(form.value), output.Engine(layout.value))
     try:
-        return output.render(pictures, *target, shown=views.index(view))
+        return output.render(pictures, form, layout, shown=views.index(view))
     except GraphvizFailed as error:
         raise CommandError(str(error), hint="--layout bundled needs no Graphviz") from error
     except PngMissing as error:
         raise CommandError(str(error)) from error
 
 
-def _format_of(output: Path | None) -> DiagramFormat:
+def _format_of(output: Path | None) -> Format:
     if output is None:
-        return DiagramFormat.MERMAID
-    found = _FORMATS.get(output.suffix.lower())
+        return Format.MERMAID
+    found = FORMATS_BY_SUFFIX.get(output.suffix.lower())
     if found is None:
         raise UsageError(
             f"the suffix of '{output}' is not a known format",
-            hint="use one of " + " ".join(_FORMATS) + ", or --format",
+            hint="use one of " + " ".join(FORMATS_BY_SUFFIX) + ", or --format",
         )
     return found
 
