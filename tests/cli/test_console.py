@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import fcntl
 import os
+import socket
 import subprocess
 import sys
+import termios
 import threading
+import time
 from pathlib import Path
 
 from composer.cli.support.output_queue import FileDescriptor, OutputQueue
@@ -101,9 +104,12 @@ def test_lines_that_a_full_disk_refuses_are_counted() -> None:
     assert queue._dropped_lines == 2
 
 
+#: ``fprintf`` holds the GIL, as rclpy does when rcl logs.
 PROGRAM = """
-import os, sys
+import ctypes, os, subprocess, sys
 from composer.cli.support.console import queued_output
+libc = ctypes.PyDLL(None)
+stderr = ctypes.c_void_p.in_dll(libc, "stderr")
 with queued_output():
     print("from Python")
     print("a message", file=sys.stderr)
@@ -113,32 +119,67 @@ with queued_output():
         os._exit(0)
     os.wait()
     for _ in range(LINES):
-        os.write(2, b"from C code" * 100)
+        libc.fprintf(stderr, b"from C code%s" % (b" " * 1000))
+    if STARTS:
+        subprocess.run([sys.executable, "-c", "import os, sys; os.write(2, b'y' * 300_000)"])
+    assert os.get_blocking(1) and os.get_blocking(2)
 print("the end")
 """
 
 
-def run(lines: int, stderr: int) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", f"LINES = {lines}\n{PROGRAM}"],
-        stdout=subprocess.PIPE,
-        stderr=stderr,
-        text=True,
-        check=False,
-        timeout=LIMIT_S,
+def run(stderr: int, *, lines: int = 1, starts: bool = False) -> subprocess.Popen[str]:
+    program = f"LINES, STARTS = {lines}, {starts}\n{PROGRAM}"
+    return subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=stderr, text=True
     )
 
 
+def ended(process: subprocess.Popen[str]) -> tuple[list[str], str]:
+    out, error = process.communicate(timeout=LIMIT_S)
+    assert process.returncode == 0, error
+    return sorted(out.splitlines()), error
+
+
+PRINTED = ["from Python", "from a forked process", "the end"]
+
+
 def test_prints_of_every_origin_arrive() -> None:
-    done = run(1, subprocess.PIPE)
-    assert sorted(done.stdout.splitlines()) == ["from Python", "from a forked process", "the end"]
-    assert "a message\n" in done.stderr
-    assert "from C code" in done.stderr
+    lines, error = ended(run(subprocess.PIPE))
+    assert lines == PRINTED
+    assert "a message\n" in error
+    assert "from C code" in error
 
 
 def test_c_code_does_not_wait_for_a_pipe_that_nothing_reads() -> None:
     pipe = FullPipe()
-    done = run(100, pipe.writing)
-    assert done.returncode == 1
+    lines, _ = ended(run(pipe.writing, lines=100))
+    assert lines == PRINTED
     pipe.close_writing()
     assert b"from C code" not in pipe.read(), "an error instead of a wait"
+
+
+def test_c_code_does_not_wait_for_a_socket_that_nothing_reads() -> None:
+    ours, theirs = socket.socketpair()
+    lines, _ = ended(run(theirs.fileno(), lines=5000))
+    assert lines == PRINTED
+    theirs.close()
+    ours.settimeout(LIMIT_S)
+    assert b"from C code" in b"".join(iter(lambda: ours.recv(65_536), b""))
+    ours.close()
+
+
+def waiting_bytes(fd: int) -> int:
+    return int.from_bytes(fcntl.ioctl(fd, termios.FIONREAD, bytes(4)), sys.byteorder)
+
+
+def test_a_started_process_waits_until_it_can_print() -> None:
+    reading, writing = os.pipe()
+    process = run(writing, starts=True)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as pipe:
+        until_s = time.monotonic() + LIMIT_S
+        while waiting_bytes(reading) < 60_000 and time.monotonic() < until_s:
+            time.sleep(0.01)  # poll until the pipe is full: it holds 64 KiB
+        received = pipe.read()
+    assert received.count(b"y") == 300_000
+    assert ended(process)[0] == PRINTED

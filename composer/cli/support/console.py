@@ -6,9 +6,7 @@ hangs. See docs/decisions/0043-console-output.md.
 
 from __future__ import annotations
 
-import fcntl
 import os
-import stat
 import sys
 from collections import deque
 from collections.abc import Iterator
@@ -16,6 +14,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from typing import TextIO
 
+from composer.cli.support.c_streams import CStreams
 from composer.cli.support.output_queue import FileDescriptor, OutputQueue
 from composer.cli.support.streams import WrappedStream
 
@@ -56,20 +55,20 @@ def queued_output() -> Iterator[None]:
     """
     before = sys.stdout, sys.stderr
     queues: list[OutputQueue] = []
-    sockets: list[int] = []
+    now = _queued(*before, queues)
+    c_streams = CStreams(lambda fd, text: now[fd - 1].write(text))
+    sys.stdout, sys.stderr = now
     try:
-        sys.stdout, sys.stderr = _queued(*before, queues)
-        sockets += _do_not_block_c_code()
         os.register_at_fork(after_in_child=partial(_restore, *before))  # it has no thread
         yield
     finally:
+        c_streams.finish()
         sys.stdout.flush()
         sys.stderr.flush()
         _restore(*before)
-        for queue in queues:
-            queue.close()
-        for fd in sockets:
-            os.set_blocking(fd, True)
+        is_written = [queue.close() for queue in queues]
+        if all(is_written):  # otherwise C code would wait at the exit
+            c_streams.restore()
 
 
 def _queued(stdout: TextIO, stderr: TextIO, queues: list[OutputQueue]) -> tuple[TextIO, TextIO]:
@@ -98,28 +97,3 @@ def _as_text(stream: TextIO, queue: OutputQueue) -> TextIO:
 def _restore(stdout: TextIO, stderr: TextIO) -> None:
     if isinstance(sys.stderr, QueuedStream):
         sys.stdout, sys.stderr = stdout, stderr
-
-
-def _do_not_block_c_code() -> list[int]:
-    """Drop what rcl and the middleware print while nothing accepts it; return changed sockets.
-
-    They print with the GIL or locks of the middleware held, which would stop all nodes.
-    """
-    sockets: list[int] = []
-    for fd in (1, 2):
-        with suppress(OSError):  # the terminal of another user
-            mode = os.fstat(fd).st_mode
-            if stat.S_ISSOCK(mode) and os.get_blocking(fd):  # such as to systemd's journal
-                os.set_blocking(fd, False)
-                sockets.append(fd)
-            elif stat.S_ISFIFO(mode) or os.isatty(fd):
-                _open_again(fd, os.O_NONBLOCK | os.O_NOCTTY)
-    return sockets
-
-
-def _open_again(fd: int, more_flags: int) -> None:
-    """Replace ``fd`` by a new file description: flags of the present one affect other processes."""
-    flags = fcntl.fcntl(fd, fcntl.F_GETFL) | more_flags
-    opened = os.open(f"/proc/self/fd/{fd}", flags)
-    os.dup2(opened, fd)
-    os.close(opened)

@@ -48,7 +48,7 @@ class FileDescriptor:
         while True:
             try:
                 return os.write(self._fd, data)
-            except BlockingIOError:  # a socket, see console.py
+            except BlockingIOError:  # another program has set the flag
                 self._writable.poll()
 
     def close(self) -> None:
@@ -100,8 +100,11 @@ class OutputQueue:
             if self._is_idle:
                 self._wake()
 
-    def close(self) -> None:
-        """Write what waits, as long as the other side reads, and end the thread."""
+    def close(self) -> bool:
+        """Write what waits, as long as the other side reads, and end the thread.
+
+        Return whether everything was written.
+        """
         with self._lock:
             self._is_closing = True
             if self._is_idle:
@@ -111,6 +114,7 @@ class OutputQueue:
             self._thread.join(_STALLED_S)
             if not self._thread.is_alive() or self._written_bytes == before:
                 break
+        return not self._thread.is_alive()
 
     def _wake(self) -> None:
         self._is_idle = False

@@ -13,6 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import BinaryIO, NoReturn, TextIO
 
+from composer.cli.support.c_streams import crash_fd
 from composer.cli.support.errors import CommandError
 from composer.cli.support.line_format import CONSOLE_FORMAT_VARIABLE, file_format
 
@@ -85,7 +86,7 @@ def end_within(limit_s: float | None) -> None:
     faulthandler.cancel_dump_traceback_later()
     signal.setitimer(signal.ITIMER_REAL, 0.0)
     if limit_s is not None:
-        faulthandler.dump_traceback_later(max(limit_s, _MIN_DELAY_S), exit=True)
+        faulthandler.dump_traceback_later(max(limit_s, _MIN_DELAY_S), exit=True, file=crash_fd())
         signal.setitimer(signal.ITIMER_REAL, limit_s + _LAST_RESORT_S)
 
 
