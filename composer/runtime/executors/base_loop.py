@@ -10,7 +10,7 @@ from time import monotonic
 from typing import Any, Generic, TypeVar, cast
 
 from composer.runtime.executors.futures import Future
-from composer.runtime.executors.loop import ExceptionHandler
+from composer.runtime.executors.loop import Awaited, ExceptionHandler
 from composer.runtime.executors.stacks import format_stacks
 from composer.runtime.executors.tasks import Task, name_of
 from composer.runtime.executors.timer_queue import ScheduledCall
@@ -49,7 +49,7 @@ class BaseLoop(ABC):
         """Return the identifiers of the threads that are in a callback now."""
 
     @abstractmethod
-    def _is_current(self) -> bool:
+    def is_current(self) -> bool:
         """Return whether the calling thread belongs to the loop."""
 
     @abstractmethod
@@ -83,13 +83,19 @@ class BaseLoop(ABC):
         Raises what ``function`` raises; TimeoutError if it takes longer, after which it is not
         started; and RuntimeError if the loop has stopped.
         """
-        if self._is_current():
+        if self.is_current():
             return function()
         call = CrossThreadCall(function)
         self.call_soon(call.run)
         if self._stopped and call.revoke():
             raise RuntimeError(f"executor '{self._name}' has stopped")
         return call.wait(timeout_s, self.current_stack)
+
+    def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
+        """Block until ``future`` is done; return false if that takes longer."""
+        done = threading.Event()
+        future.add_done_callback(lambda _: done.set())
+        return future.done() or done.wait(timeout_s) or future.done()
 
     def current_stack(self) -> str:
         """Return the Python stacks of the callbacks that run now; empty if none does."""

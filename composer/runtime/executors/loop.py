@@ -23,6 +23,17 @@ T = TypeVar("T")
 #: Called with (what was running, the exception). The loop reports it and continues.
 ExceptionHandler = Callable[[str, BaseException], None]
 
+
+class Awaited(Protocol):
+    """A future of rclpy or of the composer, as far as a loop waits for it."""
+
+    def done(self) -> bool:
+        """Return whether it has a result or an exception."""
+
+    def add_done_callback(self, callback: Callable[[Any], object]) -> object:
+        """Call ``callback`` once it is done."""
+
+
 Reply = Callable[[Any], None]
 #: A message and the middleware's information about it.
 Taken = tuple[Any, Any]
@@ -114,6 +125,16 @@ class Loop(Protocol):
 
         Raises what ``function`` raises; TimeoutError with the loop's stack if it takes longer,
         after which it is not started; and RuntimeError if the loop has stopped.
+        """
+
+    def is_current(self) -> bool:
+        """Return whether the calling thread is in a callback of the loop."""
+
+    def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
+        """Block until ``future`` is done; return false if that takes longer.
+
+        On the thread of an event loop, the loop serves everything else meanwhile. A thread of
+        another loop only blocks, so that its other threads have to complete the future.
         """
 
     def start(self) -> None:

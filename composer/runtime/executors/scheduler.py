@@ -20,7 +20,7 @@ from composer.runtime.executors.base_loop import (
     BaseLoop,
 )
 from composer.runtime.executors.entities.source_group import EntitySource, SourceGroup
-from composer.runtime.executors.loop import ExceptionHandler
+from composer.runtime.executors.loop import Awaited, ExceptionHandler
 from composer.runtime.executors.poller import Poller, use_precise_wakeups
 from composer.runtime.executors.tasks import name_of
 from composer.runtime.executors.timer_queue import ScheduledCall, TimerQueue
@@ -42,6 +42,7 @@ class Scheduler(BaseLoop):
         self._groups: dict[int, SourceGroup] = {}  # by the file descriptor of their signal
         self._running: object = None  # the source or callback that is being called
         self._sleeping = False
+        self._leaving = False  # the innermost call of _serve_until_left returns
         self._thread = threading.Thread(target=self._spin, name=f"executor {name}", daemon=True)
 
     def call_soon(self, callback: Callable[[], object]) -> None:
@@ -65,7 +66,8 @@ class Scheduler(BaseLoop):
         and returns false.
         """
         self._stopping = True
-        if self._is_current():
+        self._leaving = True
+        if self.is_current():
             return False
         if self._thread.ident is None:  # never started
             self._shut_down()
@@ -78,12 +80,44 @@ class Scheduler(BaseLoop):
             task.abandon()
         return False
 
+    def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
+        """Block until ``future`` is done; return false if that takes longer.
+
+        On the thread of the loop, in a callback, everything else is served meanwhile, except the
+        group of the callback itself.
+        """
+        if not self.is_current():
+            return super().wait_for(future, timeout_s)
+        end_s = inf if timeout_s is None else monotonic() + timeout_s
+        timer = None if timeout_s is None else self.call_later(timeout_s, self._leave)
+        future.add_done_callback(self._leave)
+        running = self._running
+        try:
+            while True:
+                self._leaving = False  # first: the future may be done before the next check
+                if future.done() or self._stopping or monotonic() >= end_s:
+                    break
+                self._serve_until_left()
+        finally:
+            self._running = running
+            self._leaving = True  # a call further out checks its own future
+            if timer is not None:
+                timer.cancel()
+        return future.done()
+
+    def _leave(self, _: object = None) -> None:
+        """Let the innermost call of ``_serve_until_left`` return. From any thread."""
+        self._leaving = True
+        if self._sleeping:
+            self._poller.wake()
+
     def busy_threads(self) -> tuple[int, ...]:
         """Return the identifiers of the threads that are in a callback now."""
         ident = self._thread.ident
         return () if ident is None or self._running is None else (ident,)
 
-    def _is_current(self) -> bool:
+    def is_current(self) -> bool:
+        """Return whether the calling thread belongs to the loop."""
         return threading.current_thread() is self._thread
 
     # --- groups of sources
@@ -113,7 +147,9 @@ class Scheduler(BaseLoop):
         use_precise_wakeups()
         while not self._stopping:
             try:
-                self._serve_until_stopped()
+                self._leaving = False
+                if not self._stopping:  # a stop sets it before it sets ``_leaving``
+                    self._serve_until_left()
             except BaseException as error:  # between callbacks: an asynchronous one, or a bug
                 self.report(f"executor '{self._name}'", error)
                 sleep(PAUSE_AFTER_FAULT_S)
@@ -121,11 +157,12 @@ class Scheduler(BaseLoop):
                 self._ready.extend(group for group in list(self._groups.values()) if group.due)
         self._shut_down()
 
-    def _serve_until_stopped(self) -> None:
+    def _serve_until_left(self) -> None:
+        """Serve calls, timers and groups until ``_leaving`` is set."""
         timers, calls, poller = self._timers, self._calls, self._poller
         groups, ready = self._groups, self._ready
         yield_at_s = inf  # not known yet
-        while not self._stopping:
+        while not self._leaving:
             now_s = monotonic()
             if now_s >= timers.next_s:
                 self._run_timers(now_s)
@@ -138,7 +175,7 @@ class Scheduler(BaseLoop):
                 yield_at_s = inf
                 self._sleeping = True
                 # Check again: a call may have been added before ``_sleeping`` was set.
-                is_idle = not (calls or self._stopping)
+                is_idle = not (calls or self._leaving)
                 signaled = poller.wait(timers.next_due_s()) if is_idle else poller.poll()
                 self._sleeping = False
             for fd, _ in signaled:
@@ -213,7 +250,7 @@ class Scheduler(BaseLoop):
                 break
 
     def _schedule(self, call: ScheduledCall) -> ScheduledCall:
-        if self._is_current():
+        if self.is_current():
             self._timers.add(call)
         else:
             self.call_soon(partial(self._timers.add, call))

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import cast
 
 from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.publisher import Publisher
 
 from composer.model import Port
 from composer.runtime.callbacks.context import NodeContext
@@ -33,14 +34,8 @@ class PublisherPort:
     def __init__(self, context: NodeContext, port: Port) -> None:
         self._context = context
         self._name = port.name.value
-        self._qos_events = QosEvents(context, port)
-        self._publisher = context.node.create_publisher(
-            interface_class(port.interface.value),
-            port.full_name,
-            rclpy_profile(port.qos.profile),
-            callback_group=context.group,
-            event_callbacks=cast(PublisherEventCallbacks, self._qos_events),
-        )
+        self._qos_events = self._make_qos_events(port)
+        self._publisher = self._make_publisher(port)
         origin = PublisherContext(context.gate, self._drop, tuple(self._observers(port)))
         #: The publisher that the node's behavior and reactions use.
         self.gated, self._remove = context.router.add_publisher(port, self._publisher, origin)
@@ -61,6 +56,21 @@ class PublisherPort:
         self._qos_events.close()
         self._remove()
         self._count.end()
+        self._destroy_publisher()
+
+    def _make_qos_events(self, port: Port) -> QosEvents:
+        return QosEvents(self._context, port)
+
+    def _make_publisher(self, port: Port) -> Publisher:
+        return self._context.node.create_publisher(
+            interface_class(port.interface.value),
+            port.full_name,
+            rclpy_profile(port.qos.profile),
+            callback_group=self._context.group,
+            event_callbacks=cast(PublisherEventCallbacks, self._qos_events),
+        )
+
+    def _destroy_publisher(self) -> None:
         self._context.node.destroy_publisher(self._publisher)
 
     def _observers(self, port: Port) -> Iterator[Target]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
+from rclpy.service import Service
+
 from composer.model import Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
@@ -61,7 +63,7 @@ class ServicePort:
     ) -> None:
         self._context = context
         self._name = port.name.value
-        self._type = interface_class(port.interface.value)
+        self._type = self._interface(port)
         self._response_type: Any = self._type.Response
         self._has_reason = _has_reason(self._response_type)
         self._reaction = reaction
@@ -76,13 +78,7 @@ class ServicePort:
             depth=None,
             reentrant=port.reentrant,
         )
-        self._service = context.node.create_service(
-            self._type,
-            port.full_name,
-            unused_callback,
-            qos_profile=rclpy_profile(port.qos.profile),
-            callback_group=context.group_of(port),
-        )
+        self._service = self._make_service(port)
         context.loop.add_service(self._service, self.on_request)
         local = LocalService(port, self._type, context.loop.call_soon, self.on_request)
         self._remove = context.router.add_service(port, local)
@@ -110,6 +106,21 @@ class ServicePort:
         for request in tuple(self._pending):
             self._refuse(request)
         self._context.loop.remove(self._service)
+        self._destroy_service()
+
+    def _interface(self, port: Port) -> Any:
+        return interface_class(port.interface.value)
+
+    def _make_service(self, port: Port) -> Service:
+        return self._context.node.create_service(
+            self._type,
+            port.full_name,
+            unused_callback,
+            qos_profile=rclpy_profile(port.qos.profile),
+            callback_group=self._context.group_of(port),
+        )
+
+    def _destroy_service(self) -> None:
         self._context.node.destroy_service(self._service)
 
     def _refuse(self, request: PendingRequest) -> None:

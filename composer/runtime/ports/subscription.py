@@ -9,6 +9,7 @@ from time import monotonic
 from typing import Any, cast
 
 from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.subscription import Subscription
 
 from composer.model import Port
 from composer.qos import Durability
@@ -74,17 +75,9 @@ class SubscriptionPort:
         self._lifespan_s = inf if lifespan_ms is None else lifespan_ms / 1000.0
         if port.qos.profile.durability is Durability.TRANSIENT_LOCAL:
             self._latched = deque(maxlen=depth)
-        self._qos_events = QosEvents(context, port)
-        self._subscription = context.node.create_subscription(
-            interface_class(port.interface.value),
-            port.full_name,
-            self._mailbox.receive,
-            rclpy_profile(port.qos.profile),
-            callback_group=context.group_of(port),
-            event_callbacks=cast(SubscriptionEventCallbacks, self._qos_events),
-        )
-        self._remove = context.router.add_subscription(port, self._subscription, self._mailbox)
-        context.loop.add_subscription(self._subscription, self._mailbox.receive)
+        self._qos_events = self._make_qos_events(port)
+        self._subscription = self._make_subscription(port)
+        self._remove = self._receive(port)
 
     def activate(self) -> None:
         """Handle the messages that were latched meanwhile."""
@@ -118,6 +111,29 @@ class SubscriptionPort:
         self._remove()
         self._count.end()
         self._context.loop.remove(self._subscription)
+        self._destroy_subscription()
+
+    def _make_qos_events(self, port: Port) -> QosEvents:
+        return QosEvents(self._context, port)
+
+    def _make_subscription(self, port: Port) -> Subscription:
+        return self._context.node.create_subscription(
+            interface_class(port.interface.value),
+            port.full_name,
+            self._mailbox.receive,
+            rclpy_profile(port.qos.profile),
+            callback_group=self._context.group_of(port),
+            event_callbacks=cast(SubscriptionEventCallbacks, self._qos_events),
+        )
+
+    def _receive(self, port: Port) -> Callable[[], None]:
+        """Receive messages from now on; return a function that stops local ones."""
+        context = self._context
+        remove = context.router.add_subscription(port, self._subscription, self._mailbox)
+        context.loop.add_subscription(self._subscription, self._mailbox.receive)
+        return remove
+
+    def _destroy_subscription(self) -> None:
         self._context.node.destroy_subscription(self._subscription)
 
     def _handle(self, message: Any) -> Coroutine[Any, Any, None] | None:

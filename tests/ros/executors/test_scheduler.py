@@ -318,3 +318,56 @@ def test_a_failing_exception_handler_does_not_end_the_loop(
     on.loop.call_soon(fall_over)
     assert on.loop.run(lambda: "alive", 5.0) == "alive"
     assert "no room for reports" in capfd.readouterr().err
+
+
+def test_a_callback_that_waits_for_a_future_keeps_nothing_else_waiting(on: Bench) -> None:
+    answered: Future[str] = Future()
+    seen: list[object] = []
+
+    def wait() -> None:
+        seen.append(on.loop.wait_for(answered, 5.0))
+        seen.append(answered.result())
+
+    on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
+    publisher = on.node.create_publisher(Int64, "numbers", 10)
+    wait_until(lambda: publisher.get_subscription_count() == 1)
+    timer = on.loop.call_every(0.001, lambda: None)
+    on.loop.call_soon(wait)
+    publisher.publish(Int64(data=1))
+    wait_until(lambda: seen == [1])
+    on.loop.call_soon(lambda: answered.set_result("done"))
+    wait_until(lambda: len(seen) == 3)
+    timer.cancel()
+    assert seen == [1, True, "done"]
+    assert on.errors() == []
+
+
+def test_waits_within_waits_end_inside_out(on: Bench) -> None:
+    outer: Future[None] = Future()
+    inner: Future[None] = Future()
+    order: list[str] = []
+
+    def wait(name: str, future: Future[None]) -> None:
+        on.loop.wait_for(future)
+        order.append(name)
+
+    on.loop.call_soon(lambda: wait("outer", outer))
+    on.loop.call_soon(lambda: wait("inner", inner))
+    on.loop.call_soon(lambda: outer.set_result(None))
+    on.loop.run(lambda: order.append("served"), 5.0)
+    inner.set_result(None)  # from another thread
+    wait_until(lambda: len(order) == 3)
+    assert order == ["served", "inner", "outer"]
+
+
+def test_a_wait_ends_in_time_and_when_the_loop_stops(on: Bench) -> None:
+    never: Future[None] = Future()
+    results: list[bool] = []
+    on.loop.call_soon(lambda: results.append(on.loop.wait_for(never, 0.01)))
+    wait_until(lambda: results)
+    assert results == [False]
+    waiting = threading.Event()
+    on.loop.call_soon(lambda: (waiting.set(), results.append(on.loop.wait_for(never))))
+    assert waiting.wait(5.0)
+    assert on.loop.stop(5.0)
+    assert results == [False, False]

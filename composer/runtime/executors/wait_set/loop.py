@@ -100,7 +100,7 @@ class WaitSetLoop(EntityLoop):
         self._timers.stop()
         for task in list(self._tasks):
             task.future.cancel()
-        is_current = self._is_current()
+        is_current = self.is_current()
         if self._thread.ident is not None and not is_current:
             self._wait_for_tasks(min(until_s, monotonic() + _CLEAN_UP_S))
         self._stopping = True
@@ -137,7 +137,8 @@ class WaitSetLoop(EntityLoop):
             else:
                 self._running[ident] = outer
 
-    def _is_current(self) -> bool:
+    def is_current(self) -> bool:
+        """Return whether the calling thread belongs to the loop."""
         return threading.get_ident() in self._running
 
     def _spin(self) -> None:
