@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 from composer.model import Event, Node, Port, PortKind, Reaction, Timer
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import ReactionClient, RunningReaction
 from composer.runtime.intra_process.publisher import GatedPublisher
 from composer.runtime.node.behavior_loader import method
+from composer.runtime.node.local_node import RunningPort
 from composer.runtime.ports.action_client import ActionClientPort
 from composer.runtime.ports.action_server import ActionServerPort, Handlers
 from composer.runtime.ports.client import ClientPort
@@ -19,19 +20,6 @@ from composer.runtime.ports.service import ServicePort
 from composer.runtime.ports.subscription import SubscriptionPort
 from composer.runtime.ports.timer import TimerPort
 from composer.runtime.ros.messages import interface_class
-
-
-class RunningPort(Protocol):
-    """A port or timer between the configuration and the cleanup of its node."""
-
-    def activate(self) -> None:
-        """Begin: the node is active now."""
-
-    def deactivate(self) -> None:
-        """Stop and discard what waits: the node is leaving *active*."""
-
-    def destroy(self) -> None:
-        """Destroy the ROS entity."""
 
 
 @dataclass(slots=True)

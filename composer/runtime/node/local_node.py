@@ -1,0 +1,347 @@
+"""What every node of this process has: a ROS node, a lifecycle, gates, a log, and counters.
+
+The kinds of nodes differ in what they create and call in a transition. See
+:class:`~composer.runtime.node.node.RunningNode` and
+:class:`~composer.runtime.hosting.hosted_node.HostedNode`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+from time import monotonic
+from typing import Protocol, TypeVar
+
+from rclpy.node import Node as RosNode
+
+from composer.model import Node
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log
+from composer.runtime.callbacks.mutation_check import MessageSnapshots, MutationCheck
+from composer.runtime.clock.clock import NodeTime
+from composer.runtime.executors.exceptions import describe
+from composer.runtime.executors.futures import Future
+from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.strand import InlineStrand, SerialStrand
+from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
+from composer.runtime.metrics.statistics import Statistics
+from composer.runtime.node.lifecycle import Lifecycle
+from composer.runtime.node.managed_node import NodeListener
+from composer.runtime.node.options import NodeOptions
+from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
+from composer.runtime.node.parameter_services import NodeParameterStore, ParameterServices
+from composer.runtime.node.ros_node import make_ros_node
+
+T = TypeVar("T")
+
+
+class RunningPort(Protocol):
+    """A port or timer between the configuration and the cleanup of its node."""
+
+    def activate(self) -> None:
+        """Begin: the node is active now."""
+
+    def deactivate(self) -> None:
+        """Stop and discard what waits: the node is leaving *active*."""
+
+    def destroy(self) -> None:
+        """Destroy the ROS entity."""
+
+
+class ActionServing(RunningPort, Protocol):
+    """An action server, whose goals may take a moment to end."""
+
+    async def drain(self) -> None:
+        """Wait until the goals have ended, up to a time limit."""
+
+
+class Entities(Protocol):
+    """The ports and timers of a configured node."""
+
+    @property
+    def ports(self) -> Iterator[RunningPort]:
+        """All of them: first those that send, then those that receive, then timers."""
+
+    @property
+    def gated(self) -> Iterator[RunningPort]:
+        """Those that work only while the node is active."""
+
+    @property
+    def always_on(self) -> Iterable[RunningPort]:
+        """The others, which work from configure to cleanup."""
+
+    @property
+    def action_servers(self) -> Mapping[str, ActionServing]:
+        """The action servers among them, by name."""
+
+
+class LocalNode(ABC):
+    """The :class:`.ManagedNode` of this process. Create it before its loop is started, or on the loop.
+
+    A subclass calls :meth:`_join` at the end of its constructor. ``_entities`` are what the node
+    has from configure to cleanup.
+    """
+
+    _entities: Entities
+    lifecycle: Lifecycle
+
+    def __init__(
+        self,
+        model: Node,
+        loop: Loop,
+        options: NodeOptions,
+        listener: NodeListener,
+        statistics: Statistics | None = None,
+    ) -> None:
+        """Continue ``statistics``."""
+        self.model = model
+        self.loop = loop
+        self.activations = 0  # how often it became active
+        #: When, by ``time.monotonic()``, the work of its last transition started.
+        self.transition_started_s = 0.0
+        self.statistics = Statistics() if statistics is None else statistics
+        self.transition_timeout_s = options.transition_timeout_s
+        self._listener = listener
+        self._system_is_up = options.system_is_up
+        self._start_state = ""  # of the current transition
+        self._ros = self._make_ros_node()
+        offers = model.introspection
+        log = Log(self._ros, options.log_level, listener.write_log, rosout=offers.rosout)
+        self._error_limit = _error_limit(model, listener)
+        error_log = ErrorLog(log, self.statistics, listener.on_error, self._error_limit)
+        self._context = NodeContext(
+            node=self._ros,
+            loop=loop,
+            clock=NodeTime(self._ros, loop, options.process.simulated_time, self._time_switched),
+            gate=LifecycleGate(model.full_name, PendingFutures(loop.call_later)),
+            strand=SerialStrand(loop.call_soon) if self._is_serial(options) else InlineStrand(),
+            log=log,
+            error_log=error_log,
+            statistics=self.statistics,
+            names={"parameters": {}, "state": {}, "node": model.full_name},
+            router=options.router,
+            chains=options.chains.of(model),
+            events=options.process.events,
+            mutations=_mutation_check(options.seen_messages, error_log),
+        )
+        # Ports that are always on have a gate of their own and share the rest.
+        always_on_gate = LifecycleGate(model.full_name, PendingFutures(loop.call_later))
+        self._always_on_context = replace(self._context, gate=always_on_gate)
+        self._keeps_entities = False
+
+    def _join(self, options: NodeOptions) -> None:
+        """Join the ROS graph, unconfigured; the parameters are declared."""
+        offers = self.model.introspection
+        if offers.parameters:
+            ParameterServices(self._ros, NodeParameterStore(self._ros), self._context.log.warn)
+        self.loop.add_node(self._ros)
+        self.lifecycle = Lifecycle(
+            self._context,
+            self,
+            timeout_s=options.transition_timeout_s,
+            services=offers.lifecycle_services,
+        )
+
+    @property
+    def full_name(self) -> str:
+        """The name ROS knows the node by."""
+        return self.model.full_name
+
+    @property
+    def state(self) -> str:
+        """The label of the lifecycle state, as ROS tools see it."""
+        return self.lifecycle.state
+
+    def now_s(self) -> float:
+        """Return the node's time in seconds."""
+        return self._context.now_s()
+
+    def count_errors(self) -> None:
+        """Count errors as faults from now on: the system is up. Thread-safe."""
+        self._system_is_up = True
+        if self._error_limit is not None and self.state == "active":
+            self._error_limit.start()
+
+    def block(self) -> None:
+        """Block all ports of a failed node until its next transition. Thread-safe.
+
+        In that transition the node can send last messages; it receives again after it.
+        """
+        if self._error_limit is not None:
+            self._error_limit.paused = True  # it has failed already
+        for context in self.contexts:
+            context.gate.block()
+
+    def sent(self, publisher: str) -> int:
+        """Return how many messages a publisher has sent."""
+        return self.statistics.publisher(publisher).count
+
+    def limit_end(self, end_s: float) -> None:
+        """Do nothing: transitions have a time limit, and the loop interrupts callbacks."""
+
+    @property
+    def callback_owners(self) -> tuple[object, ...]:
+        """The objects by which a running callback on a stack is recognized as the node's."""
+        return (self, *self.contexts)
+
+    @property
+    def contexts(self) -> tuple[NodeContext, NodeContext]:
+        """What its parts share: those that are gated by *active*, and those that are always on."""
+        return self._context, self._always_on_context
+
+    def query(self, function: Callable[[RosNode], T]) -> Future[T]:
+        """Return the result of ``function(ROS node)``, which is called on the node's loop."""
+
+        async def call() -> T:
+            return function(self._ros)
+
+        return self.loop.run_task(call())
+
+    def keep_entities(self) -> None:
+        """Do not destroy ports from now on: the end of the process does."""
+        self._keeps_entities = True
+
+    def destroy(self) -> None:
+        """Destroy the node in any state. No transition is possible afterwards."""
+        self._release()
+        self.lifecycle.destroy()
+        self._context.clock.close()
+        self.loop.remove_node(self._ros)
+        self._ros.destroy_node()
+
+    # --- what the kinds of nodes do
+
+    def _make_ros_node(self) -> RosNode:
+        return make_ros_node(self.model)
+
+    def _is_serial(self, options: NodeOptions) -> bool:
+        """Return whether a strand has to keep callbacks apart, because the loop does not."""
+        return options.parallel
+
+    @abstractmethod
+    async def _configure(self) -> None:
+        """Create new entities, so that nothing of an earlier life remains."""
+
+    @abstractmethod
+    async def _call_user(self, transition: str) -> None:
+        """Call the user's handler of a transition."""
+
+    @abstractmethod
+    async def _call_user_on_error(self, cause: BaseException) -> None:
+        """Call the user's handler of errors."""
+
+    @abstractmethod
+    def _discard(self, outcome: TransitionOutcome | None) -> None:
+        """Release what is left after the entities were destroyed; without an outcome, forever."""
+
+    @abstractmethod
+    def _time_switched(self) -> None:
+        """Follow the node's switch to or from simulated time."""
+
+    # --- hooks of the lifecycle
+
+    async def on_transition(self, transition: str, start: str) -> None:
+        """Do the work of ``transition``; raise what goes wrong."""
+        self._begin_transition()
+        self._start_state = start
+        gate = self._context.gate
+        gate.state = self._always_on_context.gate.state = self.state
+        gate.waiting = True
+        if transition == "configure":
+            await self._configure()
+            self._always_on_context.gate.outgoing = True
+        elif transition == "activate":
+            gate.outgoing = True
+        elif start == "active":
+            await self._deactivate(self._context, self._entities.gated)
+        if transition in ("cleanup", "shutdown"):
+            await self._deactivate(self._always_on_context, self._entities.always_on)
+        await self._call_user(transition)
+
+    async def on_error(self, cause: BaseException) -> None:
+        """Let the user's code clean up."""
+        self._begin_transition()
+        await self._deactivate(self._context, self._entities.gated)
+        await self._deactivate(self._always_on_context, self._entities.always_on)
+        self._context.gate.waiting = True
+        await self._call_user_on_error(cause)
+
+    def on_transition_end(self, result: TransitionOutcome) -> None:
+        """Open or close the gates for the new state, and report it."""
+        state = result.state
+        if state == "active":
+            is_activation = result.transition == "activate"
+            self.activations += is_activation
+            self._resume_error_limit(restart=is_activation)
+        _settle(self._context.gate, state, state == "active", self._entities.gated)
+        is_configured = state in ("inactive", "active")
+        _settle(self._always_on_context.gate, state, is_configured, self._entities.always_on)
+        if state in ("unconfigured", FINALIZED):
+            self._release(result)
+        self._listener.on_transition_end(result)
+
+    # --- transitions
+
+    def _begin_transition(self) -> None:
+        self.transition_started_s = monotonic()
+        if self._error_limit is not None:
+            self._error_limit.paused = True
+        for context in self.contexts:
+            context.gate.unblock_outgoing()
+
+    def _resume_error_limit(self, *, restart: bool) -> None:
+        if self._error_limit is None or not self._system_is_up:
+            return
+        if restart:
+            self._error_limit.start()
+        else:  # a refused transition
+            self._error_limit.paused = False
+
+    async def _deactivate(self, context: NodeContext, ports: Iterable[RunningPort]) -> None:
+        """Stop receiving and cancel what is pending. Publishers stay open for last messages."""
+        context.gate.incoming = False
+        deactivated = tuple(ports)
+        for port in deactivated:
+            port.deactivate()
+        context.gate.cancel_pending()
+        for server in self._entities.action_servers.values():
+            if server in deactivated:
+                await server.drain()
+
+    def _release(self, outcome: TransitionOutcome | None = None) -> None:
+        self._context.cancel_tasks()
+        if self._keeps_entities:
+            return
+        for port in reversed(tuple(self._entities.ports)):
+            try:
+                port.destroy()
+            except Exception as error:
+                self._context.log.error(f"cannot destroy {type(port).__name__}: {describe(error)}")
+        self._discard(outcome)
+
+
+def _settle(gate: LifecycleGate, state: str, is_open: bool, ports: Iterable[RunningPort]) -> None:
+    """Open or close a gate, and the ports behind it, in the primary state ``state``."""
+    gate.state = state
+    if is_open:
+        gate.open()
+        for port in ports:
+            port.activate()
+        return
+    for port in ports:
+        port.deactivate()
+    gate.close()
+
+
+def _error_limit(model: Node, listener: NodeListener) -> ErrorLimit | None:
+    supervision = model.supervision
+    max_errors = supervision.watch.max_errors
+    if max_errors is None:
+        return None
+    window_s = supervision.restart.window_ms / 1000.0
+    return ErrorLimit(max_errors.value, window_s, listener.on_error_limit)
+
+
+def _mutation_check(seen: MessageSnapshots | None, error_log: ErrorLog) -> MutationCheck | None:
+    return None if seen is None else MutationCheck(seen, error_log.error)
