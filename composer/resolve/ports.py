@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from composer.diagnostics import Diagnostic
 from composer.model import (
     Event,
     FeedbackSteps,
+    Isolation,
     Period,
     PeriodUnit,
     Port,
@@ -55,10 +58,21 @@ def read_ports(node: Mapping, qos: QosTable, diagnostics: list[Diagnostic]) -> t
     Their full names are the declared ones until the node has a name and a namespace.
     """
     return tuple(
-        _port(kind, entry, qos, diagnostics)
+        replace(
+            _port(kind, entry, qos, diagnostics),
+            isolation=_isolation(_mapping(entry), node),
+        )
         for kind in PortKind
         for entry in entries(node.get(kind.section))
     )
+
+
+def _isolation(port: Mapping, node: Mapping) -> Isolation:
+    """Return whether messages are copied: those of a class are, since it may use them again."""
+    written = choice(port.get("isolation"), Isolation)
+    if written is not None:
+        return written.value
+    return Isolation.SHARE if node.get("class") is None else Isolation.COPY
 
 
 def read_timers(node: Mapping, diagnostics: list[Diagnostic]) -> tuple[Timer, ...]:
@@ -68,7 +82,7 @@ def read_timers(node: Mapping, diagnostics: list[Diagnostic]) -> tuple[Timer, ..
 
 def _port(kind: PortKind, entry: Entry, qos: QosTable, diagnostics: list[Diagnostic]) -> Port:
     span = entry.key.span
-    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), span)
+    tree = _mapping(entry)
     ros_name = text(tree.get(kind.channel.value)) or key(entry)
     accept = expression(tree.get("accept"), diagnostics)
     return Port(
@@ -93,6 +107,10 @@ def _port(kind: PortKind, entry: Entry, qos: QosTable, diagnostics: list[Diagnos
         required=_required(tree.get("required")),
         description=plain_text(tree.get("description")),
     )
+
+
+def _mapping(entry: Entry) -> Mapping:
+    return entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
 
 
 def _required(tree: Tree | None) -> bool | None:

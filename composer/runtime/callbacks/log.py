@@ -23,7 +23,8 @@ from composer.runtime.executors.tasks import Cancellable, SupportsCallLater
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import Statistics
 
-_SEVERITIES = {
+#: The numbers of rcl_interfaces/msg/Log.
+SEVERITIES = {
     LogLevel.DEBUG: 10,
     LogLevel.INFO: 20,
     LogLevel.WARN: 30,
@@ -63,29 +64,33 @@ class Log:
         Without ``rosout``, to the console only.
         """
         self._name = node.get_fully_qualified_name().strip("/").replace("/", ".")
-        self._lowest = _SEVERITIES[level]
+        self._lowest = SEVERITIES[level]
         self._write = write
         self._clock = node.get_clock()
         self._rosout = node.create_publisher(LogMessage, "/rosout", _ROSOUT_QOS) if rosout else None
 
     def is_enabled_for(self, level: LogLevel) -> bool:
         """Return whether messages at ``level`` are logged."""
-        return _SEVERITIES[level] >= self._lowest
+        return SEVERITIES[level] >= self._lowest
 
     def write(self, level: LogLevel, message: str) -> None:
         """Log ``message`` at ``level``."""
-        if not self.is_enabled_for(level):
-            return
+        if self.is_enabled_for(level):
+            self.emit(level, message)
+
+    def emit(self, level: LogLevel, message: str, name: str | None = None) -> None:
+        """Log ``message`` whatever the level of this log is, by default as the node's."""
+        name = name or self._name
         text = printable(message)
-        self._write(level, self._name, text)
+        self._write(level, name, text)
         if self._rosout is None:
             return
         with suppress(*_DESTROYED):
             self._rosout.publish(
                 LogMessage(
                     stamp=self._clock.now().to_msg(),
-                    level=_SEVERITIES[level],
-                    name=self._name,
+                    level=SEVERITIES[level],
+                    name=name,
                     msg=text,
                 )
             )

@@ -57,9 +57,12 @@ class MatchListener:
 
     __slots__ = ("_event", "is_supported")
 
-    def __init__(self, publisher: Publisher) -> None:
-        #: False if the middleware does not report matches.
+    def __init__(self, publisher: Publisher, *, enabled: bool = True) -> None:
+        """Listen unless it is not ``enabled``: rmw has one callback per kind of event."""
+        #: False if matches are not reported.
         self.is_supported = False
+        if not enabled:
+            return
         try:
             with publisher.handle:
                 self._event = rclpy_implementation.EventHandle(

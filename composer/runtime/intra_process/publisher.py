@@ -46,12 +46,14 @@ class PublisherContext:
     """What a publisher needs of its node.
 
     ``on_refused`` is called for each message that is published while the gate is closed.
-    ``observers`` receive each message before any other target.
+    ``observers`` receive each message before any other target. Without ``listens_to_matches``,
+    matched subscriptions are counted for each message.
     """
 
     gate: LifecycleGate
     on_refused: Callable[[], None]
     observers: tuple[Target, ...] = ()
+    listens_to_matches: bool = True
 
 
 class GatedPublisher:

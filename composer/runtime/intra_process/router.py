@@ -61,6 +61,10 @@ class LocalRouter:
         """Return why the port uses DDS although the other endpoint is in-process, or None."""
         return self._dds_reasons.get(channel_of(port))
 
+    def delivers(self, port: Port) -> bool:
+        """Return whether the topic or service of the port is delivered in the process."""
+        return self._dds_reasons.get(channel_of(port), "") is None
+
     def add_publisher(
         self, port: Port, publisher: Publisher, context: PublisherContext
     ) -> tuple[GatedPublisher, Remove]:

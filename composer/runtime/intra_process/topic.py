@@ -89,7 +89,7 @@ class LocalPublisher(GatedPublisher):
         self.profile = port.qos.profile
         self._isolated = port.isolation is Isolation.COPY
         self._count_matched: Callable[[], int] = publisher.handle.get_subscription_count
-        self._match_listener = MatchListener(publisher)
+        self._match_listener = MatchListener(publisher, enabled=context.listens_to_matches)
         self._has_external = False
         self._checking = threading.Lock()  # the latest check counts, not the slowest
         self._subscriptions: tuple[LocalSubscription, ...] = ()

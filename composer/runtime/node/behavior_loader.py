@@ -55,6 +55,8 @@ def _module(reference: BehaviorReference) -> ModuleType:
     try:
         return importlib.import_module(reference.module)
     except ModuleNotFoundError as error:
+        if not f"{reference.module}.".startswith(f"{error.name}."):
+            raise  # the module exists, and imports one that does not
         raise BehaviorLoadError(
             f"behavior '{reference.text}': there is no '{parts[-1]}.py' in {reference.folder} "
             "or among the project's node types, and no such installed module"

@@ -77,7 +77,9 @@ class Entities(Protocol):
 
 
 class LocalNode(ABC):
-    """The :class:`.ManagedNode` of this process. Create it before its loop is started, or on the loop.
+    """A :class:`.ManagedNode` of this process.
+
+    Create it before its loop is started, or on the loop.
 
     A subclass calls :meth:`_join` at the end of its constructor. ``_entities`` are what the node
     has from configure to cleanup.
@@ -177,7 +179,7 @@ class LocalNode(ABC):
         """Return how many messages a publisher has sent."""
         return self.statistics.publisher(publisher).count
 
-    def limit_end(self, end_s: float) -> None:
+    def limit_end(self, end_s: float) -> None:  # noqa: B027  nothing to do is the default
         """Do nothing: transitions have a time limit, and the loop interrupts callbacks."""
 
     @property

@@ -133,7 +133,7 @@ def _declare(node: Node, parameter: Parameter) -> Any:
     name = parameter.name.value
     if parameter.value is None:
         raise ParameterError(f"parameter '{name}' is required and has no value")
-    value = _ros_value(parameter)
+    value = ros_value(parameter)
     reason = _out_of_bounds(parameter, value)
     if reason is not None:
         raise ParameterError(reason)
@@ -146,7 +146,7 @@ def _declare(node: Node, parameter: Parameter) -> Any:
     return _plain(value)
 
 
-def _ros_value(parameter: Parameter) -> Any:
+def ros_value(parameter: Parameter) -> Any:
     """Return the value as rclpy expects it for the declared type."""
     value: Any = parameter.value.value if parameter.value is not None else None
     match parameter.type.value:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from rcl_interfaces.msg import ParameterEvent
@@ -28,8 +29,11 @@ class _NodeWithoutParameterEvents(RosNode):
         return super().create_publisher(msg_type, topic, *args, **kwargs)
 
 
-def make_ros_node(model: Node) -> RosNode:
-    """Return a ROS node for ``model``. It does not publish /rosout: the node's log does."""
+def make_ros_node(model: Node, arguments: Sequence[str] = ()) -> RosNode:
+    """Return a ROS node for ``model``, with command-line ``arguments`` of rcl.
+
+    It does not publish /rosout: the node's log does.
+    """
     offers = model.introspection
     kind = RosNode if offers.parameters else _NodeWithoutParameterEvents
     overrides = []
@@ -38,6 +42,7 @@ def make_ros_node(model: Node) -> RosNode:
     return kind(
         model.ros_name.value,
         namespace=model.namespace.value,
+        cli_args=list(arguments),
         use_global_arguments=False,
         enable_rosout=False,
         start_parameter_services=False,  # see parameter_services.py

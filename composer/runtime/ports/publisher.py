@@ -36,7 +36,12 @@ class PublisherPort:
         self._name = port.name.value
         self._qos_events = self._make_qos_events(port)
         self._publisher = self._make_publisher(port)
-        origin = PublisherContext(context.gate, self._drop, tuple(self._observers(port)))
+        origin = PublisherContext(
+            context.gate,
+            self._drop,
+            tuple(self._observers(port)),
+            listens_to_matches=not self._qos_events.uses_matches,
+        )
         #: The publisher that the node's behavior and reactions use.
         self.gated, self._remove = context.router.add_publisher(port, self._publisher, origin)
         self._count = context.statistics.publisher(self._name)

@@ -71,6 +71,9 @@ class QosEvents:
     was deactivated. So an event also counts only if the node was active for the whole period.
     """
 
+    #: Whether it watches matches, so that in-process delivery cannot.
+    uses_matches = False
+
     def __init__(self, context: NodeContext, port: Port) -> None:
         self._context = context
         self._port = port

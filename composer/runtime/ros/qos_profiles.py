@@ -62,6 +62,19 @@ def discovered_profile(profile: QoSProfile) -> QosProfile:
     return converted
 
 
+def own_profile(profile: QoSProfile) -> QosProfile:
+    """Return the profile that an endpoint of this process was created with."""
+    found = discovered_profile(profile)
+    return replace(
+        found,
+        depth=profile.depth,
+        # Zero is rmw's unspecified duration.
+        deadline_ms=found.deadline_ms or None,
+        lifespan_ms=found.lifespan_ms or None,
+        liveliness_lease_duration_ms=found.liveliness_lease_duration_ms or None,
+    )
+
+
 def _duration(milliseconds: float | None) -> Duration:
     """Return a duration; zero, which is rmw's unspecified duration, for no limit."""
     return Duration(nanoseconds=round((milliseconds or 0.0) * _NANOSECONDS))

@@ -26,6 +26,7 @@ from composer.runtime.children.outside_node import OutsideContext
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.factory import log_exception, make_loop, place_threads
 from composer.runtime.executors.loop import Loop
+from composer.runtime.hosting.hosted_node import HostedNode
 from composer.runtime.intra_process.eligibility import shared_channels
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, chain_figures, figures
@@ -242,7 +243,8 @@ class NodeSet:
             system_is_up=before is not None,
         )
         loop = self._loop_of(executor)
-        return RunningNode(node, loop, options, self._make_listener(node), statistics)
+        kind = RunningNode if node.hosted_class is None else HostedNode
+        return kind(node, loop, options, self._make_listener(node), statistics)
 
     def _make_outside(self, node: Node, statistics: Statistics) -> ManagedNode:
         name = Located(_OUTSIDE, node.span)
@@ -272,9 +274,15 @@ class NodeSet:
         return node.supervision.timeout_ms / 1000.0 if override_s is None else override_s
 
     def _executor_of(self, node: Node) -> Executor:
-        """Return the executor that runs the node: by default ``default``, an event loop."""
+        """Return the executor that runs the node: by default ``default``, an event loop.
+
+        A hosted class has an event loop of its own by default: its callbacks may block.
+        """
         if node.executor is not None:
             return self._executors[node.executor.value]
+        if node.hosted_class is not None:
+            name = Located(node.full_name, node.span)
+            return Executor(name, ExecutorKind.EVENTS, node.span)
         return self._executors.get(DEFAULT_EXECUTOR) or Executor(
             Located(DEFAULT_EXECUTOR, node.span), ExecutorKind.EVENTS, node.span
         )

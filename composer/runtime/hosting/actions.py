@@ -1,0 +1,194 @@
+"""Action servers and clients that a class creates."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from rclpy.action.server import CancelResponse, GoalEvent, GoalResponse
+from rclpy.action.server import RCLError as ActionError
+
+from composer.behavior import CallCancelled
+from composer.model import PortKind
+from composer.runtime.executors.exceptions import is_closing
+from composer.runtime.executors.futures import Cancelled, Future
+from composer.runtime.executors.tasks import within
+from composer.runtime.hosting.instance import Instance
+from composer.runtime.hosting.services import hosted_future
+from composer.runtime.hosting.user_code import UserFunction
+from composer.runtime.ports.action_server import CANCEL_LIMIT_S
+
+
+class HostedActionServer:
+    """The port of an action server: it takes goals only while the node is active.
+
+    When the node leaves *active*, running goals are asked to cancel, and feedback is dropped. Goals
+    that have not ended at cleanup are aborted, so that their clients get a result.
+    """
+
+    def __init__(self, instance: Instance, server: Any, full_name: str) -> None:
+        self._instance = instance
+        self._server = server
+        self.port = instance.ports.port(PortKind.ACTION_SERVER, full_name, server.action_type)
+        self.name = self.port.name.value
+        self._context = instance.context
+        self._statistics = instance.context.statistics.callback(self.port.kind.value, self.name)
+        server.register_goal_callback(self._wrapped(server._goal_callback, self._accepts))
+        server.register_cancel_callback(
+            self._wrapped(server._cancel_callback, _returns(CancelResponse.REJECT))
+        )
+        server.register_execute_callback(self._wrapped(server._execute_callback, self._abort))
+        accepted = self._wrapped(server._handle_accepted_callback, self._abort_accepted)
+        server.register_handle_accepted_callback(lambda goal: accepted(self._gated(goal)))
+        instance.context.loop.add_action_server(server)
+
+    def activate(self) -> None:
+        """Do nothing: the gate lets goals in."""
+
+    def deactivate(self) -> None:
+        """Ask the running goals to cancel."""
+        for goal in tuple(self._server._goal_handles.values()):
+            if goal.is_active and not goal.is_cancel_requested:
+                try:
+                    goal._update_state(GoalEvent.CANCEL_GOAL)
+                except ActionError:
+                    continue  # it has just ended
+
+    async def drain(self) -> None:
+        """Wait until the goals have ended, up to a time limit."""
+        for goal in tuple(self._server._goal_handles.values()):
+            result = self._server._result_futures.get(bytes(goal.goal_id.uuid))
+            if result is None or not goal.is_active:
+                continue
+            ended: Future[None] = Future()
+            result.add_done_callback(lambda _, ended=ended: ended.set_result(None))
+            try:
+                await within(self._context.loop, ended, CANCEL_LIMIT_S)
+            except TimeoutError:
+                self._context.log.warn(
+                    f"action server '{self.name}': a goal did not end within {CANCEL_LIMIT_S:g} s"
+                )
+
+    def destroy(self) -> None:
+        """Abort the goals that have not ended, and destroy the server."""
+        self._instance.ports.forget(self.port)
+        for identity, goal in tuple(self._server._goal_handles.items()):
+            if goal.is_active:
+                goal.abort()
+                self._send_result(self._server._result_futures[identity], goal.status)
+        self._context.loop.remove(self._server)
+        self._server.destroy()
+
+    def _send_result(self, future: Any, status: int) -> None:
+        response = self._server.action_type.Impl.GetResultService.Response(status=status)
+        future._set_executor(None)  # at once: the server is about to be destroyed
+        future.set_result(response)
+
+    # --- callbacks
+
+    def _wrapped(self, callback: Callable[[Any], Any], fallback: Callable[[Any], Any]) -> Any:
+        """Return a callback whose exceptions are errors of the node, answered by ``fallback``."""
+        function = UserFunction(self._instance, callback)
+        is_goal = fallback == self._accepts
+
+        def call(argument: Any) -> Any:
+            if is_goal and not self._context.gate.incoming:
+                return self._accepts(argument)
+            try:
+                return function(argument)
+            except BaseException as error:
+                return self._fail(function, error, fallback, argument)
+
+        async def call_and_await(argument: Any) -> Any:
+            try:
+                result = call(argument)
+                return await result if isinstance(result, Awaitable) else result
+            except BaseException as error:
+                if is_closing(error):
+                    raise
+                return self._fail(function, error, fallback, argument)
+
+        return call_and_await if inspect.iscoroutinefunction(callback) else call
+
+    def _fail(
+        self,
+        function: UserFunction,
+        error: BaseException,
+        fallback: Callable[[Any], Any],
+        argument: Any,
+    ) -> Any:
+        if not isinstance(error, Cancelled):
+            self._context.error_log.exception(function.__name__, error)
+        return fallback(argument)
+
+    def _accepts(self, _: object) -> GoalResponse:
+        if not self._context.gate.incoming:
+            self._context.log.info(
+                f"action server '{self.name}' rejects a goal: {self._context.gate.refusal}"
+            )
+        return GoalResponse.REJECT
+
+    def _gated(self, goal: Any) -> Any:
+        """Make a goal publish feedback only while the node is active; return it."""
+        publish = goal.publish_feedback
+
+        def publish_feedback(feedback: Any) -> None:
+            if self._context.gate.outgoing:
+                publish(feedback)
+
+        goal.publish_feedback = publish_feedback
+        return goal
+
+    def _abort(self, goal: Any) -> Any:
+        if goal.is_active:
+            goal.abort()
+        return self._server.action_type.Result()
+
+    def _abort_accepted(self, goal: Any) -> None:
+        goal.execute(self._abort)
+
+
+class HostedActionClient:
+    """The port of an action client. Its goals go by DDS, while the node is active."""
+
+    def __init__(self, instance: Instance, client: Any, full_name: str) -> None:
+        self._instance = instance
+        self._client = client
+        self.port = instance.ports.port(PortKind.ACTION_CLIENT, full_name, client._action_type)
+        self._send = self._client.send_goal_async
+        self._client.send_goal_async = self._send_goal
+        instance.context.loop.add_action_client(client)
+
+    def activate(self) -> None:
+        """Do nothing: the gate lets goals out."""
+
+    def deactivate(self) -> None:
+        """Do nothing: feedback and responses are dropped."""
+
+    def destroy(self) -> None:
+        """Destroy the client."""
+        self._instance.ports.forget(self.port)
+        self._instance.context.loop.remove(self._client)
+        self._client.destroy()
+
+    def _send_goal(
+        self, goal: Any, feedback_callback: Callable[[Any], Any] | None = None, **options: Any
+    ) -> Any:
+        """Send a goal as rclpy's method; it fails with CallCancelled if the node is not active."""
+        context = self._instance.context
+        if not context.gate.waiting:
+            return hosted_future(self._instance, CallCancelled(context.gate.refusal))
+        function = None
+        if feedback_callback is not None:
+            function = UserFunction(self._instance, feedback_callback)
+
+        def on_feedback(message: Any) -> None:
+            if function is not None and context.gate.incoming:
+                context.call(function.__name__, function, message)
+
+        return self._send(goal, on_feedback if function else None, **options)
+
+
+def _returns(value: Any) -> Callable[[object], Any]:
+    return lambda _: value

@@ -1,0 +1,106 @@
+"""The ports that a class creates, matched with those that its node declares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import count
+from typing import Any
+
+from composer.model import Isolation, Node, Port, PortKind, Qos
+from composer.qos import PRESETS, QosProfile
+from composer.runtime.hosting.errors import HostingError
+from composer.runtime.ros.qos_profiles import own_profile
+from composer.source import Located
+
+#: Created by rclpy for every node, or by the composer.
+_OF_EVERY_NODE = frozenset({"/rosout", "/parameter_events", "/clock"})
+
+
+def interface_name(interface: Any) -> str:
+    """Return the name of a message, service or action class: ``std_msgs/msg/String``."""
+    package, _, rest = interface.__module__.partition(".")
+    return f"{package}/{rest.partition('.')[0]}/{interface.__name__}"
+
+
+@dataclass(slots=True)
+class DeclaredPorts:
+    """The declared ports of a node, and which of them its class has created.
+
+    ``undeclared`` are the ports that the class has created without a declaration, and
+    ``differences`` those whose QoS is not the declared one.
+    """
+
+    node: Node
+    created: set[str] = field(default_factory=set)  # names in use
+    undeclared: list[Port] = field(default_factory=list)
+    differences: list[str] = field(default_factory=list)
+
+    def port(self, kind: PortKind, full_name: str, interface: Any, qos: Any = None) -> Port:
+        """Return the port of an endpoint that the class creates, with its actual QoS.
+
+        Raises HostingError if another type is declared for it.
+        """
+        profile = PRESETS["services_default"] if qos is None else own_profile(qos)
+        created = interface_name(interface)
+        for port in self.node.ports_of(kind):
+            if port.full_name == full_name and port.name.value not in self.created:
+                return self._declared(port, created, profile)
+        port = self._undeclared(kind, full_name, created, profile)
+        self.created.add(port.name.value)
+        if full_name not in _OF_EVERY_NODE:
+            self.undeclared.append(port)
+        return port
+
+    def missing(self) -> Iterator[Port]:
+        """Yield the declared ports that the class has not created."""
+        yield from (port for port in self.node.ports if port.name.value not in self.created)
+
+    def forget(self, port: Port) -> None:
+        """Know that the class has destroyed an endpoint, and may create it again."""
+        self.created.discard(port.name.value)
+
+    def _declared(self, port: Port, created: str, profile: QosProfile) -> Port:
+        declared = port.interface.value
+        if declared != created:
+            raise HostingError(
+                f"{port.kind} '{port.name}' on {port.full_name} is declared as {declared},"
+                f" but the class creates {created}; declare 'type: {created}'"
+            )
+        self.created.add(port.name.value)
+        if port.kind in (PortKind.PUBLISHER, PortKind.SUBSCRIPTION):
+            difference = _difference(port.qos.profile, profile)
+            if difference:
+                self.differences.append(f"{port.kind} '{port.name}': {difference}")
+        return replace(port, qos=replace(port.qos, profile=profile))
+
+    def _undeclared(
+        self, kind: PortKind, full_name: str, interface: str, profile: QosProfile
+    ) -> Port:
+        span = self.node.span
+        return Port(
+            kind=kind,
+            name=Located(self._free_name(full_name.strip("/")), span),
+            interface=Located(interface, span),
+            ros_name=Located(full_name, span),
+            full_name=full_name,
+            qos=Qos(profile, span, explicit=False),
+            span=span,
+            isolation=Isolation.COPY,
+        )
+
+    def _free_name(self, name: str) -> str:
+        """Return ``name``, with a number if another port has it: counters are kept by name."""
+        numbered = (f"{name}_{number}" for number in count(2))
+        used = self.created | {port.name.value for port in self.node.ports}
+        return name if name not in used else next(item for item in numbered if item not in used)
+
+
+def _difference(declared: QosProfile, actual: QosProfile) -> str:
+    """Return how the QoS that matters for matching differs; empty if it does not."""
+    names = ("reliability", "durability", "deadline_ms", "liveliness")
+    different = [name for name in names if getattr(declared, name) != getattr(actual, name)]
+    return ", ".join(
+        f"{name} is {getattr(actual, name)}, declared as {getattr(declared, name)}"
+        for name in different
+    )

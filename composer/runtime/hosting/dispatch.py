@@ -1,0 +1,192 @@
+"""What rclpy's functions do for hosted nodes: decided by the type of the node they are given.
+
+Installed once per process, before the first class is imported. Other nodes are not affected.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from functools import cache
+from typing import Any
+
+import rclpy
+from rclpy import utilities
+from rclpy.action.client import ActionClient
+from rclpy.action.server import ActionServer
+from rclpy.executors import Executor
+from rclpy.lifecycle.node import LifecycleNodeMixin
+from rclpy.node import Node
+from rclpy.task import Future
+
+from composer.model import PortKind
+from composer.runtime.hosting.adopted_node import (
+    AdoptedLifecycleNode,
+    AdoptedNode,
+    action_name,
+)
+from composer.runtime.hosting.errors import HostingError
+from composer.runtime.hosting.instance import Instance
+from composer.runtime.hosting.user_code import current_instance
+
+_SECOND_NODE = (
+    "the class creates a second node, {name}; declare it as a node of the system,"
+    " or run the class as an 'executable'"
+)
+_SPINS = (
+    "the class spins its node in {where}, which would never return: the composer calls its"
+    " callbacks; remove the spin, or run the class as an 'executable'"
+)
+
+
+@cache
+def install() -> None:
+    """Let rclpy's functions dispatch by the type of their node."""
+    _install_nodes()
+    _install_actions()
+    _install_spinning()
+    _install_executors()
+    _install_threads()
+    _install_context()
+
+
+def _install_nodes() -> None:
+    create_node, create_mixin = Node.__init__, LifecycleNodeMixin.__init__
+
+    def init_node(self: Any, *arguments: Any, **options: Any) -> None:
+        if isinstance(self, AdoptedNode):  # Node.__init__(self, 'name') instead of super()
+            AdoptedNode.__init__(self, *arguments, **options)
+            return
+        if current_instance() is not None:
+            name = arguments[0] if arguments else options.get("node_name")
+            raise HostingError(_SECOND_NODE.format(name=f"'{name}'"))
+        create_node(self, *arguments, **options)
+
+    def init_mixin(self: Any, **options: Any) -> None:
+        if isinstance(self, AdoptedLifecycleNode):
+            self.take_over_lifecycle()
+        else:
+            create_mixin(self, **options)
+
+    Node.__init__ = init_node  # type: ignore[method-assign]
+    LifecycleNodeMixin.__init__ = init_mixin  # type: ignore[method-assign]
+
+
+def _install_actions() -> None:
+    for kind, role in (
+        (ActionServer, PortKind.ACTION_SERVER),
+        (ActionClient, PortKind.ACTION_CLIENT),
+    ):
+        _install_action(kind, role)
+
+
+def _install_action(kind: Any, role: PortKind) -> None:
+    create = kind.__init__
+
+    def init(self: Any, node: Any, action_type: Any, name: str, *args: Any, **options: Any) -> None:
+        if not isinstance(node, AdoptedNode):
+            create(self, node, action_type, name, *args, **options)
+            return
+        full_name = action_name(node, role, name)
+        create(self, node, action_type, full_name, *args, **options)
+        node.adopt_action(self, full_name)
+
+    kind.__init__ = init
+
+
+def _install_spinning() -> None:
+    spin, spin_once = rclpy.spin, rclpy.spin_once
+    spin_until_complete = rclpy.spin_until_future_complete
+
+    def spin_node(node: Any, executor: Any = None) -> None:
+        if isinstance(node, AdoptedNode):
+            _wait_until_ended(node._composer_instance)
+        else:
+            spin(node, executor)
+
+    def spin_node_once(node: Any, *, executor: Any = None, timeout_sec: Any = None) -> None:
+        if isinstance(node, AdoptedNode):
+            node._composer_instance.wait_for(Future(), 0.01 if timeout_sec is None else timeout_sec)
+        else:
+            spin_once(node, executor=executor, timeout_sec=timeout_sec)
+
+    def spin_node_until_complete(
+        node: Any, future: Any, executor: Any = None, timeout_sec: Any = None
+    ) -> None:
+        if isinstance(node, AdoptedNode):
+            node._composer_instance.wait_for(future, timeout_sec)
+        else:
+            spin_until_complete(node, future, executor, timeout_sec)
+
+    rclpy.spin = spin_node
+    rclpy.spin_once = spin_node_once
+    rclpy.spin_until_future_complete = spin_node_until_complete
+
+
+def _install_executors() -> None:
+    add_node, spin_until_complete = Executor.add_node, Executor.spin_until_future_complete
+
+    def add_node_to_executor(self: Any, node: Any) -> bool:
+        if not isinstance(node, AdoptedNode):
+            return add_node(self, node)
+        node._composer_instance.executors.append(self)
+        return True  # and do not serve it: the composer does
+
+    def executor_spins_until(self: Any, future: Any, timeout_sec: Any = None) -> None:
+        instance = current_instance()
+        if instance is not None and self in instance.executors:
+            instance.wait_for(future, timeout_sec)
+        else:
+            spin_until_complete(self, future, timeout_sec)
+
+    Executor.add_node = add_node_to_executor  # type: ignore[method-assign]
+    Executor.spin_until_future_complete = executor_spins_until  # type: ignore[method-assign]
+
+
+def _install_threads() -> None:
+    start = threading.Thread.start
+
+    def start_thread(self: threading.Thread) -> None:
+        instance = current_instance()
+        if instance is not None:
+            instance.threads.append(self)
+        start(self)
+
+    threading.Thread.start = start_thread  # type: ignore[method-assign]
+
+
+def _wait_until_ended(instance: Instance) -> None:
+    """Let a thread of the class wait while the composer calls the callbacks."""
+    if (
+        instance.context.loop.is_current()
+        or threading.current_thread() is instance.transition_thread
+    ):
+        where = "its constructor or a transition" if instance.in_transition else "a callback"
+        raise HostingError(_SPINS.format(where=where))
+    instance.ended.wait()
+
+
+def _install_context() -> None:
+    init, shutdown, try_shutdown = rclpy.init, rclpy.shutdown, utilities.try_shutdown
+
+    def init_context(**options: Any) -> Any:
+        # It is initialized already.
+        return init(**options) if current_instance() is None else contextlib.nullcontext()
+
+    def shut_down(**options: Any) -> None:
+        instance = current_instance()
+        if instance is None:
+            shutdown(**options)
+        else:
+            instance.finish("it called rclpy.shutdown()")
+
+    def try_to_shut_down(**options: Any) -> None:
+        instance = current_instance()
+        if instance is None:
+            try_shutdown(**options)
+        else:
+            instance.finish("it called rclpy.try_shutdown()")
+
+    rclpy.init = init_context
+    rclpy.shutdown = shut_down
+    rclpy.try_shutdown = try_to_shut_down  # type: ignore[attr-defined]

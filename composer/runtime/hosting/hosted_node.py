@@ -1,0 +1,269 @@
+"""A node whose implementation is an unmodified rclpy class."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, cast
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.node import Node as RosNode
+from rclpy.parameter import Parameter as RosParameter
+
+from composer.behavior import TransitionFailed
+from composer.model import USE_SIM_TIME, BehaviorReference, HostedClass, LogLevel, Node
+from composer.runtime.executors.futures import Cancelled
+from composer.runtime.executors.loop import Loop
+from composer.runtime.hosting.adopted_node import adopted, is_managed, shared_class
+from composer.runtime.hosting.declared_ports import DeclaredPorts
+from composer.runtime.hosting.dispatch import install
+from composer.runtime.hosting.errors import HostingError
+from composer.runtime.hosting.instance import HostedEntities, Instance, InstanceSettings
+from composer.runtime.hosting.logger import HostedLogger
+from composer.runtime.hosting.names import action_names, remapping_arguments
+from composer.runtime.hosting.user_code import ThreadedCall
+from composer.runtime.metrics.statistics import Statistics
+from composer.runtime.node.behavior_loader import BehaviorLoadError, behavior_class
+from composer.runtime.node.local_node import LocalNode
+from composer.runtime.node.managed_node import NodeListener
+from composer.runtime.node.node import WrongReturn
+from composer.runtime.node.options import NodeOptions
+from composer.runtime.node.outcome import TransitionOutcome
+from composer.runtime.node.parameters import ros_value
+from composer.runtime.node.ros_node import make_ros_node
+
+_THREAD_ENDS_WITHIN_S = 0.2
+
+
+class HostedNode(LocalNode):
+    """Constructs the class when it is configured, and destroys the instance when it is cleaned up.
+
+    The ROS node, with its parameter and lifecycle services, exists in all states.
+    """
+
+    _entities: HostedEntities
+
+    def __init__(
+        self,
+        model: Node,
+        loop: Loop,
+        options: NodeOptions,
+        listener: NodeListener,
+        statistics: Statistics | None = None,
+    ) -> None:
+        """Join the ROS graph, unconfigured; continue ``statistics``. Raises ParameterError."""
+        install()
+        self._hosted = cast(HostedClass, model.hosted_class)
+        super().__init__(model, loop, options, listener, statistics)
+        self._entities = HostedEntities()
+        self._log_level: LogLevel = options.log_level
+        self._instance: Instance | None = None
+        self._restore: list[Callable[[], None]] = []
+        self._overrides = {
+            parameter.name.value: RosParameter(parameter.name.value, value=ros_value(parameter))
+            for parameter in model.parameters
+            if parameter.value is not None
+        }
+        simulated = self._overrides.pop(USE_SIM_TIME, None)
+        if simulated is not None:
+            self._ros.set_parameters([simulated])
+        self._join(options)
+
+    @property
+    def callback_owners(self) -> tuple[object, ...]:
+        """The objects by which a running callback on a stack is recognized as the node's."""
+        instance = self._instance
+        return (*super().callback_owners, *(() if instance is None else instance.contexts))
+
+    @property
+    def instance(self) -> Any:
+        """The instance of the class, or None."""
+        return None if self._instance is None else self._instance.node
+
+    # --- transitions
+
+    def _make_ros_node(self) -> RosNode:
+        node = make_ros_node(self.model, remapping_arguments(self.model))
+        node.__class__ = shared_class(cast(Any, type(node)))
+        return node
+
+    def _is_serial(self, _options: NodeOptions) -> bool:
+        return True  # a callback may wait while the loop goes on
+
+    async def _configure(self) -> None:
+        self._context.group = self._always_on_context.group = MutuallyExclusiveCallbackGroup()
+        instance = self._new_instance()
+        self._instance, self._entities = instance, instance.entities
+        vars(self._ros)["_composer_instance"] = instance
+        self._remember_shared_state()
+        target = node_class(self._hosted.reference)
+        await self._in_thread(instance, partial(self._construct, target, instance), "constructor")
+        self._report_ports(instance.ports)
+
+    async def _call_user(self, transition: str) -> None:
+        instance = self._instance
+        if instance is None:
+            return
+        if is_managed(type(instance.node)):
+            handle = partial(self._handle, instance, transition)
+            await self._in_thread(instance, handle, f"on_{transition}")
+        if transition in ("cleanup", "shutdown"):
+            await self._in_thread(instance, instance.node.destroy_node, "destroy_node")
+
+    async def _call_user_on_error(self, _cause: BaseException) -> None:
+        instance = self._instance
+        if instance is not None and is_managed(type(instance.node)):
+            await self._in_thread(instance, partial(self._handle, instance, "error"), "on_error")
+
+    def _handle(self, instance: Instance, transition: str) -> None:
+        """Call a handler of a lifecycle node class."""
+        name = f"on_{transition}"
+        state = LifecycleState(self._start_state, _STATE_IDS.get(self._start_state, 0))
+        answer = getattr(instance.node, name)(state)
+        if answer == TransitionCallbackReturn.FAILURE:
+            raise TransitionFailed(f"{name} returned FAILURE")
+        if answer != TransitionCallbackReturn.SUCCESS:
+            raise WrongReturn(f"{name} returned {answer!r}, not a TransitionCallbackReturn")
+
+    def _construct(self, target: Any, instance: Instance) -> None:
+        arguments = {name.value: value for name, value in self._hosted.arguments}
+        kind = adopted(target)
+        node: Any = kind.__new__(kind, **arguments)
+        node._composer_instance = instance
+        try:
+            node.__init__(**arguments)
+        except SystemExit as error:
+            raise HostingError(f"the constructor ends the process: SystemExit({error})") from error
+        if instance.node is None:
+            raise HostingError("the constructor does not call super().__init__()")
+
+    def _discard(self, _outcome: TransitionOutcome | None) -> None:
+        instance, self._instance = self._instance, None
+        self._entities = HostedEntities()
+        if instance is None:
+            return
+        vars(self._ros)["_composer_instance"] = None
+        instance.ended.set()  # threads that spin the node return
+        for executor in instance.executors:
+            executor.shutdown(0.0)
+        for service in instance.lasting_services:
+            self.loop.remove(service)
+            self._ros.destroy_service(service)
+        while self._restore:
+            self._restore.pop()()
+        self._check_threads(instance.threads)
+
+    # --- parts
+
+    def _new_instance(self) -> Instance:
+        logger_name = self._ros.get_logger().name
+        return Instance(
+            self.contexts,
+            DeclaredPorts(self.model),
+            InstanceSettings(
+                overrides=self._overrides,
+                logger=HostedLogger(self._context.log, logger_name, self._log_level),
+                action_names=action_names(self.model),
+                finish=self._finish,
+                request=self._request,
+                current_state=lambda: (_STATE_IDS.get(self.state, 0), self.state),
+            ),
+        )
+
+    async def _in_thread(self, instance: Instance, function: Callable[[], Any], name: str) -> None:
+        """Call code of the class on a thread of its own, which may block within the time limit."""
+        call = ThreadedCall(instance, function, f"{self.full_name} {name}")
+        instance.in_transition, instance.transition_thread = True, call.thread
+        try:
+            await call.result()
+        except Cancelled:
+            at = call.location
+            self._context.log.error(f"{name} has not returned" + (f"; it is at {at}" if at else ""))
+            raise
+        finally:
+            instance.in_transition, instance.transition_thread = False, None
+
+    def _finish(self, reason: str) -> None:
+        """Deactivate the node: in a process of its own, the class would have ended it."""
+        self._context.log.warn(f"the node is deactivated: {reason}")
+        self._request("deactivate")
+
+    def _request(self, transition: str) -> None:
+        self.loop.run_task(self.lifecycle.change(transition))
+
+    def _time_switched(self) -> None:
+        self._context.strand.post(self._follow_clock)
+
+    def _follow_clock(self) -> None:
+        for port in self._entities.ports:
+            follow = getattr(port, "follow_clock", None)
+            if follow is not None:
+                follow()
+
+    def _remember_shared_state(self) -> None:
+        """Restore what an instance changes of the ROS node when the instance ends."""
+        node: Any = self._ros
+        for shared in (
+            node._parameters,
+            node._descriptors,
+            node._pre_set_parameters_callbacks,
+            node._on_set_parameters_callbacks,
+            node._post_set_parameters_callbacks,
+        ):
+            self._restore.append(partial(_restore, shared, shared.copy()))
+
+    def _report_ports(self, ports: DeclaredPorts) -> None:
+        log = self._context.log
+        for port in ports.undeclared:
+            if self._context.router.delivers(port):
+                continue
+            log.info(
+                f"{port.kind} on {port.full_name} is not declared: it uses DDS ({port.interface})"
+            )
+        for port in ports.missing():
+            log.warn(f"the class has not created {port.kind} '{port.name}' on {port.full_name}")
+        for difference in ports.differences:
+            log.warn(f"QoS of the class counts: {difference}")
+        declared: Any = self._ros._parameters
+        unknown = sorted(self._overrides.keys() - declared.keys())
+        for name in unknown:
+            log.warn(f"the class has not declared parameter '{name}'")
+
+    def _check_threads(self, threads: Sequence[threading.Thread]) -> None:
+        """Report threads of the class that still run after its end."""
+        for thread in threads:
+            thread.join(_THREAD_ENDS_WITHIN_S / len(threads))
+            if thread.is_alive():
+                self._context.error_log.error(
+                    "cleanup", f"thread '{thread.name}' of the class still runs"
+                )
+
+
+_STATE_IDS = {"unconfigured": 1, "inactive": 2, "active": 3, "finalized": 4}
+
+
+def _restore(shared: Any, before: Any) -> None:
+    shared.clear()
+    if isinstance(shared, dict):
+        shared.update(before)
+    else:
+        shared.extend(before)
+
+
+def node_class(reference: BehaviorReference) -> type[RosNode]:
+    """Import and return the class.
+
+    Raises HostingError if there is none, and anything that importing its module raises.
+    """
+    try:
+        found = behavior_class(reference)
+    except BehaviorLoadError as error:
+        raise HostingError(str(error).replace("behavior", "class", 1)) from error
+    if not issubclass(found, RosNode):
+        raise HostingError(
+            f"class '{reference.text}' is not derived from rclpy's Node; a class without ROS is"
+            " a 'behavior'"
+        )
+    return found

@@ -1,0 +1,181 @@
+"""One instance of a hosted class, from the configuration of its node to the cleanup."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup, ReentrantCallbackGroup
+from rclpy.executors import Executor
+from rclpy.parameter import Parameter
+from rclpy.service import Service
+
+from composer.model import Port, PortKind
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.executors.loop import Awaited
+from composer.runtime.executors.strand import InlineStrand, SerialStrand
+from composer.runtime.executors.tasks import name_of
+from composer.runtime.hosting.declared_ports import DeclaredPorts
+from composer.runtime.hosting.logger import HostedLogger
+from composer.runtime.node.local_node import ActionServing, RunningPort
+
+
+class HostedEntities:
+    """The ports and timers of an instance. Any thread of the class may add one."""
+
+    def __init__(self) -> None:
+        self._by_entity: dict[object, tuple[RunningPort, bool]] = {}
+        self._action_servers: dict[str, ActionServing] = {}
+
+    def add(self, entity: object, port: RunningPort, *, always_on: bool = False) -> None:
+        """Add the port of an entity of rclpy."""
+        self._by_entity[entity] = port, always_on
+
+    def add_action_server(self, server: object, name: str, port: ActionServing) -> None:
+        """Add the port of an action server."""
+        self._action_servers[name] = port
+        self.add(server, port)
+
+    def pop(self, entity: object) -> RunningPort | None:
+        """Remove and return the port of an entity, or None if it has none."""
+        port, _ = self._by_entity.pop(entity, (None, False))
+        for name in [name for name, kept in self._action_servers.items() if kept is port]:
+            del self._action_servers[name]
+        return port
+
+    @property
+    def ports(self) -> Iterator[RunningPort]:
+        """All of them, in the order in which they were created."""
+        return (port for port, _ in tuple(self._by_entity.values()))
+
+    @property
+    def gated(self) -> Iterator[RunningPort]:
+        """Those that work only while the node is active."""
+        return (port for port, always_on in tuple(self._by_entity.values()) if not always_on)
+
+    @property
+    def always_on(self) -> tuple[RunningPort, ...]:
+        """The others, which work from configure to cleanup."""
+        return tuple(port for port, always_on in tuple(self._by_entity.values()) if always_on)
+
+    @property
+    def action_servers(self) -> Mapping[str, ActionServing]:
+        """The action servers, by name."""
+        return dict(self._action_servers)
+
+
+@dataclass(frozen=True, slots=True)
+class InstanceSettings:
+    """What an instance gets from its node.
+
+    ``overrides`` are the initial values of parameters, by name. ``action_names`` are the full names
+    of actions by kind and expanded name. ``finish(reason)`` deactivates the node: the class says
+    that it has finished. ``request(transition)`` requests a transition. ``current_state()`` returns
+    the id and the label of the state.
+    """
+
+    overrides: Mapping[str, Parameter]
+    logger: HostedLogger
+    action_names: Mapping[tuple[PortKind, str], str]
+    finish: Callable[[str], None]
+    request: Callable[[str], None]
+    current_state: Callable[[], tuple[int, str]]
+
+
+class Instance:
+    """What the entities of one instance share."""
+
+    def __init__(
+        self,
+        contexts: tuple[NodeContext, NodeContext],
+        ports: DeclaredPorts,
+        settings: InstanceSettings,
+    ) -> None:
+        """``contexts`` are the node's, gated by *active* and always on."""
+        self.context, self._always_on_context = contexts
+        self.ports = ports
+        self.overrides = settings.overrides
+        self.logger = settings.logger
+        self.action_names = settings.action_names
+        self.finish = settings.finish
+        self.request = settings.request
+        self.current_state = settings.current_state
+        self.entities = HostedEntities()
+        #: The instance, once ``Node.__init__`` was called.
+        self.node: Any = None
+        #: True while the constructor or a handler of a transition runs.
+        self.in_transition = False
+        #: Set when the instance has been destroyed.
+        self.ended = threading.Event()
+        #: The executors of the class's own that the node was added to.
+        self.executors: list[Executor] = []
+        #: The threads that the class has started.
+        self.threads: list[threading.Thread] = []
+        #: Services of the ROS node that exist as long as the instance.
+        self.lasting_services: list[Service] = []
+        #: The thread of the constructor or of the current handler of a transition.
+        self.transition_thread: threading.Thread | None = None
+        self._contexts: dict[CallbackGroup, NodeContext] = {}
+        self._timer_names: dict[str, int] = {}
+
+    @property
+    def contexts(self) -> tuple[NodeContext, ...]:
+        """The contexts of all callback groups."""
+        return tuple(self._contexts.values())
+
+    def context_of(self, port: Port, group: CallbackGroup | None = None) -> NodeContext:
+        """Return the context of a port whose callbacks are in ``group``."""
+        context = self.context_for(group)
+        return replace(context, gate=self._always_on_context.gate) if port.always_on else context
+
+    def context_for(self, group: CallbackGroup | None) -> NodeContext:
+        """Return the context of a callback group: callbacks of one group exclude each other."""
+        if group is None or group is self.node.default_callback_group:
+            return self.context
+        if group not in self._contexts:
+            strand = InlineStrand() if self.is_reentrant(group) else self._new_strand()
+            self._contexts[group] = replace(self.context, strand=strand, group=group)
+        return self._contexts[group]
+
+    def _new_strand(self) -> SerialStrand:
+        return SerialStrand(self.context.loop.call_soon)
+
+    @staticmethod
+    def is_reentrant(group: CallbackGroup | None) -> bool:
+        """Return whether callbacks of the group may overlap."""
+        return isinstance(group, ReentrantCallbackGroup)
+
+    def in_group(self, port: Port, group: CallbackGroup | None) -> Port:
+        """Return the port as its callback group makes it."""
+        return replace(port, reentrant=True) if self.is_reentrant(group) else port
+
+    def timer_name(self, callback: object) -> str:
+        """Return a name for a timer that has no other one: that of its callback."""
+        name = "rate" if callback is None else name_of(callback).rpartition(".")[2]
+        number = self._timer_names[name] = self._timer_names.get(name, 0) + 1
+        return name if number == 1 else f"{name}_{number}"
+
+    def begin(self, entity: object, port: RunningPort, *, always_on: bool = False) -> None:
+        """Add the port of an entity, and activate it if the node is active."""
+        self.entities.add(entity, port, always_on=always_on)
+        gate = self._always_on_context.gate if always_on else self.context.gate
+        if gate.incoming:
+            port.activate()
+
+    def remove(self, entity: object) -> bool:
+        """Destroy an entity with its port; return false if it has none."""
+        port = self.entities.pop(entity)
+        if port is None:
+            return False
+        port.destroy()
+        return True
+
+    def wait_for(self, future: Awaited, timeout_s: float | None) -> bool:
+        """Block until ``future`` is done, in code of the class; return false after the time.
+
+        In a callback, the loop goes on with everything but callbacks of the same group.
+        """
+        limit_s = None if timeout_s is None or timeout_s < 0 else timeout_s
+        return self.context.loop.wait_for(future, limit_s)

@@ -1,0 +1,178 @@
+"""The lives of hosted classes: constructed, driven, refused, destroyed, and nothing left."""
+
+from __future__ import annotations
+
+import gc
+from pathlib import Path
+
+import pytest
+from std_msgs.msg import Int64
+
+from composer.model import PrimaryState
+from tests.ros.support import node_classes
+from tests.ros.support.in_process import Peer, running, wait_until
+from tests.ros.support.node_classes import history
+
+CLASSES = "tests.ros.support.node_classes"
+
+
+def test_an_instance_lives_from_configure_to_cleanup(tmp_path: Path, peer: Peer) -> None:
+    history.clear()
+    text = f'system: lives\nnodes: {{talker: {{class: "{CLASSES}:Talker"}}}}'
+    with running(text, tmp_path, autostart=PrimaryState.UNCONFIGURED) as system:
+        assert history == []
+        wait_until(lambda: peer.node.count_services("/talker/change_state") == 1)
+        assert peer.change("/talker", "configure")
+        assert history == ["constructed"]
+        first = system.node("talker").instance
+        assert peer.change("/talker", "activate")
+        numbers = peer.listen(Int64, "/numbers")
+        wait_until(lambda: numbers)
+        assert peer.change("/talker", "deactivate")
+        assert peer.change("/talker", "cleanup")
+        assert history == ["constructed", "destroyed"]
+        wait_until(lambda: peer.node.count_publishers("/numbers") == 0)
+        assert peer.set_parameter("/talker", "word", "x")  # not declared any more
+        system.change("talker", "configure", "activate")
+        assert system.node("talker").instance is not first
+    assert history == ["constructed", "destroyed"] * 2
+
+
+def test_the_handlers_of_a_lifecycle_node_class_are_called(tmp_path: Path, peer: Peer) -> None:
+    history.clear()
+    text = f'system: counting\nnodes: {{counter: {{class: "{CLASSES}:Counter"}}}}'
+    with running(text, tmp_path) as system:
+        numbers = peer.listen(Int64, "/numbers")
+        wait_until(lambda: len(numbers) >= 3)
+        counter = system.node("counter").instance
+        assert counter._state_machine.current_state[1] == "active"
+        counter.trigger_deactivate()
+        wait_until(lambda: system.node("counter").state == "inactive")
+        assert counter.calls == ["configure from unconfigured", "activate", "deactivate"]
+        count = counter.count
+        assert peer.state("/counter") == "inactive"
+        assert counter.count == count
+        system.change("counter", "cleanup")
+        assert history == ["cleaned up"]
+
+
+def test_a_handler_can_refuse_a_transition(tmp_path: Path, peer: Peer) -> None:
+    text = f"""
+    system: refusing
+    nodes:
+      counter:
+        class: {CLASSES}:Counter
+        parameters: {{refuse: {{type: string, default: configure}}}}
+    """
+    with running(text, tmp_path, autostart=PrimaryState.UNCONFIGURED) as system:
+        wait_until(lambda: peer.node.count_services("/counter/change_state") == 1)
+        assert not peer.change("/counter", "configure")
+        assert system.node("counter").state == "unconfigured"
+        system.wait_for_log("on_configure refused the transition: on_configure returned FAILURE")
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("SpinsInConstructor", "spins its node in its constructor or a transition"),
+        ("MakesSecondNode", "creates a second node, 'helper'"),
+        ("HasOwnArguments", "command-line arguments of its own; use 'remappings'"),
+        ("Exits", "the constructor ends the process: SystemExit(3)"),
+        ("NotANode", "is not derived from rclpy's Node"),
+        ("Missing", "has no class 'Missing'"),
+        ("WantsArguments", "missing 1 required positional argument: 'port'"),
+        ("NeverReturns", "timed out after 0.3 s"),
+    ],
+)
+def test_what_cannot_be_hosted_is_refused_with_the_reason(
+    tmp_path: Path, name: str, reason: str
+) -> None:
+    text = f"""
+    system: refused
+    nodes:
+      refused:
+        class: {CLASSES}:{name}
+        lifecycle: {{timeout_ms: 300}}
+    """
+    with running(text, tmp_path) as system:
+        outcome = system.end()
+    assert outcome.exit_code == 1
+    assert reason in system.log_text()
+    if name == "NeverReturns":
+        assert "constructor has not returned; it is at" in system.log_text()
+    elif name != "WantsArguments":
+        assert "Traceback" not in system.log_text()
+
+
+def test_a_declared_type_that_the_class_does_not_have_is_refused(tmp_path: Path) -> None:
+    text = f"""
+    system: wrong
+    nodes:
+      talker:
+        class: {CLASSES}:Talker
+        publishers: {{numbers: {{type: std_msgs/msg/String}}}}
+    """
+    with running(text, tmp_path) as system:
+        system.end()
+    assert (
+        "publisher 'numbers' on /numbers is declared as std_msgs/msg/String, but the class creates"
+        " std_msgs/msg/Int64; declare 'type: std_msgs/msg/Int64'"
+    ) in system.log_text()
+
+
+def test_what_is_declared_and_missing_in_the_class_is_reported(tmp_path: Path) -> None:
+    text = f"""
+    system: missing
+    nodes:
+      talker:
+        class: {CLASSES}:Talker
+        publishers:
+          other: {{type: std_msgs/msg/Int64, external: true}}
+          numbers: {{type: std_msgs/msg/Int64, external: true, qos: sensor_data}}
+        parameters: {{speed: {{type: double, default: 1}}}}
+    """
+    with running(text, tmp_path) as system:
+        log = system.log()
+    assert "the class has not created publisher 'other' on /other" in log
+    assert "the class has not declared parameter 'speed'" in log
+    qos = "publisher 'numbers': reliability is reliable, declared as best_effort"
+    assert f"QoS of the class counts: {qos}" in log
+
+
+def test_a_thread_that_outlives_its_instance_is_an_error(tmp_path: Path) -> None:
+    text = f'system: stubborn\nnodes: {{stubborn: {{class: "{CLASSES}:Stubborn"}}}}'
+    try:
+        with running(text, tmp_path) as system:
+            system.change("stubborn", "deactivate", "cleanup")
+            system.wait_for_log("cleanup: thread 'stubborn' of the class still runs")
+            assert system.node("stubborn").statistics.errors == 1
+    finally:
+        node_classes.Stubborn.release.set()
+
+
+def test_many_lives_leave_nothing_behind(tmp_path: Path) -> None:
+    text = f"""
+    system: lives
+    nodes:
+      talker: {{class: "{CLASSES}:Talker"}}
+      listener: {{class: "{CLASSES}:Listener"}}
+      counter: {{class: "{CLASSES}:Counter"}}
+    """
+    kinds = (node_classes.Talker, node_classes.Listener, node_classes.Counter)
+
+    def live(system: object) -> None:
+        for name in ("talker", "listener", "counter"):
+            system.change(name, "deactivate", "cleanup", "configure", "activate")  # type: ignore[attr-defined]
+
+    def counts() -> tuple[int, int]:
+        gc.collect()
+        instances = sum(isinstance(item, kinds) for item in gc.get_objects())
+        return instances, len(list(Path("/proc/self/fd").iterdir()))
+
+    with running(text, tmp_path) as system:
+        live(system)
+        before = counts()
+        for _ in range(40):
+            live(system)
+        wait_until(lambda: counts() == before, f"{counts()} instead of {before}")
+        assert before[0] == 3
