@@ -48,7 +48,7 @@ Write: TypeAlias = Callable[[LogLevel, str, str], None]
 
 def severity(level: LogLevel) -> int:
     """Return the number of a level, which is greater the more severe it is."""
-    return _SEVERITIES[level]
+    return SEVERITIES[level]
 
 
 class Log:

@@ -157,11 +157,9 @@ def _install_threads() -> None:
 
 def _wait_until_ended(instance: Instance) -> None:
     """Let a thread of the class wait while the composer calls the callbacks."""
-    if (
-        instance.context.loop.is_current()
-        or threading.current_thread() is instance.transition_thread
-    ):
-        where = "its constructor or a transition" if instance.in_transition else "a callback"
+    in_transition = threading.current_thread() is instance.transition_thread
+    if in_transition or instance.context.loop.is_current():
+        where = "its constructor or a transition" if in_transition else "a callback"
         raise HostingError(_SPINS.format(where=where))
     instance.ended.wait()
 

@@ -49,4 +49,4 @@ def _remapped(node: Node) -> Iterator[str]:
 
 
 def _expanded(node: Node, name: str) -> str:
-    return expand_name(name, node.name.value, node.namespace.value)
+    return expand_name(name, node.ros_name.value, node.namespace.value)
