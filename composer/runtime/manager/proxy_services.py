@@ -94,6 +94,10 @@ class ProxyParameterStore(NodeParameterStore):
                 result.names += [full_parameter_name(name, parameter) for parameter in names]
         return result
 
+    def has(self, name: str) -> bool:
+        """Return whether these are the parameters of a node, by its full name."""
+        return name == self.manager or self._local(name) is not None
+
     async def names_of(self, name: str) -> list[str]:
         """Return the names of the parameters of a node, none if it is not in this process."""
         if name == self.manager:

@@ -62,10 +62,15 @@ class ManagerQueries:
     def _node_parameters(self, requested: Any) -> dict[str, list[Any]] | None:
         """Return descriptions and values of the parameters of the system's nodes and manager.
 
-        ``requested`` are full names of nodes, None for all. Other nodes are left out.
+        ``requested`` are full names of nodes, None for all. Other nodes are left out, and so are those
+        of other processes, which have parameter services of their own.
         """
         known = (self._parameters.manager, *self._nodes())
-        names = [name for name in known if requested is None or name in requested]
+        names = [
+            name
+            for name in known
+            if self._parameters.has(name) and (requested is None or name in requested)
+        ]
         done = threading.Event()
         future = self._loop.run_task(self._collect(names))
         future.add_done_callback(lambda _: done.set())
