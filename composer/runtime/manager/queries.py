@@ -62,8 +62,8 @@ class ManagerQueries:
     def _node_parameters(self, requested: Any) -> dict[str, list[Any]] | None:
         """Return descriptions and values of the parameters of the system's nodes and manager.
 
-        ``requested`` are full names of nodes, None for all. Other nodes are left out, and so are those
-        of other processes, which have parameter services of their own.
+        ``requested`` are full names of nodes, None for all. Other nodes are left out, and so are
+        those of other processes, which have parameter services of their own.
         """
         known = (self._parameters.manager, *self._nodes())
         names = [

@@ -81,12 +81,12 @@ def test_native_nodes_with_our_own(prefix: Path, tmp_path: Path, peer: Peer) -> 
             node = system.node(name)
             killed_s = time.monotonic() - system.host._reporter._started_at_s
             os.kill(node.pid, signal.SIGKILL)
-            wait_until(lambda: len(system.reported(NodeFailed)) == round_, "the fault")
+            wait_until(lambda n=round_: len(system.reported(NodeFailed)) == n, "the fault")
             failed = system.reported(NodeFailed)[-1]
             assert failed.node == node.full_name
             assert failed.elapsed_s - killed_s < 0.1 * max(1.0, os.getloadavg()[0])
             wait_until(lambda: system.node("listener").state == "inactive", "the pause")
-            wait_until(lambda: len(system.reported(Restarted)) == round_, "the restart")
+            wait_until(lambda n=round_: len(system.reported(Restarted)) == n, "the restart")
             wait_until(lambda: system.node("listener").state == "active", "the end of the pause")
         response = peer.call(GetState, "/robot/camera/get_state")
         assert response.current_state.label == "active"
