@@ -57,8 +57,14 @@ class CStream:
 
 
 def crash_fd() -> int:
-    """Return the descriptor for the last words of the process, which does not block in a run."""
-    return CStream(2).fd or 2
+    """Return the descriptor for the last words of the process.
+
+    It does not block in a run, unless it is a socket: nothing may read a pipe any more.
+    """
+    with suppress(OSError):  # it is closed
+        if not stat.S_ISSOCK(os.fstat(2).st_mode):
+            return CStream(2).fd or 2
+    return 2
 
 
 class CStreams:
@@ -67,7 +73,7 @@ class CStreams:
     def __init__(self, forward: Forward) -> None:
         """Redirect streams to pipes and terminals, and let ``forward`` write those to sockets."""
         self._forward = forward
-        self._redirected: dict[int, int] = {}  # the descriptors by the usual ones
+        self._redirected: list[int] = []  # the usual descriptors
         self._readers: dict[int, threading.Thread] = {}  # those of pipes, by the descriptors
         for number in _NAMES:
             with suppress(OSError):  # the terminal of another user
@@ -84,11 +90,12 @@ class CStreams:
             reader.join(_READ_WITHIN_S)
 
     def restore(self) -> None:
-        """Let them write to the usual descriptors again."""
-        while self._redirected:
-            number, fd = self._redirected.popitem()
+        """Let them write to the usual descriptors again.
+
+        Their own descriptors stay open, for the last words of a process that hangs.
+        """
+        for number in self._redirected:
             CStream(number).redirect(number)
-            os.close(fd)
 
     def _redirect(self, number: int) -> None:
         mode = os.fstat(number).st_mode
@@ -101,7 +108,7 @@ class CStreams:
         else:
             return
         if CStream(number).redirect(fd):
-            self._redirected[number] = fd
+            self._redirected.append(number)
         else:
             os.close(fd)
 

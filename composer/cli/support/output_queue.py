@@ -81,6 +81,7 @@ class OutputQueue:
         self._dropped_lines = 0
         self._written_bytes = 0
         self._is_closing = False
+        self._is_writing = False
         self._is_broken = False
         self._is_idle = False
         self._wakeup = threading.Lock()  # a binary semaphore: the thread sleeps on it
@@ -112,7 +113,9 @@ class OutputQueue:
         for _ in range(round(_LAST_WRITE_S / _STALLED_S)):
             before = self._written_bytes
             self._thread.join(_STALLED_S)
-            if not self._thread.is_alive() or self._written_bytes == before:
+            # On a busy machine, the thread may not have had a turn yet.
+            is_stalled = self._is_writing and self._written_bytes == before
+            if is_stalled or not self._thread.is_alive():
                 break
         return not self._thread.is_alive()
 
@@ -149,6 +152,7 @@ class OutputQueue:
 
     def _write(self, data: bytes) -> None:
         while data and not self._is_broken:
+            self._is_writing = True
             try:
                 count = self._sink.write(data)
             except BrokenPipeError:
@@ -160,3 +164,5 @@ class OutputQueue:
             else:
                 self._written_bytes += count
                 data = data[count:]
+            finally:
+                self._is_writing = False
