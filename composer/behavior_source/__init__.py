@@ -5,7 +5,7 @@ read from the syntax tree. What syntax does not determine (a base class in anoth
 decorator, ``__getattr__``) is marked as unknown, and rules do not report it as missing.
 """
 
-from composer.behavior_source.lookup import BehaviorSource, find_behavior
+from composer.behavior_source.lookup import BehaviorSource, find_behavior, imported_from
 from composer.behavior_source.method_body import Call, Function
 from composer.behavior_source.publishing import published_port
 from composer.behavior_source.syntax import Class, Method, Module
@@ -18,5 +18,6 @@ __all__ = [
     "Method",
     "Module",
     "find_behavior",
+    "imported_from",
     "published_port",
 ]

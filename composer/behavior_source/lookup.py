@@ -201,7 +201,7 @@ class _Reader:
         for _ in range(MAXIMUM_MODULES):
             if name in module.classes:
                 return module, module.classes[name]
-            imported = _imported(module, name)
+            imported = imported_from(module, name)
             if imported is None:
                 return None
             following = self._imported_module(module, imported)
@@ -230,11 +230,11 @@ class _Reader:
     def _is_plain(self, module: Module, base: str) -> bool:
         if base == "object":
             return True
-        imported = _imported(module, base)
+        imported = imported_from(module, base)
         return imported is not None and (imported.module, imported.name) in _PLAIN_BASES
 
 
-def _imported(module: Module, name: str) -> Import | None:
+def imported_from(module: Module, name: str) -> Import | None:
     """Return the origin of a name that ``module`` imports: ``Base``, or ``package.Base``."""
     if name in module.imports:
         found = module.imports[name]
