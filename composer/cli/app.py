@@ -29,6 +29,7 @@ COMMANDS = {
     "config": "config",
     "graph": "graph",
     "diff": "diff",
+    "import": "import_nodes",
     "lifecycle": "lifecycle",
     "node": "node",
     "topic": "topic",

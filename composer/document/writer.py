@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from collections.abc import Mapping as Map
+from types import MappingProxyType
+from typing import TypeAlias
 
 from composer.document.scalars import resolve_plain
 from composer.tree import Mapping, Scalar, ScalarValue, Sequence, Tree
@@ -16,20 +19,31 @@ _PLAIN = re.compile(r"[A-Za-z_/](?:[A-Za-z0-9_./ -]*[A-Za-z0-9_./])?")
 _SECTION = 1  # the depth of the values of a file's keys
 
 
-def write_document(tree: Mapping) -> str:
+#: Comments by the keys of the entries that they are written above, from the outermost map on.
+Comments: TypeAlias = "Map[tuple[str, ...], Iterable[str]]"
+
+
+def write_document(tree: Mapping, comments: Comments | None = None) -> str:
     """Return ``tree`` as YAML.
 
-    Sections are in block style; within them, a value that fits into a line is in flow style.
+    Sections are in block style; within them, a value that fits into a line is in flow style, unless
+    something in it has a comment. The comments of the empty path are written above everything.
     """
-    return "".join(f"{line}\n" for line in _block(tree, 0))
+    given = comments or {}
+    head = _comment_lines(given.get((), ()))
+    return "".join(f"{line}\n" for line in (*head, *_block(tree, 0, (), given)))
 
 
-def _block(tree: Tree, depth: int) -> Iterator[str]:
+def _block(
+    tree: Tree, depth: int, path: tuple[str, ...] = (), comments: Comments = MappingProxyType({})
+) -> Iterator[str]:
     """Yield the lines of a map or list that is not empty."""
     match tree:
         case Mapping():
             for entry in tree:
-                yield from _entry(f"{_scalar(entry.name)}:", entry.value, depth)
+                inner = (*path, entry.name)
+                yield from _comment_lines(comments.get(inner, ()))
+                yield from _entry(f"{_scalar(entry.name)}:", entry.value, depth, inner, comments)
         case Sequence():
             for item in tree.items:
                 yield from _item(item, depth)
@@ -37,13 +51,23 @@ def _block(tree: Tree, depth: int) -> Iterator[str]:
             yield _scalar(tree.value)
 
 
-def _entry(key: str, value: Tree, depth: int) -> Iterator[str]:
+def _comment_lines(texts: Iterable[str]) -> Iterator[str]:
+    """Yield comments as lines; a character that would end or hide a comment is escaped."""
+    for text in texts:
+        safe = "".join(item if item.isprintable() else ascii(item)[1:-1] for item in text)
+        yield f"# {safe}".rstrip()
+
+
+def _entry(
+    key: str, value: Tree, depth: int, path: tuple[str, ...], comments: Comments
+) -> Iterator[str]:
     line = f"{key} {_flow(value)}"
-    if _is_flow(value, line, depth + 1):
+    has_comments = any(len(at) > len(path) and at[: len(path)] == path for at in comments)
+    if not has_comments and _is_flow(value, line, depth + 1):
         yield line
         return
     yield key
-    for inner in _block(value, depth + 1):
+    for inner in _block(value, depth + 1, path, comments):
         yield f"{_INDENT}{inner}"
 
 

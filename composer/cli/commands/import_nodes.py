@@ -1,0 +1,186 @@
+"""``compose import``: describe existing nodes in YAML."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.completion import complete_node
+from composer.cli.support.errors import CommandError
+from composer.cli.support.options import Timeout, examples
+from composer.cli.support.ros import require_ros, ros_session
+from composer.cli.support.terminal import lines, say, write_raw
+
+if TYPE_CHECKING:
+    from composer.importing import FoundNode
+
+app = typer.Typer(
+    help="""Describe existing nodes in YAML.
+
+    The files that are written have their origin in comments, and are a start: edit them, then
+    compare them with what runs with 'compose diff'.
+    """,
+    epilog=examples(
+        "compose import live -o systems/robot.yaml                   the nodes that run now",
+        "compose import class driver:Driver -o nodes/driver.yaml     an rclpy class",
+    ),
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FILE",
+        help="Write to a new file instead of stdout.",
+        show_default=False,
+    ),
+]
+SystemToWrite = Annotated[
+    str, typer.Option("--system", metavar="NAME", help="Name of the system that is written.")
+]
+
+
+@app.command(
+    "live",
+    epilog=examples(
+        "compose import live",
+        "compose import live --node talker --node '/perception/*'",
+        "compose import live --system robot -o systems/robot.yaml",
+    ),
+)
+def live(
+    *,
+    nodes: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--node",
+            metavar="NODE",
+            help="Only this node: a full name, the last part of a name, or a pattern. Repeatable.",
+            show_default=False,
+            autocompletion=complete_node,
+        ),
+    ] = None,
+    system: SystemToWrite = "imported",
+    output: Output = None,
+    timeout: Timeout = 10.0,
+) -> None:
+    """Describe the nodes of the running ROS graph as a system.
+
+    For each node: its name and namespace, topics, services and actions with types and QoS, and its
+    parameters with their descriptions. The nodes are external: 'compose run' waits for them and
+    observes them, but does not start them. Replace 'external' by 'class' or 'executable' to start
+    a node with the system.
+
+    The ROS graph does not show the depth of queues. It is that of the most similar QoS preset.
+    """
+    with ros_session("compose import live", timeout) as (session, deadline):
+        from composer.importing.live import describe_graph
+        from composer.remote.parameter_descriptions import parameter_settings
+        from composer.remote.snapshot import GraphObserver
+
+        with GraphObserver(session) as observer:
+            snapshot = observer.snapshot(deadline)
+        names = {node.full_name: tuple(node.parameters or ()) for node in snapshot.nodes}
+        settings = parameter_settings(session, deadline, names)
+    found = describe_graph(system, snapshot, settings, _known_types(), nodes or ())
+    if not found.nodes:
+        matching = f" matches {', '.join(nodes)}" if nodes else " was found"
+        raise CommandError(
+            f"no node{matching}", hint="'compose node list' lists the nodes of the ROS graph"
+        )
+    from composer.importing import write_system
+
+    _write(write_system(found), output)
+    _report_left_out(found.left_out)
+
+
+@app.command(
+    "class",
+    epilog=examples(
+        "compose import class demo_nodes_py.topics.talker:Talker -o nodes/talker.yaml",
+        "compose import class driver:Driver --construct        run its constructor once",
+    ),
+)
+def import_class(
+    reference: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODULE:CLASS", help="A class derived from rclpy's Node or LifecycleNode."
+        ),
+    ],
+    *,
+    construct: Annotated[
+        bool,
+        typer.Option(
+            "--construct",
+            help="Construct the class once, in a process of its own; do not read its source.",
+        ),
+    ] = False,
+    output: Output = None,
+    timeout: Timeout = 30.0,
+) -> None:
+    """Describe an rclpy node class as a node type.
+
+    The source is read, and no code of it runs: the topics, services, actions and parameters that it
+    creates with literal names are declared. What only running would show is listed. With
+    --construct, the constructor runs, and all that it creates is declared.
+
+    The module is searched in this folder, in the project's node types and where Python finds it.
+    """
+    from composer.importing import write_node_type
+    from composer.importing.python_class import ClassNotFound, describe_class
+
+    unknown: tuple[str, ...] = ()
+    if construct:
+        found = _constructed(reference, timeout)
+    else:
+        try:
+            found, unknown = describe_class(reference, Path.cwd())
+        except ClassNotFound as error:
+            raise CommandError(str(error), hint=error.hint) from error
+    type_name = found.name if output is None else output.stem
+    _write(write_node_type(type_name, found), output)
+    if unknown:
+        say(lines(["the source does not show:", *(f"  {text}" for text in unknown)]))
+
+
+def _constructed(reference: str, timeout_s: float) -> FoundNode:
+    """Construct a class in a process of its own. Raises CommandError."""
+    require_ros("compose import class --construct")
+    from composer.cli.support.user_processes import run_user_process
+    from composer.importing.constructed import describe_constructed
+
+    module = "composer.remote.constructed_class"
+    text = run_user_process(module, [reference, str(Path.cwd())], timeout_s)
+    return describe_constructed(reference, json.loads(text))
+
+
+def _known_types() -> set[str]:
+    from composer.interfaces import Interfaces
+    from composer.node_types import interface_folders
+    from composer.project import Project
+
+    types = Interfaces.load(interface_folders(Project.at(Path.cwd())))
+    return {name for kind in ("msg", "srv", "action") for name in types.names(kind)}
+
+
+def _write(text: str, output: Path | None) -> None:
+    """Write a new file, or to stdout. Raises CommandError; then there is no incomplete file."""
+    if output is None:
+        write_raw(text)
+        return
+    from composer.cli.support.new_files import write_new_file
+
+    write_new_file(output, text)
+    say(f"wrote {output}")
+
+
+def _report_left_out(left_out: tuple[str, ...]) -> None:
+    if left_out:
+        say(lines(["left out:", *(f"  {text}" for text in left_out)]))

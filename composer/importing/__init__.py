@@ -1,0 +1,18 @@
+"""Describes existing nodes, and writes the descriptions as systems and node types.
+
+A description comes from the ROS graph (:mod:`.live`), from the source of a class
+(:mod:`.python_class`) or from a launch file (:mod:`composer.launch_interop`). Nothing here imports
+ROS or runs the code of users.
+"""
+
+from composer.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
+from composer.importing.writing import write_node_type, write_system
+
+__all__ = [
+    "FoundNode",
+    "FoundParameter",
+    "FoundPort",
+    "FoundSystem",
+    "write_node_type",
+    "write_system",
+]

@@ -1,0 +1,301 @@
+"""Describe an rclpy node class from its source, without importing or running it."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from composer.behavior_source import BehaviorSource, Function, find_behavior
+from composer.diagnostics import suggestion
+from composer.fast_dataclass import dataclass
+from composer.importing.found import FoundNode, FoundParameter, FoundPort
+from composer.importing.python_values import NotLiteral, Scope
+from composer.model import BehaviorReference, PortKind
+from composer.source import Located, SourceFile, Span, shown_path
+from composer.tree import Plain
+
+T = TypeVar("T")
+
+#: The methods and classes that create endpoints: their kind, and their arguments in order.
+_TOPIC = ("msg_type", "topic", "qos_profile")
+_CREATORS: dict[str, tuple[PortKind, tuple[str, ...]]] = {
+    "create_publisher": (PortKind.PUBLISHER, _TOPIC),
+    "create_lifecycle_publisher": (PortKind.PUBLISHER, _TOPIC),
+    "create_subscription": (
+        PortKind.SUBSCRIPTION,
+        ("msg_type", "topic", "callback", "qos_profile"),
+    ),
+    "create_service": (PortKind.SERVICE, ("srv_type", "srv_name")),
+    "create_client": (PortKind.CLIENT, ("srv_type", "srv_name")),
+}
+_ACTIONS: dict[str, tuple[PortKind, tuple[str, ...]]] = {
+    "rclpy.action.ActionServer": (PortKind.ACTION_SERVER, ("node", "action_type", "action_name")),
+    "rclpy.action.server.ActionServer": (
+        PortKind.ACTION_SERVER,
+        ("node", "action_type", "action_name"),
+    ),
+    "rclpy.action.ActionClient": (PortKind.ACTION_CLIENT, ("node", "action_type", "action_name")),
+    "rclpy.action.client.ActionClient": (
+        PortKind.ACTION_CLIENT,
+        ("node", "action_type", "action_name"),
+    ),
+}
+_TYPES = ("msg_type", "srv_type", "action_type")
+_NAMES = ("topic", "srv_name", "action_name")
+_DESCRIPTOR = "rcl_interfaces.msg.ParameterDescriptor"
+_RANGES = ("rcl_interfaces.msg.FloatingPointRange", "rcl_interfaces.msg.IntegerRange")
+
+
+class ClassNotFound(Exception):
+    """The class cannot be read; ``hint`` says how to proceed."""
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+def describe_class(text: str, folder: Path) -> tuple[FoundNode, tuple[str, ...]]:
+    """Return the node of a class ``module:Class``, and what its source does not show.
+
+    The module is searched as that of a behavior in a file in ``folder``. Raises ClassNotFound.
+    """
+    located = Located(text, Span(SourceFile("", text), 1, 1, len(text)))
+    source = find_behavior(BehaviorReference(located, folder))
+    _check(source, text)
+    reader = _ClassReader([], [], [])
+    for module, known in source.classes:
+        if "rclpy" not in module.path.parts:
+            for method in known.methods:
+                if method.node is not None:
+                    reader.read(Scope(module, known.node, method.node))
+    own_module, own = source.classes[0]
+    place = f"{shown_path(own_module.path)}:{own.span.line}"
+    comments: tuple[str, ...] = (
+        f"From the source of {text} ({place}), by 'compose import class'.",
+    )
+    if reader.unknown:
+        comments += ("Not shown by the source:", *(f"- {item}" for item in reader.unknown))
+    node = FoundNode(
+        name=reader.name or own.name.lower(),
+        keys={"class": text},
+        ports=tuple(reader.ports),
+        parameters=tuple(reader.parameters),
+        comments=comments,
+    )
+    return node, tuple(reader.unknown)
+
+
+def _check(source: BehaviorSource, text: str) -> None:
+    module, _, name = text.partition(":")
+    if not module or not name.isidentifier():
+        raise ClassNotFound(
+            f"'{text}' does not name a class", "for example: demo_nodes_py.topics.talker:Talker"
+        )
+    if source.problem is not None:
+        raise ClassNotFound(f"module '{module}' {source.problem}")
+    if not source.module_found:
+        raise ClassNotFound(
+            f"no Python module named '{module}'",
+            "it is searched in this folder, in the project's node types, and where Python finds it",
+        )
+    if not source.class_found:
+        raise ClassNotFound(
+            f"module '{module}' has no class '{name}'", suggestion(name, source.class_names)
+        )
+    if not source.classes:
+        raise ClassNotFound(
+            f"the source of '{text}' cannot be read: it is compiled or made at run time",
+            "use --construct to run its constructor",
+        )
+
+
+@dataclass(slots=True)
+class _ClassReader:
+    """Collects what the methods of a class create."""
+
+    ports: list[FoundPort]
+    parameters: list[FoundParameter]
+    unknown: list[str]
+    name: str = ""
+
+    def read(self, scope: Scope) -> None:
+        """Read one method."""
+        for call in _calls(scope.method):
+            place = f"{scope.module.path.name}:{call.lineno}"
+            name = call.func.attr if isinstance(call.func, ast.Attribute) else ""
+            full_name = scope.full_name(call.func)
+            if name in _CREATORS and full_name.startswith("self."):
+                self._add_port(scope, call, _CREATORS[name], place)
+            elif full_name in _ACTIONS:
+                self._add_port(scope, call, _ACTIONS[full_name], place)
+            elif full_name == "self.declare_parameter":
+                self._add_parameter(scope, call, place)
+            elif full_name == "self.declare_parameters":
+                self._add_parameters(scope, call, place)
+            elif name == "__init__" and not self.name:
+                self.name = _node_name(scope, call)
+
+    def _add_port(
+        self,
+        scope: Scope,
+        call: ast.Call,
+        creator: tuple[PortKind, tuple[str, ...]],
+        place: str,
+    ) -> None:
+        kind, names = creator
+        given = _arguments(call, names)
+        try:
+            (type_node,) = (given[name] for name in _TYPES if name in given)
+            (name_node,) = (given[name] for name in _NAMES if name in given)
+            port_type, port_name = scope.interface(type_node), scope.text(name_node)
+        except NotLiteral as error:
+            self.unknown.append(f"{place}: a {kind}, because of {error}")
+            return
+        except ValueError:
+            self.unknown.append(f"{place}: a {kind} with unusual arguments")
+            return
+        qos = None
+        if "qos_profile" in given:
+            qos = self._try(
+                lambda: scope.qos(given["qos_profile"]), f"{place}: the QoS of {kind} {port_name}"
+            )
+        known = {(port.kind, port.name) for port in self.ports}
+        if (kind, port_name) not in known:
+            self.ports.append(FoundPort(kind, port_name, port_type, qos, comments=(place,)))
+
+    def _add_parameter(self, scope: Scope, call: ast.Call, place: str) -> None:
+        given = _arguments(call, ("name", "value", "descriptor"))
+        if "name" not in given:
+            return
+        name = self._try(lambda: scope.text(given["name"]), f"{place}: a parameter")
+        if name is None:
+            return
+        settings: dict[str, Plain] = {}
+        if "descriptor" in given:
+            settings = _settings(scope, given["descriptor"])
+        self._declare(scope, name, given.get("value"), settings, place)
+
+    def _add_parameters(self, scope: Scope, call: ast.Call, place: str) -> None:
+        given = _arguments(call, ("namespace", "parameters"))
+        listed = given.get("parameters")
+        if not isinstance(listed, ast.List | ast.Tuple):
+            self.unknown.append(f"{place}: parameters that are not listed there")
+            return
+        prefix = self._try(
+            lambda: scope.text(given["namespace"]) if "namespace" in given else "",
+            f"{place}: the prefix of parameters",
+        )
+        for item in listed.elts if prefix is not None else ():
+            if isinstance(item, ast.Tuple) and item.elts:
+                name = self._try(partial(scope.text, item.elts[0]), f"{place}: a parameter")
+                value = item.elts[1] if len(item.elts) > 1 else None
+                if name is not None:
+                    full = f"{prefix}.{name}" if prefix else name
+                    self._declare(scope, full, value, {}, place)
+
+    def _declare(
+        self,
+        scope: Scope,
+        name: str,
+        value_node: ast.expr | None,
+        settings: dict[str, Plain],
+        place: str,
+    ) -> None:
+        value: Plain = None
+        if value_node is not None:
+            value = self._try(
+                lambda: scope.literal(value_node), f"{place}: the default of parameter {name}"
+            )
+        kind = _parameter_type(value)
+        if kind is None and value_node is not None:
+            kind = _type_of_node(scope, value_node)
+        if kind is None:
+            self.unknown.append(f"{place}: the type of parameter {name}")
+        elif name not in {item.name for item in self.parameters}:
+            self.parameters.append(FoundParameter(name, kind, value, settings, (place,)))
+
+    def _try(self, read: Callable[[], T], what: str) -> T | None:
+        """Return ``read()``; if only running would show it, add ``what`` to the unknown."""
+        try:
+            return read()
+        except NotLiteral as error:
+            self.unknown.append(f"{what}, because of {error}")
+            return None
+
+
+def _calls(method: Function) -> Iterator[ast.Call]:
+    calls = [node for node in ast.walk(method) if isinstance(node, ast.Call)]
+    yield from sorted(calls, key=lambda call: (call.lineno, call.col_offset))
+
+
+def _arguments(call: ast.Call, names: tuple[str, ...]) -> dict[str, ast.expr]:
+    found = dict(zip(names, call.args, strict=False))
+    found |= {item.arg: item.value for item in call.keywords if item.arg in names}
+    return found
+
+
+def _node_name(scope: Scope, call: ast.Call) -> str:
+    """Return the name of the node that ``super().__init__(...)`` sets, or an empty text."""
+    given = _arguments(call, ("node_name",))
+    try:
+        name = scope.text(given["node_name"])
+    except (NotLiteral, KeyError):
+        return ""
+    return name if name.isidentifier() else ""
+
+
+def _settings(scope: Scope, node: ast.expr) -> dict[str, Plain]:
+    """Return the keys of a parameter that its descriptor shows."""
+    if not isinstance(node, ast.Call) or scope.full_name(node.func) != _DESCRIPTOR:
+        return {}
+    settings: dict[str, Plain] = {}
+    for keyword in node.keywords:
+        try:
+            if keyword.arg in ("floating_point_range", "integer_range"):
+                settings |= _range(scope, keyword.value)
+            elif keyword.arg in ("description", "read_only"):
+                settings[keyword.arg] = scope.literal(keyword.value)
+        except NotLiteral:
+            continue
+    return settings
+
+
+def _range(scope: Scope, node: ast.expr) -> dict[str, Plain]:
+    match node:
+        case ast.List(elts=[ast.Call() as call]) if scope.full_name(call.func) in _RANGES:
+            given = {item.arg: scope.literal(item.value) for item in call.keywords}
+            keys = {"minimum": "from_value", "maximum": "to_value", "step": "step"}
+            return {
+                key: given[name]
+                for key, name in keys.items()
+                if name in given and not (key == "step" and not given[name])
+            }
+    return {}
+
+
+def _parameter_type(value: Plain) -> str | None:
+    match value:
+        case bool():
+            return "bool"
+        case int():
+            return "integer"
+        case float():
+            return "double"
+        case str():
+            return "string"
+        case [first, *_]:
+            kinds = {_parameter_type(item) for item in value}
+            return (
+                f"{_parameter_type(first)}_array" if len(kinds) == 1 and None not in kinds else None
+            )
+        case _:
+            return None
+
+
+def _type_of_node(scope: Scope, node: ast.expr) -> str | None:
+    """Return the type of ``Parameter.Type.DOUBLE``, in lower case, or None."""
+    name = scope.full_name(node)
+    return name.rpartition(".")[2].lower() if ".Parameter.Type." in name else None

@@ -1,0 +1,192 @@
+"""Write descriptions as canonical YAML, with comments on their origin."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable
+
+from composer.document.writer import write_document
+from composer.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
+from composer.model import ChannelKind, PortKind
+from composer.qos import PRESETS, QosProfile
+from composer.source import SourceFile, Span
+from composer.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree
+
+_SECTIONS = {
+    PortKind.PUBLISHER: "publishers",
+    PortKind.SUBSCRIPTION: "subscriptions",
+    PortKind.SERVICE: "services",
+    PortKind.CLIENT: "clients",
+    PortKind.ACTION_SERVER: "action_servers",
+    PortKind.ACTION_CLIENT: "action_clients",
+}
+#: Presets that may describe a profile, the usual ones first.
+_PRESETS = ("command", "sensor_data", "state")
+_POLICIES = (
+    "history",
+    "depth",
+    "reliability",
+    "durability",
+    "deadline_ms",
+    "lifespan_ms",
+    "liveliness",
+    "liveliness_lease_duration_ms",
+)
+_NOWHERE = Span(SourceFile("", ""), 1, 1, 1)
+_NOT_IN_KEYS = re.compile(r"[^A-Za-z0-9_]+")
+
+_Comments = dict[tuple[str, ...], tuple[str, ...]]
+
+
+def write_system(found: FoundSystem) -> str:
+    """Return a system file."""
+    comments: _Comments = {(): found.comments}
+    if found.left_out:
+        comments[()] += ("", "Left out:", *(f"- {text}" for text in found.left_out))
+    nodes: dict[str, Plain] = {}
+    for key, node in node_keys(found.nodes).items():
+        nodes[key] = _node(key, node, ("nodes", key), comments)
+    return write_document(_map({"system": found.name, "nodes": nodes}), comments)
+
+
+def write_node_type(type_name: str, found: FoundNode) -> str:
+    """Return the file of a node type.
+
+    The names of ports stay as they are: the namespace is that of each node with the type.
+    """
+    comments: _Comments = {(): found.comments}
+    content: dict[str, Plain] = {"node": type_name, **found.keys}
+    content |= _declarations(found, (), comments)
+    return write_document(_map(content), comments)
+
+
+def node_keys(nodes: Iterable[FoundNode]) -> dict[str, FoundNode]:
+    """Return the nodes by their keys: their names, with parts of the namespace where needed."""
+    nodes = tuple(nodes)
+    names = Counter(node.name for node in nodes)
+    found: dict[str, FoundNode] = {}
+    for node in nodes:
+        key = node.name
+        if names[node.name] > 1:
+            key = _key(node.full_name)
+        found[_free(key, found)] = node
+    return found
+
+
+def qos_value(profile: QosProfile) -> Plain:
+    """Return a profile as YAML: a preset, or the policies that differ from the defaults."""
+    for name in _PRESETS:
+        if PRESETS[name] == profile:
+            return name
+    default = QosProfile()
+    return {
+        policy: _policy(getattr(profile, policy))
+        for policy in _POLICIES
+        if getattr(profile, policy) != getattr(default, policy)
+    }
+
+
+def _node(key: str, node: FoundNode, path: tuple[str, ...], comments: _Comments) -> Plain:
+    content: dict[str, Plain] = {}
+    if node.name != key:
+        content["name"] = node.name
+    if node.namespace != "/":
+        content["namespace"] = node.namespace
+    content |= node.keys
+    if node.comments:
+        comments[path] = node.comments
+    content |= _declarations(node, path, comments)
+    if node.remappings:
+        content["remappings"] = dict(node.remappings)
+    return content
+
+
+def _declarations(node: FoundNode, path: tuple[str, ...], comments: _Comments) -> dict[str, Plain]:
+    content: dict[str, Plain] = {}
+    if node.parameters:
+        content["parameters"] = {item.name: _parameter(item) for item in node.parameters}
+        for item in node.parameters:
+            if item.comments:
+                comments[*path, "parameters", item.name] = item.comments
+    for kind, section in _SECTIONS.items():
+        ports = [port for port in node.ports if port.kind is kind]
+        written: dict[str, Plain] = {}
+        for port in ports:
+            relative = _relative(port.name, node) if path else port.name
+            key = _free(_key(_last_part(relative), relative), written)
+            written[key] = _port(port, relative, key)
+            if port.comments:
+                comments[*path, section, key] = port.comments
+        if written:
+            content[section] = written
+    return content
+
+
+def _port(port: FoundPort, relative: str, key: str) -> Plain:
+    content: dict[str, Plain] = {"type": port.type}
+    if relative != key:
+        content[port.kind.channel.value] = relative
+    if port.qos is not None and port.kind.channel is ChannelKind.TOPIC:
+        content["qos"] = qos_value(port.qos)
+    if port.external:
+        content["external"] = True
+    return content
+
+
+def _relative(name: str, node: FoundNode) -> str:
+    """Return the name of a port as short as a file may write it."""
+    if name.startswith(f"{node.full_name}/"):
+        return f"~{name.removeprefix(node.full_name)}"
+    namespace = node.namespace.rstrip("/") + "/"
+    rest = name.removeprefix(namespace)
+    return rest if name.startswith(namespace) and "/" not in rest else name
+
+
+def _parameter(item: FoundParameter) -> Plain:
+    content: dict[str, Plain] = {"type": item.type}
+    if item.value is not None:
+        content["default"] = item.value
+    return {**content, **item.settings}
+
+
+def _policy(value: object) -> Plain:
+    return value if isinstance(value, bool | int | float) or value is None else str(value)
+
+
+def _last_part(name: str) -> str:
+    return name.rpartition("/")[2] or "port"
+
+
+def _key(text: str, whole: str = "") -> str:
+    """Return ``text`` as the key of a port or node: a Python name."""
+    key = _NOT_IN_KEYS.sub("_", text).strip("_") or _NOT_IN_KEYS.sub("_", whole).strip("_")
+    return f"_{key}" if key[:1].isdigit() else key or "unnamed"
+
+
+def _free(key: str, taken: Iterable[str]) -> str:
+    number, free = 2, key
+    while free in taken:
+        free, number = f"{key}_{number}", number + 1
+    return free
+
+
+def _map(content: dict[str, Plain]) -> Mapping:
+    tree = _tree(content)
+    return tree if isinstance(tree, Mapping) else Mapping((), _NOWHERE)
+
+
+def _tree(value: Plain) -> Tree:
+    if isinstance(value, dict):
+        entries = (
+            Entry(Scalar(_literal(key), _NOWHERE), _tree(item)) for key, item in value.items()
+        )
+        return Mapping(tuple(entries), _NOWHERE)
+    if isinstance(value, list):
+        return Sequence(tuple(map(_tree, value)), _NOWHERE)
+    return Scalar(_literal(value) if isinstance(value, str) else value, _NOWHERE)
+
+
+def _literal(text: str) -> str:
+    """Return a text in which nothing looks like a variable."""
+    return text.replace("${", "$${")
