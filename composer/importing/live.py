@@ -138,7 +138,7 @@ def _parameters(
         if is_of_every_node(name) or (name == USE_SIM_TIME and not value):
             continue
         described = dict(settings.get(name, {}))
-        kind = described.pop("type", None) or _type_of(value)
+        kind = described.pop("type", None) or parameter_type(value)
         if parameter_name_problem(name):
             problem = parameter_name_problem(name)
             left_out.append(f"parameter {name!r} of {node.full_name}: the name {problem}")
@@ -148,10 +148,11 @@ def _parameters(
             yield FoundParameter(name, str(kind), value, described)
 
 
-def _type_of(value: Plain) -> str | None:
+def parameter_type(value: Plain) -> str | None:
+    """Return the type of a parameter with a value; None if no parameter has such a value."""
     match value:
         case list():
-            kinds = {_type_of(item) for item in value}
+            kinds = {parameter_type(item) for item in value}
             return f"{kinds.pop()}_array" if len(kinds) == 1 else None
         case bool():
             return "bool"

@@ -12,6 +12,7 @@ from composer.behavior_source import BehaviorSource, Function, find_behavior
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
 from composer.importing.found import FoundNode, FoundParameter, FoundPort
+from composer.importing.live import parameter_type
 from composer.importing.python_values import NotLiteral, Scope
 from composer.model import BehaviorReference, PortKind
 from composer.source import Located, SourceFile, Span, shown_path
@@ -209,7 +210,7 @@ class _ClassReader:
             value = self._try(
                 lambda: scope.literal(value_node), f"{place}: the default of parameter {name}"
             )
-        kind = _parameter_type(value)
+        kind = parameter_type(value)
         if kind is None and value_node is not None:
             kind = _type_of_node(scope, value_node)
         if kind is None:
@@ -274,25 +275,6 @@ def _range(scope: Scope, node: ast.expr) -> dict[str, Plain]:
                 if name in given and not (key == "step" and not given[name])
             }
     return {}
-
-
-def _parameter_type(value: Plain) -> str | None:
-    match value:
-        case bool():
-            return "bool"
-        case int():
-            return "integer"
-        case float():
-            return "double"
-        case str():
-            return "string"
-        case [first, *_]:
-            kinds = {_parameter_type(item) for item in value}
-            return (
-                f"{_parameter_type(first)}_array" if len(kinds) == 1 and None not in kinds else None
-            )
-        case _:
-            return None
 
 
 def _type_of_node(scope: Scope, node: ast.expr) -> str | None:

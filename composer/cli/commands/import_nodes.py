@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.support.completion import complete_node
-from composer.cli.support.errors import CommandError
+from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import Timeout, examples
-from composer.cli.support.ros import require_ros, ros_session
+from composer.cli.support.ros import require_launch, require_ros, ros_session
 from composer.cli.support.terminal import lines, say, write_raw
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ app = typer.Typer(
     epilog=examples(
         "compose import live -o systems/robot.yaml                   the nodes that run now",
         "compose import class driver:Driver -o nodes/driver.yaml     an rclpy class",
+        "compose import launch robot.launch.py                       a launch file",
     ),
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -159,6 +160,55 @@ def _constructed(reference: str, timeout_s: float) -> FoundNode:
     module = "composer.remote.constructed_class"
     text = run_user_process(module, [reference, str(Path.cwd())], timeout_s)
     return describe_constructed(reference, json.loads(text))
+
+
+@app.command(
+    "launch",
+    epilog=examples(
+        "compose import launch robot.launch.py -o systems/robot.yaml",
+        "compose import launch robot.launch.xml use_sim_time:=true --system robot",
+    ),
+)
+def import_launch(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A launch file.")],
+    arguments: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME:=VALUE]...", help="Launch arguments.", show_default=False),
+    ] = None,
+    *,
+    system: SystemToWrite = "imported",
+    output: Output = None,
+    timeout: Timeout = 30.0,
+) -> None:
+    """Describe the nodes of a launch file as a system.
+
+    The file is evaluated with these arguments in a process of its own, as by 'ros2 launch', but
+    nothing is started: nodes become executables with their names, namespaces, parameters,
+    remappings and environment. Includes, groups and conditions are resolved. Components, processes
+    that are not nodes and event handlers are listed and left out.
+
+    Launch files do not show topics, services and actions: see 'compose import live'. The packages
+    launch and launch_ros must be installed.
+    """
+    given = arguments or []
+    for argument in given:
+        if ":=" not in argument:
+            raise UsageError(f"'{argument}' is not a launch argument", hint="write NAME:=VALUE")
+    if not file.is_file():
+        raise UsageError(f"there is no file '{file}'")
+    require_launch("compose import launch")
+    from composer.cli.support.user_processes import run_user_process
+    from composer.importing import write_system
+    from composer.importing.launch_file import describe_launch_file
+
+    arguments_of_process = [str(file.absolute()), *given]
+    text = run_user_process("composer.launch.visitor", arguments_of_process, timeout)
+    found = describe_launch_file(system, str(file), given, json.loads(text))
+    if not found.nodes:
+        _report_left_out(found.left_out)
+        raise CommandError(f"'{file}' starts no node with these arguments")
+    _write(write_system(found), output)
+    _report_left_out(found.left_out)
 
 
 def _known_types() -> set[str]:

@@ -37,6 +37,17 @@ def require_ros(command: str) -> None:
         raise CommandError(str(refusal), hint=refusal.hint) from refusal
 
 
+def require_launch(command: str) -> None:
+    """Raise CommandError if launch or launch_ros is not installed."""
+    require_ros(command)
+    for package in ("launch", "launch_ros"):
+        if find_spec(package) is None:
+            raise CommandError(
+                f"'{command}' needs {package}, which is not installed in this Python",
+                hint="it is part of ROS 2: source /opt/ros/jazzy/setup.bash",
+            )
+
+
 def require_interfaces(system: System) -> None:
     """Raise CommandError if Python lacks an interface package that a port of the system uses."""
     from composer.interfaces.building import how_to_build

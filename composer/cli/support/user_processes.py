@@ -32,6 +32,7 @@ def run_user_process(module: str, arguments: Sequence[str], timeout_s: float) ->
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             start_new_session=True,
+            env={**os.environ, "TMPDIR": folder},  # removes what it leaves behind
             text=True,
             errors="replace",
         )

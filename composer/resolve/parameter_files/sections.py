@@ -72,6 +72,16 @@ class ParameterFiles:
         in_order = sorted(found.items(), key=lambda item: item[1][0])
         return {parameter: entry for parameter, (_, entry) in in_order}
 
+    def all_values(self, full_name: str) -> dict[str, Entry]:
+        """Return all values for a node whose parameters are not known, by parameter."""
+        found: dict[str, tuple[int, Entry]] = {}
+        for name in self.names_for(full_name):
+            for parameter, value in self._values[name].items():
+                known = found.setdefault(parameter, value)
+                found[parameter] = max(value, known, key=lambda item: item[0])
+        in_order = sorted(found.items(), key=lambda item: item[1][0])
+        return {parameter: entry for parameter, (_, entry) in in_order}
+
     def unmatched(self, nodes: Iterable[Node]) -> tuple[UnmatchedParameters, ...]:
         """Return the sections, and parameters of patterns, that are for none of the nodes."""
         search = _Search(self, {node.full_name: node for node in nodes})

@@ -1,0 +1,170 @@
+"""Visits a launch file as ``ros2 launch`` does, but starts nothing, and reports its nodes.
+
+Run as ``python -P -m composer.launch.visitor REPORT FILE [NAME:=VALUE]...``: launch files are
+Python, and their code runs. The report goes to the file REPORT as JSON.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from launch import LaunchContext, LaunchDescription, LaunchService
+from launch.actions import (
+    EmitEvent,
+    ExecuteLocal,
+    ExecuteProcess,
+    IncludeLaunchDescription,
+    RegisterEventHandler,
+    TimerAction,
+)
+from launch.launch_description_sources import AnyLaunchDescriptionSource
+from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
+from launch.utilities.type_utils import perform_typed_substitution
+from launch_ros.actions import LifecycleNode, LoadComposableNodes, Node
+
+from composer.launch.parameter_values import parameter_values
+
+_UNKNOWN_NAME = "<node_name_unspecified>"
+_MAXIMUM_ENTITIES = 100_000
+
+
+class Visitor:
+    """Collects the nodes of a launch description, in the order in which they would start."""
+
+    def __init__(self, context: LaunchContext) -> None:
+        self._context = context
+        self._environment = dict(context.environment)
+        self._count = 0
+        self.nodes: list[dict[str, Any]] = []
+        self.left_out: list[str] = []
+
+    def visit(self, entity: Any, note: str = "") -> None:
+        """Visit an entity and what it consists of. ``note`` says when it would be started."""
+        self._count += 1
+        if self._count > _MAXIMUM_ENTITIES:
+            raise RuntimeError("the launch file includes itself without an end")
+        condition = getattr(entity, "condition", None)
+        if condition is not None and not condition.evaluate(self._context):
+            return
+        if isinstance(entity, Node):
+            self.nodes.append(self._node(entity, note))
+        elif isinstance(entity, TimerAction):
+            for inner in entity.actions:
+                self.visit(inner, f"after {self._text(entity.period)} s")
+            return
+        described = self._left_out(entity)
+        self.left_out += described
+        if not described and not isinstance(entity, Node):
+            for inner in entity.visit(self._context) or ():
+                self.visit(inner, note)
+
+    def _left_out(self, entity: Any) -> list[str]:
+        """Describe what cannot be a node of a system; nothing for what can be visited."""
+        match entity:
+            case Node() | LoadComposableNodes():
+                return [self._component(item) for item in _components(entity)]
+            case ExecuteProcess() | ExecuteLocal():
+                return [f"process: {self._command(entity)}"]
+            case RegisterEventHandler():
+                return [f"event handler: {type(entity.event_handler).__name__}"]
+            case EmitEvent():
+                return [f"event: {type(entity.event).__name__}"]
+            case _:
+                return []
+
+    def _node(self, node: Any, note: str) -> dict[str, Any]:
+        node._perform_substitutions(self._context)
+        namespace, _, name = str(node.node_name).rpartition("/")
+        namespace = "" if "unspecified" in namespace else namespace
+        full_name = f"{namespace}/{name}"
+        arguments = getattr(node, "_Node__arguments", None) or ()
+        found: dict[str, Any] = {
+            "name": None if name == _UNKNOWN_NAME else name,
+            "namespace": namespace or "/",
+            "package": self._text(node.node_package) if node.node_package else None,
+            "executable": self._text(node.node_executable),
+            "arguments": [self._text(argument) for argument in arguments],
+            "remappings": dict(node.expanded_remapping_rules or ()),
+            "environment": self._environment_of(node),
+            "lifecycle": isinstance(node, LifecycleNode),
+            "respawn": self._respawns(node),
+            "note": note,
+        }
+        sources = [*self._global_parameters()]
+        expanded = getattr(node, "_Node__expanded_parameter_arguments", None) or ()
+        sources += [(str(text), bool(is_file)) for text, is_file in expanded]
+        found["parameters"], found["problems"] = parameter_values(sources, full_name)
+        ros_arguments = getattr(node, "_Node__ros_arguments", None) or ()
+        found["ros_arguments"] = [self._text(argument) for argument in ros_arguments]
+        return found
+
+    def _global_parameters(self) -> Iterable[tuple[str, bool]]:
+        """Yield the values of SetParameter; launch_ros lists its files with those of the node."""
+        given: Any = self._context.launch_configurations.get("global_params", None) or ()
+        for item in given:
+            if isinstance(item, tuple):
+                yield f"{item[0]}:={json.dumps(item[1])}", False
+
+    def _environment_of(self, node: Any) -> dict[str, str]:
+        """Return the variables that differ from those of the visitor."""
+        found = {
+            name: value
+            for name, value in self._context.environment.items()
+            if self._environment.get(name) != value
+        }
+        for pairs in (node.env or (), node.additional_env or ()):
+            found |= {self._text(name): self._text(value) for name, value in pairs}
+        return found
+
+    def _respawns(self, node: Any) -> bool:
+        respawn = getattr(node, "_ExecuteLocal__respawn", False)
+        return bool(perform_typed_substitution(self._context, respawn, bool))
+
+    def _component(self, component: Any) -> str:
+        plugin, package = self._text(component.node_plugin), self._text(component.package)
+        return f"component: {plugin} of package {package}"
+
+    def _command(self, entity: Any) -> str:
+        return " ".join(self._text(word) for word in entity.cmd)
+
+    def _text(self, value: Any) -> str:
+        if isinstance(value, int | float):
+            return str(value)
+        return str(perform_substitutions(self._context, normalize_to_list_of_substitutions(value)))
+
+
+def _components(action: Any) -> Iterable[Any]:
+    """Return the components of a container, or those that an action loads into one."""
+    for kind in ("ComposableNodeContainer", "LoadComposableNodes"):
+        found = getattr(action, f"_{kind}__composable_node_descriptions", None)
+        if found:
+            return list(found)
+    return ()
+
+
+def main(report: Path, path: str, arguments: list[str]) -> None:
+    """Visit a launch file, write the report, and end the process."""
+    context = LaunchContext(argv=arguments)
+    loop = asyncio.new_event_loop()
+    asyncio.set_event_loop(loop)
+    context._set_asyncio_loop(loop)
+    context.extend_globals({"launch_service": LaunchService})
+    include = IncludeLaunchDescription(
+        AnyLaunchDescriptionSource(path),
+        launch_arguments=[tuple(text.split(":=", 1)) for text in arguments],
+    )
+    visitor = Visitor(context)
+    visitor.visit(LaunchDescription([include]))
+    found = {"nodes": visitor.nodes, "left_out": visitor.left_out}
+    report.write_text(json.dumps(found), encoding="utf-8")
+    os._exit(0)  # whatever the launch file has started
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2], sys.argv[3:])

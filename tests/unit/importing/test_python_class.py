@@ -1,0 +1,124 @@
+"""Node classes, described from their source."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from composer.importing import write_node_type
+from composer.importing.python_class import ClassNotFound, describe_class
+
+DRIVER = """\
+import sys
+import std_msgs.msg
+from rclpy.action import ActionClient
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSPresetProfiles, QoSProfile, ReliabilityPolicy
+from rclpy.qos import qos_profile_sensor_data as SENSOR
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+sys.exit("the module must not be executed")
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Base(Node):
+    def __init__(self):
+        super().__init__("lidar")
+        self.declare_parameter("frame", "laser", ParameterDescriptor(read_only=True))
+
+
+class Lidar(Base):
+    TOPIC = "scan"
+
+    def __init__(self):
+        super().__init__()
+        rate = FloatingPointRange(from_value=0.0, to_value=50.0, step=0.0)
+        self.declare_parameter(
+            "rate", 10.0, ParameterDescriptor(floating_point_range=[FloatingPointRange(
+                from_value=0.0, to_value=50.0)], description="Rate.")
+        )
+        self.declare_parameters("limits", [("x", -1), ("y", [1.0, 2.0])])
+        self.pub = self.create_publisher(String, self.TOPIC, SENSOR)
+        self.status = self.create_publisher(String, "~/status", LATCHED)
+        qos = QoSProfile(
+            depth=3, reliability=ReliabilityPolicy.BEST_EFFORT, deadline=Duration(seconds=0.5)
+        )
+        self.create_subscription(
+            std_msgs.msg.String, topic="/cmd", callback=self.on, qos_profile=qos
+        )
+        self.create_subscription(String, "map", self.on, QoSPresetProfiles.SENSOR_DATA.value)
+        self.create_service(Trigger, "reset", self.on)
+        self.create_client(Trigger, "stop")
+        changed = QoSProfile(depth=3)
+        changed.depth = 7
+        self.create_publisher(String, "changed", changed)
+        for i in range(2):
+            self.create_publisher(String, f"out{i}", 10)
+        self.create_publisher(self.kind, "any", 10)
+
+    def on(self, message):
+        pass
+"""
+
+
+def test_the_source_shows_ports_and_parameters_and_what_it_does_not(tmp_path: Path) -> None:
+    (tmp_path / "driver.py").write_text(DRIVER, encoding="utf-8")
+    found, unknown = describe_class("driver:Lidar", tmp_path)
+    text = write_node_type("lidar", found)
+    written = [line for line in text.splitlines() if not line.strip().startswith("#")]
+    assert (
+        "\n".join(written)
+        == """\
+node: lidar
+class: "driver:Lidar"
+parameters:
+  rate: {type: double, default: 10.0, minimum: 0.0, maximum: 50.0, description: Rate.}
+  limits.x: {type: integer, default: -1}
+  limits.y: {type: double_array, default: [1.0, 2.0]}
+  frame: {type: string, default: laser, read_only: true}
+publishers:
+  scan: {type: std_msgs/msg/String, qos: sensor_data}
+  status: {type: std_msgs/msg/String, topic: "~/status", qos: state}
+  changed: {type: std_msgs/msg/String}
+subscriptions:
+  cmd:
+    type: std_msgs/msg/String
+    topic: /cmd
+    qos: {depth: 3, reliability: best_effort, deadline_ms: 500.0}
+  map: {type: std_msgs/msg/String, qos: sensor_data}
+services:
+  reset: {type: std_srvs/srv/Trigger}
+clients:
+  stop: {type: std_srvs/srv/Trigger}"""
+    )
+    assert [item.partition(": ")[2] for item in unknown] == [
+        "the QoS of publisher changed, because of changed",
+        "a publisher, because of f'out{i}'",
+        "a publisher, because of self.kind",
+    ]
+    assert "  # driver.py:34" in text.splitlines()
+    assert "driver" not in sys.modules
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "hint"),
+    [
+        ("driver:Lidr", "module 'driver' has no class 'Lidr'", "did you mean 'Lidar'?"),
+        ("drver:Lidar", "no Python module named 'drver'", "this folder"),
+        ("driver", "'driver' does not name a class", "demo_nodes_py"),
+        ("broken:A", "module 'broken' is not Python", None),
+    ],
+)
+def test_what_is_not_a_class_is_explained(
+    text: str, message: str, hint: str | None, tmp_path: Path
+) -> None:
+    (tmp_path / "driver.py").write_text(DRIVER, encoding="utf-8")
+    (tmp_path / "broken.py").write_text("class A(\n", encoding="utf-8")
+    with pytest.raises(ClassNotFound, match=message) as raised:
+        describe_class(text, tmp_path)
+    assert hint is None or hint in str(raised.value.hint)
