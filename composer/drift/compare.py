@@ -104,7 +104,8 @@ def _of_node(node: Node, observed: ObservedNode, state: str) -> Iterator[Drift]:
             span=node.name.span,
         )
     yield from _of_state(node, observed, state)
-    if state in _WITH_PORTS or observed.state in _WITH_PORTS:
+    is_described = node.ports or node.implementation.in_process
+    if is_described and (state in _WITH_PORTS or observed.state in _WITH_PORTS):
         yield from compare_endpoints(node, observed)
     yield from compare_parameters(node, observed)
 

@@ -16,7 +16,8 @@ _IS_ACTIVE = "/manager/is_active"
 _SOURCES = (PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER)
 #: Parameters that rclpy and rclcpp declare for each node.
 _OF_EVERY_NODE = ("start_type_description_service", "qos_overrides.")
-_EXTERNAL: Mapping[str, Plain] = {"external": True}
+#: The primary states below active.
+_LOW_STATES = ("unconfigured", "inactive")
 #: Of the profiles that look the same in the ROS graph, the one that is most likely meant.
 _LIKELY = (PRESETS["sensor_data"], PRESETS["state"])
 
@@ -48,7 +49,7 @@ def describe_graph(
             FoundNode(
                 name=last,
                 namespace=namespace or "/",
-                keys=_EXTERNAL,
+                keys=_keys(node),
                 ports=ports,
                 parameters=parameters,
                 comments=_node_comments(node),
@@ -166,7 +167,13 @@ def parameter_type(value: Plain) -> str | None:
             return None
 
 
+def _keys(node: ObservedNode) -> dict[str, Plain]:
+    """Return the keys of an external node, which stays in the state that it has."""
+    keys: dict[str, Plain] = {"external": True}
+    if node.state in _LOW_STATES:
+        keys["lifecycle"] = {"autostart": node.state}
+    return keys
+
+
 def _node_comments(node: ObservedNode) -> tuple[str, ...]:
-    if node.state:
-        return (f"A lifecycle node, {node.state} at the time.",)
     return ("A lifecycle node that did not respond.",) if node.state is None else ()

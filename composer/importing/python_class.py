@@ -250,6 +250,7 @@ def _node_name(scope: Scope, call: ast.Call) -> str:
 
 def _settings(scope: Scope, node: ast.expr) -> dict[str, Plain]:
     """Return the keys of a parameter that its descriptor shows."""
+    node = scope.followed(node)
     if not isinstance(node, ast.Call) or scope.full_name(node.func) != _DESCRIPTOR:
         return {}
     settings: dict[str, Plain] = {}
@@ -265,7 +266,7 @@ def _settings(scope: Scope, node: ast.expr) -> dict[str, Plain]:
 
 
 def _range(scope: Scope, node: ast.expr) -> dict[str, Plain]:
-    match node:
+    match scope.followed(node):
         case ast.List(elts=[ast.Call() as call]) if scope.full_name(call.func) in _RANGES:
             given = {item.arg: scope.literal(item.value) for item in call.keywords}
             keys = {"minimum": "from_value", "maximum": "to_value", "step": "step"}

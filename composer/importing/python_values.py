@@ -63,7 +63,7 @@ class Scope:
 
     def literal(self, node: ast.expr) -> Plain:
         """Return the value of an expression. Raises NotLiteral."""
-        found = self._followed(node)
+        found = self.followed(node)
         match found:
             case ast.Constant(value=bool() | int() | float() | str() | None):
                 return found.value  # type: ignore[return-value]
@@ -87,7 +87,7 @@ class Scope:
 
         Raises NotLiteral.
         """
-        parts = self.full_name(self._followed(node)).split(".")
+        parts = self.full_name(self.followed(node)).split(".")
         if len(parts) == 3 and parts[1] in _FOLDERS:
             return "/".join(parts)
         raise NotLiteral(ast.unparse(node)[:80])
@@ -97,7 +97,7 @@ class Scope:
         preset = _QOS_NAMES.get(self.full_name(node))
         if preset is not None:
             return PRESETS[preset]
-        found = self._followed(node)
+        found = self.followed(node)
         match found:
             case ast.Constant(value=int() as depth) if depth is not True and depth is not False:
                 return QosProfile(depth=depth)
@@ -123,14 +123,14 @@ class Scope:
         return QosProfile(**values)  # type: ignore[arg-type]
 
     def _policy(self, name: str, node: ast.expr) -> object:
-        value = dotted(self._followed(node)).rpartition(".")[2].lower()
+        value = dotted(self.followed(node)).rpartition(".")[2].lower()
         kind = _POLICIES[name]
         if value not in {item.value for item in kind}:
             raise NotLiteral(ast.unparse(node)[:80])
         return kind(value)
 
     def _duration_ms(self, node: ast.expr) -> float:
-        found = self._followed(node)
+        found = self.followed(node)
         if isinstance(found, ast.Call) and self.full_name(found.func) == "rclpy.duration.Duration":
             given = {item.arg: self.literal(item.value) for item in found.keywords if item.arg}
             numbers = [given.get(name, 0) for name in ("seconds", "nanoseconds")]
@@ -139,7 +139,7 @@ class Scope:
                 return float(seconds) * 1e3 + float(nanoseconds) * 1e-6  # type: ignore[arg-type]
         raise NotLiteral(ast.unparse(node)[:80])
 
-    def _followed(self, node: ast.expr) -> ast.expr:
+    def followed(self, node: ast.expr) -> ast.expr:
         """Return the expression that a name stands for, if it is assigned once."""
         for _ in range(_MAXIMUM_STEPS):
             assigned = self._assigned(dotted(node))

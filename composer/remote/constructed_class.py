@@ -21,9 +21,9 @@ from rclpy.qos import QoSProfile
 from composer.model import BehaviorReference
 from composer.project import Project
 from composer.remote.parameter_descriptions import settings_of
-from composer.remote.parameters import description_of
 from composer.runtime.node.behavior_loader import behavior_class
 from composer.runtime.process.environment import ROS_ARGUMENTS, prepare_environment
+from composer.runtime.ros.parameter_values import description
 from composer.source import Located, SourceFile, Span
 
 #: Of names below it, the class has given the relative form.
@@ -67,7 +67,7 @@ def _description(node: Node) -> dict[str, Any]:
         "parameters": {
             name: {
                 "value": _plain(node.get_parameter(name)),
-                **settings_of(description_of(name, node.describe_parameter(name))),
+                **settings_of(description(name, node.describe_parameter(name))),
             }
             for name in names
         },

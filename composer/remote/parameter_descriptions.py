@@ -7,9 +7,10 @@ from contextlib import closing
 
 from rcl_interfaces.srv import DescribeParameters
 
-from composer.remote.parameters import ParameterDescription, description_of
 from composer.remote.requests import ServiceCaller
 from composer.remote.session import Deadline, Session
+from composer.runtime.ros.parameter_description import ParameterDescription
+from composer.runtime.ros.parameter_values import description
 from composer.tree import Plain
 
 #: How long to wait for the responses of nodes; the parameters of later ones have no description.
@@ -45,7 +46,7 @@ def parameter_settings(
     for service, (node, listed) in requests.items():
         response = responses[service]
         if response is not None and len(response.descriptors) == len(listed):
-            descriptions = map(description_of, listed, response.descriptors)
+            descriptions = map(description, listed, response.descriptors)
             found[node] = {item.name: settings_of(item) for item in descriptions}
     return found
 

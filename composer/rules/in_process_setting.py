@@ -87,7 +87,7 @@ def _of_port(port: Port) -> Iterator[tuple[str, Span]]:
     for event, reaction in port.reactions:
         yield f"the reaction of {port.kind} '{port.name}' to its {event}", reaction.span
     for name, located in (("budget_ms", port.budget_ms), ("timeout_ms", port.timeout_ms)):
-        if located is not None:
+        if located is not None and located.span != port.span:  # that of the default
             yield f"'{name}'", located.span
     for name, is_set in (("reentrant", port.reentrant), ("always_on", port.always_on)):
         if is_set:

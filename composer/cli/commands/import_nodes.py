@@ -75,8 +75,8 @@ def live(
 
     For each node: its name and namespace, topics, services and actions with types and QoS, and its
     parameters with their descriptions. The nodes are external: 'compose run' waits for them and
-    observes them, but does not start them. Replace 'external' by 'class' or 'executable' to start
-    a node with the system.
+    observes them, but does not start or move them. Replace 'external' by 'class' or 'executable' to
+    start a node with the system.
 
     The ROS graph does not show the depth of queues. It is that of the most similar QoS preset.
     """

@@ -87,11 +87,11 @@ nodes:
       tf: {type: std_msgs/msg/String, topic: /tf, qos: {deadline_ms: 5.0}, external: true}
       tf_2: {type: std_msgs/msg/String, topic: /b/tf, qos: command, external: true}
     services: {reset: {type: std_srvs/srv/Trigger, external: true}}
-  # A lifecycle node, inactive at the time.
   b_talker:
     name: talker
     namespace: /b
     external: true
+    lifecycle: {autostart: inactive}
     subscriptions: {chatter: {type: std_msgs/msg/String, topic: /a/chatter, qos: sensor_data}}
 """
     )

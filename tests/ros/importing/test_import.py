@@ -1,0 +1,136 @@
+"""``compose import`` of nodes that were written without the composer."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.ros.support.commands import PROGRAMS, compose, errors, hand_written, output_of, running
+
+THREE = "hand_written_three.py"
+
+
+def test_live_nodes_are_described_so_that_nothing_differs(tmp_path: Path) -> None:
+    written = tmp_path / "robot.yaml"
+    with hand_written(THREE):
+        done = compose("import", "live", "--system", "robot", "-o", written)
+        assert (done.returncode, done.stdout) == (0, ""), done.stderr
+        assert done.stderr == f"wrote {written}\n"
+        assert output_of("validate", written) == ""
+        assert compose("diff", written).stderr == "robot: runs as declared\n"
+        (text,) = errors(("import", "live", "-o", str(written)))
+        assert "exists already" in text
+        with running(tmp_path / "log.txt", str(written)) as run:
+            run.wait_for("2 of 3 nodes active")
+            assert compose("diff", written).stderr == "robot: runs as declared\n"
+            # The other way around: what runs now is described by the same file.
+            assert output_of("import", "live", "--system", "robot") == written.read_text()
+            assert run.stop()[0] == 0
+        only = output_of("import", "live", "--node", "/base/*")
+        assert "/base" in only
+        assert "lidar" not in only
+        (text,) = errors(("import", "live", "--node", "nothing"))
+        assert "no node matches nothing" in text
+    lines = written.read_text().splitlines()
+    assert "    lifecycle: {autostart: unconfigured}" in lines
+    assert "      wheels.count: {type: integer, default: 4}" in lines
+    assert "      scan: {type: std_msgs/msg/String, qos: sensor_data}" in lines
+    assert any(line.startswith("    action_servers: {navigate: ") for line in lines)
+
+
+def test_a_constructed_class_has_what_its_source_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(PROGRAMS)
+    text = output_of("import", "class", "hand_written_three:Lidar", "--construct")
+    source = output_of("import", "class", "hand_written_three:Lidar")
+    assert yaml.safe_load(text) == yaml.safe_load(source)
+    path = tmp_path / "nodes" / "lidar.yaml"
+    assert compose("import", "class", "hand_written_three:Lidar", "-o", path).returncode == 0
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "nodes" / THREE).write_text((PROGRAMS / THREE).read_text())
+    assert output_of("validate", path) == ""
+
+
+def test_a_constructor_that_fails_or_waits_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.py").write_text(
+        "import threading\nfrom rclpy.node import Node\n"
+        "class Fails(Node):\n    def __init__(self):\n        raise ValueError('no map')\n"
+        "class Waits(Node):\n    def __init__(self):\n        threading.Event().wait()\n"
+        "class Other:\n    pass\n"
+    )
+    fails, waits, other = errors(
+        ("import", "class", "bad:Fails", "--construct"),
+        ("import", "class", "bad:Waits", "--construct", "--timeout", "3"),
+        ("import", "class", "bad:Other", "--construct"),
+    )
+    assert fails.startswith("compose: ValueError: no map\n")
+    assert waits.startswith("compose: it did not end within 3 s\n")
+    assert other.startswith("compose: TypeError: bad:Other is not derived from rclpy.node.Node\n")
+
+
+LAUNCH = """\
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, GroupAction
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node, PushRosNamespace, SetParameter
+
+
+def generate_launch_description():
+    return LaunchDescription([
+        DeclareLaunchArgument("sim", default_value="false"),
+        GroupAction([
+            PushRosNamespace("a"),
+            SetParameter("use_sim_time", True),
+            Node(package="demo", executable="talker", name="talker",
+                 parameters=[{"rate": 5.0}, "PARAMETERS"], remappings=[("chatter", "/chat")]),
+        ]),
+        Node(package="demo", executable="sim", name="sim",
+             condition=IfCondition(LaunchConfiguration("sim"))),
+        ExecuteProcess(cmd=["true"]),
+    ])
+"""
+
+
+@pytest.mark.skipif(find_spec("launch_ros") is None, reason="launch_ros is not installed")
+def test_the_nodes_of_a_launch_file_are_described(tmp_path: Path) -> None:
+    parameters = tmp_path / "parameters.yaml"
+    parameters.write_text(
+        "/a/talker: {ros__parameters: {rate: 7.5}}\n/**: {ros__parameters: {x: 1}}\n"
+    )
+    file = tmp_path / "robot.launch.py"
+    file.write_text(LAUNCH.replace("PARAMETERS", str(parameters)))
+    done = compose("import", "launch", file)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == "left out:\n  process: true\n"
+    assert (
+        done.stdout.partition("nodes:\n")[2]
+        == """\
+  talker:
+    namespace: /a
+    executable: {package: demo, name: talker}
+    parameters:
+      use_sim_time: {type: bool, default: true}
+      rate: {type: double, default: 7.5}
+      x: {type: integer, default: 1}
+    remappings: {chatter: /chat}
+"""
+    )
+    assert "\n  sim: {executable: " in output_of("import", "launch", file, "sim:=true")
+
+
+@pytest.mark.skipif(find_spec("launch_ros") is not None, reason="launch_ros is installed")
+def test_a_missing_launch_is_reported(tmp_path: Path) -> None:
+    file = tmp_path / "robot.launch.py"
+    file.write_text(LAUNCH)
+    (text,) = errors(("import", "launch", str(file)))
+    assert "needs launch, which is not installed in this Python" in text
+    assert sys.modules.get("launch") is None
