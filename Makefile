@@ -109,7 +109,7 @@ profile: $(READY) $(STAMPS)/tools
 	@$(BIN)/python -c 'import os, sys; os.execv(sys.argv[1], sys.argv[1:])' \
 	  $(BIN)/py-spy record --threads --rate 200 --output build/profile.svg -- \
 	  $(BIN)/compose run $(SYSTEM) --for $(PROFILE_SECONDS)
-	@echo "==> build/profile.svg: a flame graph, one tower per thread; open it in a browser"
+	@echo "==> build/profile.svg: a flame graph with one stack per thread; open it in a browser"
 
 # atheris guides the search by coverage; without a wheel for this Python the search is random.
 fuzz: $(STAMPS)/composer $(STAMPS)/dev
