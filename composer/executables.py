@@ -11,8 +11,11 @@ import os
 import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.metadata import Distribution, PackageNotFoundError, distribution
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from importlib.metadata import Distribution
 
 _INDEX = Path("share", "ament_index", "resource_index", "packages")
 _RUN = "import sys; from {module} import {function} as main; sys.exit(main())"
@@ -83,6 +86,8 @@ def _libraries(package: str, environment: Mapping[str, str]) -> Iterator[Path]:
 
 
 def _distribution(package: str) -> Distribution | None:
+    from importlib.metadata import PackageNotFoundError, distribution  # noqa: PLC0415 (slow)
+
     for name in (package, f"ros-{package}"):
         try:
             return distribution(name.replace("_", "-"))

@@ -235,5 +235,16 @@ def test_help_and_version_import_nothing_heavy() -> None:
     assert done.stderr == "set()\n"
 
 
+def test_validate_imports_only_what_it_needs() -> None:
+    code = (
+        "import sys; from composer.cli import main; main(['validate', 'systems/pipeline.yaml']);"
+        "heavy = {'rclpy', 'jsonschema', 'importlib.metadata', 'importlib.resources', 'email',"
+        " 'socket', 'sysconfig', 'asyncio', 'rich', 'composer.runtime', 'composer.graph'};"
+        "print(heavy & set(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr == "1 file checked: no problems found\nset()\n"
+
+
 def test_examples_are_printed_verbatim() -> None:
     assert examples("compose a", "compose b") == "\b\nExamples:\n  compose a\n  compose b"
