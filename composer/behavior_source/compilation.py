@@ -6,6 +6,7 @@ import ast
 import warnings
 
 from composer.behavior_source.spans import characters
+from composer.behavior_source.traversal import children, walk
 from composer.source import SourceFile, Span
 
 #: Maximum number of syntax nodes that the compiler generates code for.
@@ -61,11 +62,11 @@ def _compiled_nodes(tree: ast.Module) -> int:
         total += copies
         if isinstance(node, ast.Try | ast.TryStar) and node.finalbody:
             guarded = [*node.body, *node.handlers, *node.orelse]
-            exits = sum(isinstance(inner, _EXITS) for item in guarded for inner in ast.walk(item))
+            exits = sum(isinstance(inner, _EXITS) for inner in walk(guarded))
             pending.extend((item, copies) for item in guarded)
             pending.extend((item, copies * (2 + exits)) for item in node.finalbody)
         else:
-            pending.extend((child, copies) for child in ast.iter_child_nodes(node))
+            pending += [(child, copies) for child in children(node)]
     return total
 
 

@@ -4,21 +4,30 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Sequence
+from functools import cache
 
-#: Nodes without a location and without code: ``ast.Load``, ``ast.Add`` and the like.
-_MARKS = (ast.expr_context, ast.operator, ast.boolop, ast.unaryop, ast.cmpop)
+#: Fields with plain values, and those with what has no location: contexts and operators.
+_OTHER_FIELDS = frozenset(
+    {"arg", "asname", "attr", "conversion", "ctx", "id", "is_async", "kind", "level", "module"}
+    | {"op", "ops", "rest", "simple", "type_comment"}
+)
 
 
 def children(node: ast.AST) -> list[ast.AST]:
     """Return the nodes directly below ``node``, in source order, without contexts and operators."""
     found: list[ast.AST] = []
-    for name in node._fields:
+    for name in _fields(node.__class__):  # type: ignore[arg-type]  # a class is hashable
         value = getattr(node, name, None)
         if isinstance(value, list):
             found += [item for item in value if isinstance(item, ast.AST)]
-        elif isinstance(value, ast.AST) and not isinstance(value, _MARKS):
+        elif isinstance(value, ast.AST):
             found.append(value)
     return found
+
+
+@cache
+def _fields(kind: type[ast.AST]) -> tuple[str, ...]:
+    return tuple(name for name in kind._fields if name not in _OTHER_FIELDS)
 
 
 def walk(body: Sequence[ast.AST], *, closed: tuple[type[ast.AST], ...] = ()) -> Iterator[ast.AST]:

@@ -17,6 +17,9 @@ _MODULE_NAMES = frozenset(
 #: Functions with which a name can be defined without a statement that shows it.
 _DYNAMIC = frozenset({"exec", "eval", "globals", "locals", "vars"})
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+_DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+#: Nodes with scopes or annotations.
+_SPECIAL = (*_DEFINITIONS, ast.Lambda, *_COMPREHENSIONS, ast.AnnAssign)
 
 
 @dataclass(slots=True)
@@ -53,16 +56,18 @@ def _uses(
         if isinstance(node, ast.Name):
             if isinstance(node.ctx, ast.Load) and not any(node.id in one.names for one in scopes):
                 yield node, frozenset().union(*(scope.names for scope in scopes))
-            continue
-        pending.extend(list(_children(node, scopes))[::-1])
-        if with_annotations:
-            pending.extend([(item, scopes) for item in _annotations(node, scopes)][::-1])
+        elif isinstance(node, _SPECIAL):
+            pending += [*_evaluated(node, scopes)][::-1]
+            if with_annotations:
+                pending += [(item, scopes) for item in _annotations(node, scopes)][::-1]
+        else:
+            pending += [(item, scopes) for item in children(node)[::-1]]
 
 
-def _children(
+def _evaluated(
     node: ast.AST, scopes: tuple[_Scope, ...]
 ) -> Iterator[tuple[ast.AST, tuple[_Scope, ...]]]:
-    """Yield the parts of a node that are evaluated, with the scopes that each of them sees."""
+    """Yield the parts of a special node that are evaluated, with the scopes that each sees."""
     visible = tuple(scope for scope in scopes if not scope.is_class)  # methods do not see classes
     match node:
         case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.Lambda():
@@ -87,8 +92,6 @@ def _children(
             yield node.target, scopes
             if node.value is not None:
                 yield node.value, scopes
-        case _:
-            yield from ((item, scopes) for item in children(node))
 
 
 def _annotations(node: ast.AST, scopes: tuple[_Scope, ...]) -> Iterator[ast.expr]:
