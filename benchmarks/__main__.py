@@ -39,6 +39,7 @@ BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
     "large": ("start-up, memory and shutdown of N idle nodes", large_systems.measure),
     "timers": ("jitter of a timer", systems.timers),
     "calls": ("services and actions", systems.calls),
+    "hosted": ("a talker and a listener of unmodified rclpy classes", systems.hosted),
     "external": ("messages between processes through DDS", systems.external),
     "others": (
         "the ring with Zenoh, ezmsg and dora, which are installed on the first run",

@@ -135,6 +135,20 @@ def calls(*, long: bool) -> list[Row]:
     return measured
 
 
+def hosted(*, long: bool) -> list[Row]:
+    """Measure a talker and a listener of rclpy node classes, hosted and on rclpy's executors."""
+    rounds, seconds = (7, 3.0) if long else (3, 1.0)
+    measured: list[Row] = []
+    for message, rate_hz in (("String", 100.0), ("String", 1000.0), ("LaserScan", 100.0)):
+        case = Case("pair", 2, seconds, rounds, rate_hz, message)
+        turns = run_rounds((COMPOSED, EVENTS, SINGLE), case)
+        name = f"hosted pair, {message} {rate_hz:g} Hz"
+        measured += rows(name, CPU, turns, cpu_us)
+        measured += rows(f"{name}, p50", "latency us", turns, _took_us(0.5))
+        measured += rows(name, "% lost", turns, _lost(case))
+    return measured
+
+
 def external(*, long: bool) -> list[Row]:
     """Measure the CPU of one of two processes that exchange a single message."""
     rounds, seconds = (9, 3.0) if long else (5, 2.0)

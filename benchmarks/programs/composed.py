@@ -12,9 +12,9 @@ from typing import Any
 import yaml
 
 # Imported before the measurement starts, as in the hand-written program.
-from benchmarks.programs import behaviors
+from benchmarks.programs import behaviors, node_classes
 from benchmarks.programs.payloads import TYPES
-from benchmarks.programs.task import Place, Task, places, task_from_arguments
+from benchmarks.programs.task import Place, Task, places, task_from_arguments, topic
 from benchmarks.programs.work import KICK_PERIOD_S, measure, print_result
 from composer.loading import load
 from composer.plan import bring_up, tear_down
@@ -28,6 +28,8 @@ _GO = {"go": {"type": "composer_interfaces/action/Navigate", "action": "/go"}}
 
 def system_tree(task: Task) -> dict[str, Any]:
     """Return the content of the system file."""
+    if task.shape == "pair":
+        return _pair(task)
     return {
         "system": "measured" if task.part is None else f"measured_{task.part}",
         "executors": {"chosen": {"kind": task.executor}},
@@ -39,6 +41,7 @@ def main() -> None:
     """Bring the system up, measure, and print the result."""
     task = task_from_arguments()
     behaviors.TASKS.append(task)
+    node_classes.TASKS.append(task)
     up = threading.Event()
 
     def on_event(event: Event) -> None:
@@ -60,6 +63,19 @@ def main() -> None:
             sys.exit("the system did not come up")
         figures = measure(task, started_s)
     print_result(figures)
+
+
+def _pair(task: Task) -> dict[str, Any]:
+    """Return a system of two hosted classes."""
+    port = {"type": TYPES[task.message], "topic": topic(1)}
+    module = node_classes.__name__
+    return {
+        "system": "measured",
+        "nodes": {
+            "talker": {"class": f"{module}:Talker", "publishers": {"output": port}},
+            "listener": {"class": f"{module}:Listener", "subscriptions": {"input": port}},
+        },
+    }
 
 
 def _node(task: Task, place: Place) -> dict[str, Any]:

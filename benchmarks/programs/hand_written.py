@@ -15,6 +15,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 
+from benchmarks.programs import node_classes
 from benchmarks.programs.payloads import CLASSES, make
 from benchmarks.programs.task import Place, Task, places, task_from_arguments
 from benchmarks.programs.work import COUNTS, measure, needs_kick, print_result
@@ -169,6 +170,22 @@ PARTS = {
 }
 
 
+def make_lifecycle_nodes(task: Task) -> list[Any]:
+    """Return the nodes of a task, active."""
+    nodes = [PARTS.get((task.shape, place.index), Relay)(task, place) for place in places(task)]
+    for node in nodes:
+        node.trigger_configure()
+    for node in reversed(nodes):
+        node.trigger_activate()
+    return nodes
+
+
+def make_pair(task: Task) -> list[Any]:
+    """Return the talker and the listener."""
+    node_classes.TASKS.append(task)
+    return [node_classes.Talker(), node_classes.Listener()]
+
+
 def spin(executor: Any, task: Task) -> None:
     """Spin. EventsExecutor.spin() does not wake up for timers and external messages."""
     can_spin = task.shape == "ring" and task.part is None
@@ -183,16 +200,12 @@ def main() -> None:
     task = task_from_arguments()
     started_s = time.perf_counter()
     rclpy.init()
-    nodes = [PARTS.get((task.shape, place.index), Relay)(task, place) for place in places(task)]
-    for node in nodes:
-        node.trigger_configure()
-    for node in reversed(nodes):
-        node.trigger_activate()
+    nodes = make_pair(task) if task.shape == "pair" else make_lifecycle_nodes(task)
     executor = EXECUTORS[task.executor]()
     for node in nodes:
         executor.add_node(node)
     threading.Thread(target=spin, args=(executor, task), daemon=True).start()
-    print_result(measure(task, started_s, nodes[0].kick))
+    print_result(measure(task, started_s, getattr(nodes[0], "kick", lambda: None)))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
-SHAPES = ("ring", "chain", "star", "hop", "timer", "service", "action")
+SHAPES = ("ring", "chain", "star", "hop", "timer", "service", "action", "pair")
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +16,8 @@ class Task:
     ``shape``: in a *ring*, one message circulates; in a *chain* and a *star*, the first node
     publishes at ``rate_hz`` and the others forward or receive the messages; in a *hop*, only the
     second node receives them; with *timer*, the first node has a timer; with *service* and
-    *action*, the first node calls the second. All other nodes are idle. ``part`` is the index of
+    *action*, the first node calls the second; a *pair* is a talker and a listener of ordinary rclpy
+    node classes. All other nodes are idle. ``part`` is the index of
     the node of a ring that this process runs, if each node has a process. ``seconds`` is ignored
     with ``until_stopped``: the task then runs until a line arrives on standard input.
     """
@@ -34,7 +35,7 @@ class Task:
     @property
     def is_timed(self) -> bool:
         """Whether the task has a fixed rate."""
-        return self.shape in ("chain", "star", "hop", "timer")
+        return self.shape in ("chain", "star", "hop", "timer", "pair")
 
 
 @dataclass(frozen=True, slots=True)
