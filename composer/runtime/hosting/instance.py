@@ -7,7 +7,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rclpy.callback_groups import CallbackGroup, ReentrantCallbackGroup
+from rclpy.callback_groups import (
+    CallbackGroup,
+    MutuallyExclusiveCallbackGroup,
+    ReentrantCallbackGroup,
+)
 from rclpy.executors import Executor
 from rclpy.parameter import Parameter
 from rclpy.service import Service
@@ -135,6 +139,11 @@ class Instance:
         if group is None or group is self.node.default_callback_group:
             return self.context
         if group not in self._contexts:
+            if not isinstance(group, MutuallyExclusiveCallbackGroup | ReentrantCallbackGroup):
+                self.context.log.warn(
+                    f"callback group {type(group).__name__} of the class is not asked: its"
+                    " callbacks exclude each other"
+                )
             strand = InlineStrand() if self.is_reentrant(group) else self._new_strand()
             self._contexts[group] = replace(self.context, strand=strand, group=group)
         return self._contexts[group]
