@@ -13,18 +13,19 @@ UNSAFE = (
     "\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069"
     "\ud800-\udfff\ufeff\ufff9-\ufffb\ufffe\uffff\U000e0000-\U000e007f"
 )
-_UNSAFE_IN_LINES = re.compile(f"[{UNSAFE}\r]")
+#: Matches a character that is unsafe in a text of several lines.
+UNSAFE_IN_LINES = re.compile(f"[{UNSAFE}\r]")
 _UNSAFE_IN_LINE = re.compile(f"[{UNSAFE}\r\n\t]")
 
 
 def is_safe(text: str) -> bool:
     """Return whether ``text`` has no unsafe characters; line feeds and tabs are safe."""
-    return _UNSAFE_IN_LINES.search(text) is None
+    return UNSAFE_IN_LINES.search(text) is None
 
 
 def escape_lines(text: str) -> str:
     """Return ``text`` with unsafe characters escaped as in Python, but not line feeds and tabs."""
-    return _UNSAFE_IN_LINES.sub(_escape, text)
+    return UNSAFE_IN_LINES.sub(_escape, text)
 
 
 def escape_line(text: str) -> str:
@@ -34,7 +35,7 @@ def escape_line(text: str) -> str:
 
 def escape_json(text: str) -> str:
     """Return the JSON ``text`` with the unsafe characters of its strings escaped as in JSON."""
-    return _UNSAFE_IN_LINES.sub(lambda found: json.dumps(found[0])[1:-1], text)
+    return UNSAFE_IN_LINES.sub(lambda found: json.dumps(found[0])[1:-1], text)
 
 
 def _escape(found: re.Match[str]) -> str:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 import unicodedata
 
-from composer.characters import UNSAFE
+from composer.characters import UNSAFE, UNSAFE_IN_LINES
 from composer.diagnostics import Diagnostic
 from composer.document.rules import FORBIDDEN_CHARACTER
 from composer.source import SourceFile, Span
 
 _FORBIDDEN_IN_TEXT = re.compile(f"[{UNSAFE}]")
-_FORBIDDEN_IN_VALUE = re.compile(f"[{UNSAFE}\r]")
 
 
 def check_text(source: SourceFile) -> list[Diagnostic]:
@@ -31,7 +30,7 @@ def check_text(source: SourceFile) -> list[Diagnostic]:
 
 def check_value(value: str, span: Span) -> tuple[str, list[Diagnostic]]:
     """Return ``value`` without forbidden characters from escapes, and a diagnostic if any."""
-    match = _FORBIDDEN_IN_VALUE.search(value)
+    match = UNSAFE_IN_LINES.search(value)
     if match is None:
         return value, []
     message = f"this text contains {_character(match[0])}, which is not allowed"
@@ -41,7 +40,7 @@ def check_value(value: str, span: Span) -> tuple[str, list[Diagnostic]]:
         span,
         hint="remove the escape; \\t and \\n are the only allowed control characters",
     )
-    return _FORBIDDEN_IN_VALUE.sub("", value), [diagnostic]
+    return UNSAFE_IN_LINES.sub("", value), [diagnostic]
 
 
 def _character(character: str) -> str:
