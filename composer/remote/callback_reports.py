@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray
 
+from composer.fast_dataclass import dataclass
 from composer.remote.system_reports import invalid_report
 from composer.report.display import visible
 from composer.runtime.metrics.diagnostics import from_message

@@ -6,13 +6,13 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 from action_msgs.msg import GoalStatus
 from rclpy.action.client import ActionClient, ClientGoalHandle
 from rclpy.task import Future
 
+from composer.fast_dataclass import dataclass
 from composer.remote.graph_names import type_mismatch_hint
 from composer.remote.requests import ServiceCaller
 from composer.remote.session import Deadline, NoResponseError, RosError, Session

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TypeVar
 
+from composer.fast_dataclass import dataclass
 from composer.names import is_hidden
 from composer.remote.name_matching import find_node, full_name, not_found_error
 from composer.remote.session import Deadline, RosError, Session

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -17,6 +16,7 @@ from lifecycle_msgs.msg import Transition as TransitionMessage
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 from rclpy.type_support import check_is_valid_srv_type
 
+from composer.fast_dataclass import dataclass
 from composer.remote.name_matching import check_all_respond, find_node, not_found_error
 from composer.remote.proxies import LIFECYCLE, Proxies
 from composer.remote.requests import (

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from functools import partial
 
+from composer.fast_dataclass import dataclass
 from composer.remote.dependents import active_dependents, inactive_dependents, lowered
 from composer.remote.lifecycle import CompletedTransition, LifecycleClient
 from composer.remote.session import Deadline, RosError, Session

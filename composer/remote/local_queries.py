@@ -7,9 +7,9 @@ graph then, which also produces the errors.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from composer.fast_dataclass import dataclass
 from composer.names import is_hidden
 from composer.remote.local_graph import RESPONSE_S, local_view
 from composer.remote.system_reports import InvalidReportError, SystemReport, system_report

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from composer.fast_dataclass import dataclass
 from composer.remote.lifecycle import LifecycleClient
 from composer.remote.session import Deadline, Session
 from composer.remote.system_reports import SystemReport

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import statistics
 from collections import deque
-from dataclasses import dataclass
 from itertools import pairwise
+
+from composer.fast_dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,9 +6,9 @@ The messages may be those of another version, or of any node that publishes on t
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from composer.fast_dataclass import dataclass
 from composer.report.display import visible
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.metrics.numbers import finite

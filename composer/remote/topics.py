@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Self
 
 from rclpy.duration import Duration
 
+from composer.fast_dataclass import dataclass
 from composer.qos import Durability, QosProfile, Reliability
 from composer.remote.graph_names import GraphNames, type_mismatch_hint
 from composer.remote.name_matching import full_name
