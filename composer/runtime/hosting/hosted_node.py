@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, cast
 
@@ -14,8 +15,10 @@ from rclpy.parameter import Parameter as RosParameter
 
 from composer.behavior import TransitionFailed
 from composer.model import USE_SIM_TIME, BehaviorReference, HostedClass, LogLevel, Node
+from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.strand import InlineStrand
 from composer.runtime.hosting.adopted_node import adopted, is_managed, shared_class
 from composer.runtime.hosting.declared_ports import DeclaredPorts
 from composer.runtime.hosting.dispatch import install
@@ -91,6 +94,10 @@ class HostedNode(LocalNode):
 
     def _is_serial(self, _options: NodeOptions) -> bool:
         return True  # a callback may wait while the loop goes on
+
+    def _context_of_transitions(self) -> NodeContext:
+        # Not on the strand of the callbacks: one of them may wait for what a transition ends.
+        return replace(self._context, strand=InlineStrand())
 
     async def _configure(self) -> None:
         self._context.group = self._always_on_context.group = MutuallyExclusiveCallbackGroup()

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from composer.behavior import CallCancelled
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.stacks import calls_user_code, is_internal, stacks_of
 from composer.runtime.executors.strand import in_steps
@@ -50,6 +51,11 @@ class UserFunction:
             result = self._function(*arguments, **options)
         except SystemExit:
             self._instance.finish("it raised SystemExit")
+            return None
+        except CallCancelled as error:  # it waited for a response when the node left *active*
+            if self._context.gate.incoming:
+                raise
+            self._context.log.debug(f"{self.__name__}: {error}")
             return None
         finally:
             _CURRENT.instance = before

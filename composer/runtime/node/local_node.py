@@ -139,7 +139,7 @@ class LocalNode(ABC):
             ParameterServices(self._ros, NodeParameterStore(self._ros), self._context.log.warn)
         self.loop.add_node(self._ros)
         self.lifecycle = Lifecycle(
-            self._context,
+            self._context_of_transitions(),
             self,
             timeout_s=options.transition_timeout_s,
             services=offers.lifecycle_services,
@@ -220,6 +220,10 @@ class LocalNode(ABC):
     def _is_serial(self, options: NodeOptions) -> bool:
         """Return whether a strand has to keep callbacks apart, because the loop does not."""
         return options.parallel
+
+    def _context_of_transitions(self) -> NodeContext:
+        """Return the context whose strand runs transitions."""
+        return self._context
 
     @abstractmethod
     async def _configure(self) -> None:

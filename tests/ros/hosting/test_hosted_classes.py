@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Int64, String
 from std_srvs.srv import SetBool, Trigger
 
-from tests.ros.support.in_process import Peer, running, wait_until
+from tests.ros.support.in_process import Peer, end_limit_s, running, wait_until
 from tests.ros.support.node_classes import LATCHED
 
 CLASSES = "tests.ros.support.node_classes"
@@ -166,6 +167,24 @@ def test_a_callback_may_block_until_another_node_responds(
         assert caller.overlaps == 0
         counted = system.summary("/caller")
     assert counted.errors == 0
+
+
+def test_a_callback_that_waits_for_a_response_is_released_when_its_node_is_deactivated(
+    tmp_path: Path,
+) -> None:
+    text = f'system: alone\nnodes: {{caller: {{class: "{CLASSES}:BlockingCaller"}}}}'
+    with running(text, tmp_path) as system:
+        caller = system.node("caller").instance
+        wait_until(lambda: caller.busy)
+        system.change("caller", "deactivate")
+        wait_until(lambda: not system.node("caller").loop.busy_threads())
+        system.change("caller", "activate")
+        wait_until(lambda: caller.busy)
+        began_s = time.monotonic()
+        outcome = system.stop()
+        assert time.monotonic() - began_s < end_limit_s()
+    assert outcome.nodes[0].errors == 0
+    assert outcome.exit_code == 0
 
 
 def test_coroutines_await_clients(tmp_path: Path, peer: Peer) -> None:

@@ -325,6 +325,8 @@ class Configured(Node):
     def __init__(self) -> None:
         super().__init__("configured", automatically_declare_parameters_from_overrides=True)
         self.create_publisher(String, "scan", 10)
+        self.create_publisher(String, "~/private", 10)
+        self.create_publisher(String, "other", 10)
         self.create_service(Trigger, "start", lambda _, response: response)
         self.add_on_set_parameters_callback(self.on_set)
 

@@ -1,0 +1,105 @@
+"""Names and parameters reach a class exactly as ``ros2 run --ros-args`` would set them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from rcl_interfaces.srv import GetParameters, ListParameters
+from rclpy.parameter import parameter_value_to_python
+
+from tests.ros.support.in_process import Peer, running, wait_until
+
+CLASSES = "tests.ros.support.node_classes"
+PROGRAM = f"""
+import rclpy
+from {CLASSES} import Configured
+rclpy.init()
+rclpy.spin(Configured())
+"""
+ARGUMENTS = [
+    "--ros-args",
+    "-r",
+    "__node:=robot_node",
+    "-r",
+    "__ns:=/fleet/one",
+    "-r",
+    "scan:=/all/scan",
+    "-r",
+    "start:=begin",
+    "-r",
+    "~/private:=open",
+    "-p",
+    "rate:=2.5",
+    "-p",
+    "count:=3",
+    "-p",
+    "label:=front",
+    "-p",
+    "enabled:=true",
+    "-p",
+    "gains:=[1.0,2.5]",
+    "-p",
+    'names:=["a","b"]',
+    "-p",
+    "use_sim_time:=true",
+]
+SYSTEM = f"""
+system: one
+namespace: /fleet/one
+nodes:
+  robot_node:
+    class: {CLASSES}:Configured
+    remappings: {{scan: /all/scan, start: begin, ~/private: open}}
+    parameters:
+      rate: {{type: double, default: 2.5}}
+      count: {{type: integer, default: 3}}
+      label: {{type: string, default: front}}
+      enabled: {{type: bool, default: true}}
+      gains: {{type: double_array, default: [1, 2.5]}}
+      names: {{type: string_array, default: [a, b]}}
+      use_sim_time: {{type: bool, default: true}}
+"""
+NAME, NAMESPACE = "robot_node", "/fleet/one"
+#: The lifecycle of the composer, which a plain node does not have.
+LIFECYCLE = ("change_state", "get_state", "available", "transition", "/rosout", "/clock")
+
+
+def described(peer: Peer) -> dict[str, Any]:
+    """Return what other nodes see of the node."""
+    node = peer.node
+    full_name = f"{NAMESPACE}/{NAME}"
+    wait_until(lambda: node.count_services(f"{full_name}/list_parameters") == 1)
+    wait_until(lambda: (NAME, NAMESPACE) in node.get_node_names_and_namespaces())
+    wait_until(lambda: node.count_publishers("/all/scan") == 1)
+    listed = peer.call(ListParameters, f"{full_name}/list_parameters").result.names
+    names = sorted(name for name in listed if name != "start_type_description_service")
+    values = peer.call(
+        GetParameters, f"{full_name}/get_parameters", GetParameters.Request(names=names)
+    ).values
+    return {
+        "parameters": dict(zip(names, map(parameter_value_to_python, values), strict=True)),
+        "publishers": shown(node.get_publisher_names_and_types_by_node(NAME, NAMESPACE)),
+        "services": shown(node.get_service_names_and_types_by_node(NAME, NAMESPACE)),
+    }
+
+
+def shown(found: list[tuple[str, list[str]]]) -> list[tuple[str, str]]:
+    return sorted(
+        (name, kinds[0]) for name, kinds in found if not any(part in name for part in LIFECYCLE)
+    )
+
+
+def test_a_class_has_the_names_and_parameters_of_ros2_run(tmp_path: Path, peer: Peer) -> None:
+    with subprocess.Popen([sys.executable, "-c", PROGRAM, *ARGUMENTS]) as program:
+        try:
+            expected = described(peer)
+        finally:
+            program.terminate()
+    wait_until(lambda: peer.node.count_publishers("/all/scan") == 0)
+    assert expected["parameters"]["gains"] == [1.0, 2.5]
+    with running(SYSTEM, tmp_path) as system:
+        assert system.node("robot_node").state == "active"
+        assert described(peer) == expected
