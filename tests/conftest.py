@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import fcntl
 import gc
 import importlib.util
@@ -25,6 +26,9 @@ LONG_FILES = (TESTS_WITH_ROS, TESTS / "packaging")
 #: These start no ROS node, so all of them share a domain.
 TESTS_WITHOUT_NODES = (TESTS / "unit", TESTS / "golden", TESTS / "properties")
 FAST_DDS_PROFILE = Path(__file__).with_name("udp_on_this_computer.xml")
+#: Instead of faulthandler_timeout, for tests that may take half an hour.
+SOAK_HANGS_AFTER_S = 1860.0
+STDERR = pytest.StashKey[int]()
 NO_ROS = "rclpy cannot be imported"
 # Domain 0 is the default of real robots; the ports of ids above 101 are ephemeral ports on Linux.
 DOMAIN_IDS = range(1, 102)
@@ -44,6 +48,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    config.stash[STDERR] = os.dup(2)  # pytest captures it later
+    config.add_cleanup(lambda: os.close(config.stash[STDERR]))
     # Without bytecode files, hundreds of commands would each compile the composer.
     if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
         folder = tempfile.TemporaryDirectory(prefix="bytecode-")
@@ -106,6 +112,12 @@ def _deselect(config: pytest.Config, items: list[pytest.Item], marker: str) -> N
     if deselected:
         config.hook.pytest_deselected(items=deselected)
         items[:] = [item for item in items if item not in deselected]
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("soak"):
+        stderr = item.config.stash[STDERR]
+        faulthandler.dump_traceback_later(SOAK_HANGS_AFTER_S, exit=True, file=stderr)
 
 
 #: The domain ids that the current test has used.
