@@ -87,7 +87,9 @@ class Interfaces:
     def text(self, name: str) -> str | None:
         """Return the definition as it is written; None if it is only known as a description."""
         definition = self._definition(name)
-        return None if definition is None or definition.is_json else definition.text
+        if definition is None or definition.is_json or definition.problem is not None:
+            return None
+        return definition.text
 
     def outdated(self, name: str) -> str | None:
         """Return the interface that has to be built again before ``name`` can be used, or None.
@@ -184,6 +186,8 @@ class Interfaces:
 
 
 def _parse(name: str, definition: Definition) -> Interface | InvalidDefinition:
+    if definition.problem is not None:
+        return InvalidDefinition(name, definition.path, 1, definition.problem)
     try:
         if definition.is_json:
             return read_description(name, definition.text)

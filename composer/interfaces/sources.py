@@ -28,11 +28,15 @@ _SKIPPED = frozenset(("build", "install", "log", "node_modules", "site-packages"
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """The text of a definition. ``path`` is empty for the bundled ones."""
+    """The text of a definition. ``path`` is empty for the bundled ones.
+
+    ``problem`` says why the file has no text, or None.
+    """
 
     text: str
     path: str = ""
     is_json: bool = False
+    problem: str | None = None
 
 
 class InterfaceSource(Protocol):
@@ -155,7 +159,10 @@ def _manifests(folder: Path, depth: int) -> Iterator[Path]:
 
 
 def _package_name(manifest: Path) -> str | None:
-    text = _text(manifest)
+    try:
+        text = _text(manifest)
+    except _Unreadable:
+        return None
     match = _PACKAGE_NAME.search(text) if text is not None else None
     return match[1] if match else None
 
@@ -170,20 +177,32 @@ def _listed(folder: Path) -> list[str]:
 def _read(folder: Path, type_name: str, extension: str) -> Definition | None:
     for suffix in (extension, "json"):
         path = folder / f"{type_name}.{suffix}"
-        text = _text(path)
+        is_json = suffix == "json"
+        try:
+            text = _text(path)
+        except _Unreadable as problem:
+            return Definition("", str(path), is_json=is_json, problem=str(problem))
         if text is not None:
-            return Definition(text, str(path), is_json=suffix == "json")
+            return Definition(text, str(path), is_json=is_json)
     return None
 
 
+class _Unreadable(Exception):
+    """A file exists and has no text."""
+
+
 def _text(path: Path) -> str | None:
-    """Return the text of a regular file of limited size, or None."""
+    """Return the text of a regular file, None if there is none. Raises _Unreadable."""
     try:
-        if not path.is_file() or path.stat().st_size > _MAXIMUM_BYTES:
+        if not path.is_file():
             return None
+        if path.stat().st_size > _MAXIMUM_BYTES:
+            raise _Unreadable(f"it is larger than {_MAXIMUM_BYTES // 1000} kB")
         return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return None
+    except UnicodeDecodeError as error:
+        raise _Unreadable("it is not UTF-8") from error
+    except OSError as error:
+        raise _Unreadable(error.strerror or str(error)) from error
 
 
 @lru_cache(maxsize=1)

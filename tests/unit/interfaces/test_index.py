@@ -140,11 +140,21 @@ def test_a_definition_that_cannot_be_read_says_why(tmp_path: Path) -> None:
     assert interfaces.problem("demo_msgs/msg/Good") is None
 
 
-@pytest.mark.parametrize("content", [b"bool \xff", b"#" * 1_000_001])
-def test_a_file_that_is_not_a_definition_is_not_read(tmp_path: Path, content: bytes) -> None:
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [(b"bool \xff", "it is not UTF-8"), (b"#" * 1_000_001, "it is larger than 1000 kB")],
+)
+def test_a_file_that_cannot_be_read_is_a_problem(
+    tmp_path: Path, content: bytes, reason: str
+) -> None:
     folder = package(tmp_path, "demo_msgs", msg_A="bool ok")
     (folder / "msg" / "A.msg").write_bytes(content)
-    assert Interfaces([find_packages([tmp_path])]).find("demo_msgs/msg/A") is None
+    interfaces = Interfaces([find_packages([tmp_path])])
+    assert interfaces.find("demo_msgs/msg/A") is None
+    assert interfaces.text("demo_msgs/msg/A") is None
+    problem = interfaces.problem("demo_msgs/msg/A")
+    assert problem is not None
+    assert str(problem) == f"the definition of 'demo_msgs/msg/A' cannot be read: {reason}"
 
 
 def test_only_requested_packages_are_read(tmp_path: Path) -> None:
