@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol, TypeAlias
 
 from composer.behavior import Publisher
-from composer.expressions import Expression
+from composer.expressions import EvaluationError, Expression
 from composer.model import Reaction
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.ros.messages import Build, compile_message
@@ -23,6 +23,10 @@ class ReactionClient(Protocol):
     def send(self, content: Any) -> None:
         """Send it; the port's own reactions handle the response."""
 
+
+#: The characters and items of a state variable. A reaction that appends to its own state, such as
+#: the text of each message, would otherwise use up the memory.
+MAX_STATE_SIZE = 1_000_000
 
 #: The publisher and client ports of a node, by name.
 Publishers: TypeAlias = Mapping[str, Publisher]
@@ -112,9 +116,30 @@ def _set_state(state: dict[str, Any], reaction: Reaction) -> Action:
 
     def set_state(scope: dict[str, Any]) -> None:
         # Evaluate all values with the old state before any is stored.
-        state.update({name: evaluate(content, scope) for name, content in entries})
+        state.update({name: _bounded(name, evaluate(content, scope)) for name, content in entries})
 
     return set_state
+
+
+def _bounded(name: str, value: Any) -> Any:
+    """Return ``value``. Raises EvaluationError if it is too large to be stored."""
+    if isinstance(value, str | list | dict) and not _fits(value):
+        raise EvaluationError(
+            f"'set' of '{name}': the value has more than {MAX_STATE_SIZE} characters and items"
+        )
+    return value
+
+
+def _fits(value: Any) -> bool:
+    left = MAX_STATE_SIZE
+    pending = [value]
+    while pending and left >= 0:
+        item = pending.pop()
+        if isinstance(item, str | list | dict):
+            left -= len(item)
+            if not isinstance(item, str):
+                pending += item.values() if isinstance(item, dict) else item
+    return left >= 0
 
 
 def _write_log(context: NodeContext, reaction: Reaction, content: Template) -> Action:
