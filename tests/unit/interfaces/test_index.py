@@ -222,10 +222,18 @@ def test_other_json_is_not_a_type_description(text: str) -> None:
         read_description("a_msgs/msg/A", text)
 
 
-def test_transforms_are_known_without_ros() -> None:
-    message = BUNDLED.message("tf2_msgs/msg/TFMessage")
-    assert message is not None
-    assert message.field_names == ("transforms",)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "control_msgs/action/FollowJointTrajectory",
+        "example_interfaces/srv/AddTwoInts",
+        "nav2_msgs/action/FollowGPSWaypoints",
+        "tf2_msgs/msg/TFMessage",
+        "vision_msgs/msg/Detection2DArray",
+    ],
+)
+def test_packages_that_are_not_on_pypi_are_known_without_ros(name: str) -> None:
+    assert BUNDLED.find(name) is not None
 
 
 @pytest.mark.parametrize(
