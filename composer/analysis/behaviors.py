@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -109,13 +110,25 @@ _PREFIXES = ("on_", "accept_")
 
 
 def unbound_handlers(node: Node, source: BehaviorSource) -> list[Method]:
-    """Return the methods called ``on_...`` or ``accept_...`` that nothing of the node calls."""
+    """Return the methods called ``on_...`` or ``accept_...`` that nothing calls.
+
+    One that the code itself uses, such as ``on_feedback=self.on_progress``, is not a handler.
+    """
     called = {handler.name for handler in handlers(node)} | GENERAL_HANDLERS.keys()
-    return [
+    unbound = [
         method
         for method in source.methods
         if method.name.startswith(_PREFIXES) and method.name not in called
     ]
+    if not unbound:
+        return []
+    used = {
+        inner.attr
+        for module in source.own_modules
+        for inner in ast.walk(module.tree)
+        if isinstance(inner, ast.Attribute)
+    }
+    return [method for method in unbound if method.name not in used]
 
 
 def calls_of(source: BehaviorSource, method: Method) -> Iterator[Call]:

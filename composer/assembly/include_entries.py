@@ -16,7 +16,7 @@ from composer.document import read_document
 from composer.document.rules import FILE_TOO_LARGE, UNREADABLE_FILE
 from composer.fast_dataclass import dataclass
 from composer.names import namespace_problem
-from composer.project import Project
+from composer.project import OUTSIDE_HINT, Project
 from composer.schema.kinds import SYSTEM, check_kind
 from composer.source import Located, SourceFile
 from composer.tree import Entry, Mapping, Scalar, Tree
@@ -91,7 +91,7 @@ class IncludeReader:
                     name, "is an absolute path", "use a path relative to this file: 'a.yaml'"
                 )
             elif not self.project.holds(target):
-                self._refuse(name, "is outside the project", None)
+                self._refuse(name, "is outside the project", OUTSIDE_HINT)
             elif not target.exists():
                 self._refuse(name, "does not exist", _similar(name.value, folder))
             else:

@@ -2,8 +2,8 @@
 
 The root of a project is the nearest folder with a ``composer.yaml``, or with a ``pyproject.toml``
 that has the table ``[tool.composer]``; without either, the folder above the nearest ``nodes``
-folder, else above the nearest ``interfaces`` folder, or the folder itself. Files outside the
-project are never read, not even through symbolic links.
+folder, else above the nearest ``interfaces`` folder, else above the nearest ``systems`` folder, or
+the folder itself. Files outside the project are never read, not even through symbolic links.
 
 The search ends where it finds something that belongs to another user: see
 :mod:`composer.ownership`.
@@ -25,7 +25,10 @@ from composer.project.sources import SETTINGS_FILE, SettingsSource, find_setting
 from composer.resources import data_folder
 from composer.source import SourceFile, Span, shown_path
 
-__all__ = ["INTERFACES", "NODES", "SETTINGS_FILE", "SYSTEMS", "Project", "Settings"]
+__all__ = ["INTERFACES", "NODES", "OUTSIDE_HINT", "SETTINGS_FILE", "SYSTEMS", "Project", "Settings"]
+
+#: For messages about files outside the project.
+OUTSIDE_HINT = "a file composer.yaml, which may be empty, marks the root of a project"
 
 SYSTEMS = "systems"
 NODES = "nodes"
@@ -97,6 +100,11 @@ class _Search:
                 return found if self._may_use(found) else None
         return None
 
+    def own(self, name: str) -> Path | None:
+        """Return the nearest folder of that name that holds the start of the search."""
+        found = next((above for above in self.ancestors if above.name == name), None)
+        return found if found is not None and self._may_use(found) else None
+
     def folders(self, name: str, chosen: tuple[Path, ...] | None = None) -> tuple[Path, ...]:
         """Return the folders that the settings choose, by default the nearest of that name."""
         if chosen is not None:
@@ -121,7 +129,7 @@ class _Search:
 
 
 def _without_settings(search: _Search) -> Project:
-    guess = search.nearest(NODES) or search.nearest(INTERFACES)
+    guess = search.nearest(NODES) or search.nearest(INTERFACES) or search.own(SYSTEMS)
     root = search.start if guess is None else guess.parent
     search.end_above(root)
     nodes, interfaces = search.folders(NODES), search.folders(INTERFACES)

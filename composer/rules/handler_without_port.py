@@ -18,8 +18,8 @@ RULE = register(
         summary="A behavior has a handler for a port or timer that the node does not have.",
         why=(
             "Handlers bind by name: 'on_scan' is called for the port or timer 'scan'. Without "
-            "one, the method is never called. Do not start the name of any other method with "
-            "'on_'."
+            "one, the method is never called. A method that the code itself uses, as in "
+            "on_feedback=self.on_progress, is not a handler."
         ),
         bad="""\
 # file: system.yaml

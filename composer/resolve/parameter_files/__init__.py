@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from composer.diagnostics import Diagnostic, shown
-from composer.project import Project
+from composer.project import OUTSIDE_HINT, Project
 from composer.resolve.parameter_files.reader import read_parameter_file
 from composer.resolve.parameter_files.rules import PARAMETER_FILE
 from composer.resolve.parameter_files.sections import ParameterFiles
@@ -31,7 +31,7 @@ def read_parameter_files(
         path = folder / name.value
         if not project.holds(path):
             message = f"parameter file '{shown(name.value)}' is outside the project"
-            diagnostics.append(Diagnostic(PARAMETER_FILE, message, name.span))
+            diagnostics.append(Diagnostic(PARAMETER_FILE, message, name.span, hint=OUTSIDE_HINT))
         elif not path.exists():
             message = f"there is no parameter file '{shown(name.value)}'"
             diagnostics.append(Diagnostic(PARAMETER_FILE, message, name.span))

@@ -48,7 +48,7 @@ def test_what_another_user_has_put_into_a_parent_folder_is_not_used(
         found.mkdir()
     give_away(found)
     project = Project.at(mine)
-    assert (project.root, project.settings.strict) == (mine, False)
+    assert (project.root, project.settings.strict) == (mine.parent, False)
     assert project.node_folders == project.interface_folders == ()
     name_of_user = f"'{pwd.getpwuid(OTHER_USER).pw_name}'"
     assert controlled(project.diagnostics) == [

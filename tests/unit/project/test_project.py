@@ -57,6 +57,13 @@ def test_without_settings_it_is_the_folder_above_nodes(tmp_path: Path) -> None:
     assert Project.at(tmp_path / "systems").node_folders == (tmp_path / "nodes",)
 
 
+def test_without_both_it_is_the_folder_above_systems(tmp_path: Path) -> None:
+    folder = tmp_path / "systems" / "indoor"
+    folder.mkdir(parents=True)
+    assert Project.at(folder).root == tmp_path
+    assert Project.at(tmp_path).root == tmp_path
+
+
 def test_without_anything_it_is_the_folder_itself(tmp_path: Path) -> None:
     assert Project.at(tmp_path).root == tmp_path
     assert Project.at(tmp_path).node_folders == ()
