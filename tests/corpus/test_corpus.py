@@ -1,0 +1,244 @@
+"""Real systems with one mistake each: how many ``compose validate`` finds, and where.
+
+Each document of a ``.yaml`` file next to this one is a project that was written after a real stack,
+without knowledge of the rules:
+
+- ``files``: its files. They give no error and no warning.
+- ``mistakes``: lists of file, old text, new text, what is wrong and, optionally, other places at
+  which it may be reported, as texts separated by ``|``: in that file, or in another one
+  (``nodes/arm.py:text``). The changed lines are always such a place.
+- ``valid``: edits in the same form that are correct.
+
+A mistake is found if it adds an error, a warning or an info.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+import yaml
+
+from composer.diagnostics import Diagnostic, Severity
+from composer.interfaces import Interfaces
+from composer.loading import collect_diagnostics, load
+from composer.node_types import interface_folders
+from composer.project import Project
+
+FILES = sorted(Path(__file__).parent.glob("*.yaml"))
+MIN_FOUND, MIN_RIGHT, MAX_REPORTS = 0.97, 0.98, 1.2
+MIN_MISTAKES, MIN_VALID = 220, 50
+_INSTALLED = Interfaces.load()
+
+
+@dataclass(frozen=True)
+class Edit:
+    """A change of one text in one file."""
+
+    project: str
+    file: str
+    old: str
+    new: str
+    what: str
+    places: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.project}: {self.what} ({self.file}: {self.new.strip()[:60]!r})"
+
+
+@dataclass(frozen=True)
+class ProjectFiles:
+    """A project of the corpus."""
+
+    name: str
+    files: dict[str, str]
+    mistakes: list[Edit]
+    valid: list[Edit]
+
+
+@dataclass
+class Result:
+    """What was reported for all mistakes."""
+
+    mistakes: int = 0
+    found: int = 0
+    right: int = 0
+    reports: int = 0
+    notes: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        found = max(self.found, 1)
+        return "\n".join(
+            [
+                *self.notes,
+                f"{self.mistakes} mistakes: {self.found / self.mistakes:.1%} found, "
+                f"{self.right / found:.1%} of these in the right place, "
+                f"{self.reports / found:.2f} reports each",
+            ]
+        )
+
+
+def _read(path: Path) -> Iterator[ProjectFiles]:
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    for document in yaml.load_all(path.read_text(encoding="utf-8"), Loader=loader):
+        name = document["name"]
+        edits = {
+            kind: [
+                Edit(name, file, old, new, what, tuple(places[0].split("|")) if places else ())
+                for file, old, new, what, *places in document[kind]
+            ]
+            for kind in ("mistakes", "valid")
+        }
+        yield ProjectFiles(name, document["files"], edits["mistakes"], edits["valid"])
+
+
+pytestmark = pytest.mark.slow
+PROJECTS = [project for path in FILES for project in _read(path)]
+
+
+class Checker:
+    """Checks one project in a folder, as it is and with an edit."""
+
+    def __init__(self, project: ProjectFiles, folder: Path) -> None:
+        """Write the files of the project into the current folder, ``folder``."""
+        self.folder = folder
+        self.files = project.files
+        for name, text in self.files.items():
+            self._write(name, text)
+        known = self._diagnostics()
+        self.known = {_identity(item) for item in known}
+        self.known_problems = [item for item in known if item.severity is not Severity.INFO]
+
+    def _write(self, name: str, text: str) -> None:
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+    def _diagnostics(self) -> list[Diagnostic]:
+        folders = interface_folders(Project.at(self.folder / "systems"))
+        interfaces = Interfaces.load(folders) if folders else _INSTALLED
+        names = [name for name in self.files if name.startswith(("systems/", "nodes/"))]
+        paths = [Path(name) for name in names if name.endswith(".yaml")]
+        return collect_diagnostics([load(path, interfaces=interfaces) for path in paths])
+
+    def added(self, edit: Edit) -> list[Diagnostic]:
+        """Return what is reported because of the edit."""
+        text = self.files[edit.file]
+        assert text.count(edit.old) >= 1, f"{edit}: {edit.old!r} is not in the file"
+        self._write(edit.file, text.replace(edit.old, edit.new, 1))
+        try:
+            return [item for item in self._diagnostics() if _identity(item) not in self.known]
+        finally:
+            self._write(edit.file, text)
+
+    def places(self, edit: Edit) -> set[tuple[str, int]]:
+        """Return the files and lines at which the mistake may be reported."""
+        start = self.files[edit.file].index(edit.old)
+        shared = _common_prefix(edit.old, edit.new)
+        after = _common_prefix(edit.old[shared:][::-1], edit.new[shared:][::-1])
+        text = self.files[edit.file].replace(edit.old, edit.new, 1)
+        first = text.count("\n", 0, start + shared) + 1
+        last = text.count("\n", 0, max(start + len(edit.new) - after, start + shared)) + 1
+        lines = {(edit.file, line) for line in range(first, last + 1)}
+        edited = {**self.files, edit.file: text}
+        for place in edit.places:
+            found = {
+                (name, number)
+                for name, content in edited.items()
+                for number, line in enumerate(content.split("\n"), 1)
+                if place in line
+            }
+            assert found, f"{edit}: there is no {place!r}"
+            lines |= found
+        return lines
+
+
+def _common_prefix(first: str, second: str) -> int:
+    pairs = zip(first, second, strict=False)
+    return next((i for i, (a, b) in enumerate(pairs) if a != b), min(len(first), len(second)))
+
+
+def _identity(diagnostic: Diagnostic) -> tuple[str, str, str]:
+    return (diagnostic.rule.code, diagnostic.primary.file.path, diagnostic.message)
+
+
+def _place(diagnostic: Diagnostic) -> tuple[str, int]:
+    return (diagnostic.primary.file.path, diagnostic.primary.line)
+
+
+def _shown(diagnostic: Diagnostic) -> str:
+    return f"    {diagnostic.primary} {diagnostic.rule.code} {diagnostic.message}"
+
+
+def _check_project(project: ProjectFiles, folder: Path, result: Result) -> None:
+    checker = Checker(project, folder)
+    for edit in project.mistakes:
+        result.mistakes += 1
+        added = checker.added(edit)
+        if not added:
+            result.notes.append(f"not found: {edit}")
+            continue
+        result.found += 1
+        result.reports += len(added)
+        if not {_place(item) for item in added} & checker.places(edit):
+            result.notes.append(f"elsewhere: {edit}")
+            result.notes += map(_shown, added)
+        else:
+            result.right += 1
+            if len(added) > 1:
+                result.notes.append(f"{len(added)} reports: {edit}")
+                result.notes += map(_shown, added)
+
+
+def _false_positives(project: ProjectFiles, folder: Path) -> Iterator[str]:
+    checker = Checker(project, folder)
+    for item in checker.known_problems:
+        yield f"{project.name} as it is:\n{_shown(item)}"
+    for edit in project.valid:
+        for item in checker.added(edit):
+            if item.severity is not Severity.INFO:
+                yield f"valid, but reported: {edit}\n{_shown(item)}"
+
+
+@pytest.fixture(autouse=True)
+def without_cycle_collection() -> Iterator[None]:
+    """Keep the collector from searching a thousand systems again and again."""
+    gc.disable()
+    yield
+    gc.enable()
+
+
+def _folder(project: ProjectFiles, parent: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = parent / project.name
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def test_the_corpus_is_large_enough() -> None:
+    assert sum(len(project.mistakes) for project in PROJECTS) >= MIN_MISTAKES
+    assert sum(len(project.valid) for project in PROJECTS) >= MIN_VALID
+
+
+def test_mistakes_are_found_once_in_the_right_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = Result()
+    for project in PROJECTS:
+        _check_project(project, _folder(project, tmp_path, monkeypatch), result)
+    print(result)
+    assert result.found >= MIN_FOUND * result.mistakes, result
+    assert result.right >= MIN_RIGHT * result.found, result
+    assert result.reports <= MAX_REPORTS * result.found, result
+
+
+def test_correct_files_give_no_errors_and_no_warnings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reported = []
+    for project in PROJECTS:
+        reported += _false_positives(project, _folder(project, tmp_path, monkeypatch))
+    assert not reported, "\n".join(reported)
