@@ -47,6 +47,15 @@ def reaches_end(function: Function) -> bool:
     return _continues(function.body)
 
 
+def is_stub(function: Function) -> bool:
+    """Return whether a function only has a docstring, 'pass' or '...': one to be overridden."""
+    return all(
+        isinstance(item, ast.Pass)
+        or (isinstance(item, ast.Expr) and isinstance(item.value, ast.Constant))
+        for item in function.body
+    )
+
+
 def endless_loops(function: Function) -> Iterator[ast.While]:
     """Yield the loops that never let anything else run: they neither end nor wait.
 

@@ -156,7 +156,7 @@ def _class(node: ast.ClassDef, names: Mapping[str, str], source: SourceFile) -> 
     dynamic = bool(node.decorator_list or node.keywords) or "__getattr__" in methods
     return Class(
         node.name,
-        _name_span(node, "class", source),
+        name_span(node, "class", source),
         tuple(_dotted(base) for base in node.bases),
         tuple(methods.values()),
         dynamic,
@@ -193,7 +193,7 @@ def _method(node: Function, names: Mapping[str, str], source: SourceFile) -> Met
     static = "staticmethod" in decorators
     return Method(
         name=node.name,
-        span=_name_span(node, "def", source),
+        span=name_span(node, "def", source),
         arguments=tuple(positional if static else positional[1:]),
         optional=min(len(node.args.defaults), len(positional)),
         variadic=node.args.vararg is not None,
@@ -218,7 +218,7 @@ def _dotted(node: ast.expr) -> str:
     return dotted(node.value if isinstance(node, ast.Subscript) else node)
 
 
-def _name_span(node: Function | ast.ClassDef, keyword: str, source: SourceFile) -> Span:
+def name_span(node: Function | ast.ClassDef, keyword: str, source: SourceFile) -> Span:
     """Return the span of the name after ``def`` or ``class``."""
     span = start_span(node, len(node.name), source)
     found = re.search(rf"{keyword}\s+({re.escape(node.name)})\b", source.line(span.line))

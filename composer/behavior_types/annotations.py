@@ -7,13 +7,25 @@ import warnings
 
 from composer.behavior_source import Module
 from composer.behavior_types.names import api_class, interface_name, own_name
-from composer.behavior_types.values import NONE, ApiValue, Value, join
+from composer.behavior_types.own_classes import class_named
+from composer.behavior_types.values import NONE, ApiValue, Collection, OwnObject, Value, join
 from composer.field_types import ANYTHING, BOOL, INTEGER, NUMBER, STRING
 from composer.interfaces import Action, Interfaces, Message, Service
 from composer.model import Node, PortKind
 
 _BUILTINS: dict[str, Value] = {"str": STRING, "int": INTEGER, "float": NUMBER, "bool": BOOL}
 _LONGEST_TEXT = 200
+_TRANSPARENT = frozenset({"Optional", "ClassVar", "Final"})
+_COLLECTIONS: dict[str, type] = {
+    "bytes": bytes,
+    "dict": dict,
+    "Dict": dict,
+    "list": list,
+    "List": list,
+    "set": set,
+    "Set": set,
+    "tuple": tuple,
+}
 #: The kind of port that a value of the API belongs to.
 _KINDS = {
     "Goal": PortKind.ACTION_SERVER,
@@ -34,14 +46,29 @@ def annotated(annotation: ast.expr, home: Module, node: Node, interfaces: Interf
             return join(
                 annotated(first, home, node, interfaces), annotated(second, home, node, interfaces)
             )
-        case ast.Subscript(value=ast.Name(id="Optional"), slice=inner):
+        case ast.Subscript(value=ast.Name(id=name), slice=inner) if name in _TRANSPARENT:
             return annotated(inner, home, node, interfaces)
+        case ast.Subscript(value=ast.Name(id=name), slice=inner) if name in _COLLECTIONS:
+            types = inner.elts if isinstance(inner, ast.Tuple) else [inner]
+            parts = [annotated(item, home, node, interfaces) for item in types]
+            return _collection(_COLLECTIONS[name], parts)
+        case ast.Name(id=name) if name in _COLLECTIONS and name not in home.imports:
+            return Collection(_COLLECTIONS[name])
         case ast.Name(id=name) if name in _BUILTINS and name not in home.imports:
             return _BUILTINS[name]
+        case ast.Name(id=name) if (own := class_named(name, home)) is not None:
+            return OwnObject(own)
         case ast.Name() | ast.Attribute():
             return _named(own_name(annotation, home), node, interfaces)
         case _:
             return ANYTHING
+
+
+def _collection(python: type, parts: list[Value]) -> Collection:
+    if python is dict and len(parts) > 1:
+        return Collection(dict, parts[1], parts[0])
+    is_uniform = all(part == parts[0] for part in parts)
+    return Collection(python, parts[0] if is_uniform else ANYTHING)
 
 
 def _parsed(text: str) -> ast.expr | None:

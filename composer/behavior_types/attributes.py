@@ -6,10 +6,14 @@ from collections.abc import Iterable
 
 from composer.behavior_types.api import members
 from composer.behavior_types.inference import BehaviorTypes
+from composer.behavior_types.own_classes import known_attributes
 from composer.behavior_types.problems import Kind
 from composer.behavior_types.values import (
     ApiValue,
+    Collection,
     InterfaceClass,
+    OwnClass,
+    OwnObject,
     Parameters,
     Ports,
     Self,
@@ -17,11 +21,25 @@ from composer.behavior_types.values import (
 )
 from composer.diagnostics import nearest, suggestion
 from composer.field_types import described
-from composer.interfaces import Action, FieldType, Interfaces, Message, Service
+from composer.interfaces import (
+    FLOATS,
+    INTEGER_RANGES,
+    Action,
+    FieldType,
+    Interfaces,
+    Message,
+    Service,
+)
 from composer.model import Node
 
 _MESSAGE_ATTRIBUTES = frozenset({"SLOT_TYPES", "get_fields_and_field_types"})
-_PYTHON_TYPES: dict[str, type] = {"string": str, "wstring": str, "bool": bool}
+_PYTHON_TYPES: dict[str, type] = {
+    "string": str,
+    "wstring": str,
+    "bool": bool,
+    **dict.fromkeys(FLOATS, float),
+    **dict.fromkeys(INTEGER_RANGES.keys() - {"byte"}, int),
+}
 
 #: The problem of an attribute: its kind, message and hint.
 Found = tuple[Kind, str, str | None]
@@ -48,6 +66,10 @@ def attribute_problem(types: BehaviorTypes, owner: Value, name: str) -> Found | 
             return _missing_field(owner, name)
         case FieldType():
             return _of_field(owner, name, types.interfaces)
+        case Collection(python=python) if not hasattr(python, name):
+            return Kind.ATTRIBUTE, f"a {python.__name__} has no attribute '{name}'", None
+        case OwnClass() | OwnObject():
+            return _of_own_class(owner, name)
         case _:
             return None
 
@@ -83,6 +105,16 @@ def _missing_attribute(types: BehaviorTypes, name: str) -> Found | None:
     message = f"'{types.source.reference.class_name}' has no attribute '{name}'"
     hint = f"did you mean '{close}'?" if close else "no method of the class sets it"
     return Kind.ATTRIBUTE, message, hint
+
+
+def _of_own_class(owner: OwnClass | OwnObject, name: str) -> Found | None:
+    own = owner.of if isinstance(owner, OwnObject) else owner
+    known = known_attributes(own)
+    if known is None or name in known:
+        return None
+    public = [other for other in known if not other.startswith("_")]
+    problem = f"'{own.definition.name}' has no attribute '{name}'"
+    return Kind.ATTRIBUTE, problem, suggestion(name, public)
 
 
 def _missing_part(definition: Message | Service | Action, name: str) -> Found | None:

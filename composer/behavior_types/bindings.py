@@ -22,10 +22,14 @@ class How(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """One place that binds a name; an ``expression`` of None may be anything."""
+    """One place that binds a name; an ``expression`` of None may be anything.
+
+    ``creates`` is false for a declaration of an attribute without a value.
+    """
 
     expression: ast.expr | None = None
     how: How = How.VALUE
+    creates: bool = True
 
 
 @dataclass(slots=True)
@@ -34,7 +38,9 @@ class Bindings:
 
     names: dict[str, list[Binding]] = field(default_factory=dict)
     attributes: dict[str, list[Binding]] = field(default_factory=dict)
-    augmented: set[str] = field(default_factory=set)  # attributes changed by '+=' and the like
+    #: What '+=' and the like do to attributes, and to names.
+    changes: dict[str, list[tuple[ast.operator, ast.expr]]] = field(default_factory=dict)
+    name_changes: dict[str, list[tuple[ast.operator, ast.expr]]] = field(default_factory=dict)
     receiver: str | None = None
 
     def bind(self, target: ast.AST, expression: ast.expr | None, how: How = How.VALUE) -> None:
@@ -47,7 +53,12 @@ class Bindings:
             case ast.Tuple(elts=targets) | ast.List(elts=targets):
                 values = _elements(expression, len(targets)) if how is How.VALUE else None
                 for index, item in enumerate(targets):
-                    self.bind(item, values[index] if values is not None else None)
+                    if values is not None:
+                        self.bind(item, values[index])
+                    elif how is How.VALUE:
+                        self.bind(item, expression, How.ELEMENT)
+                    else:
+                        self.bind(item, None)
             case ast.Starred(value=value):
                 self.bind(value, None)
 
@@ -90,10 +101,10 @@ def _bind(node: ast.AST, found: Bindings) -> None:
             found.bind(target, annotation, How.ANNOTATION)
         case ast.NamedExpr(target=target, value=value):
             found.bind(target, value)
-        case ast.AugAssign(target=ast.Attribute(attr=attribute)):
-            found.augmented.add(attribute)  # does not create it
-        case ast.AugAssign(target=target):
-            found.bind(target, None)
+        case ast.AugAssign(target=ast.Attribute(attr=attribute), op=operator, value=value):
+            found.changes.setdefault(attribute, []).append((operator, value))
+        case ast.AugAssign(target=ast.Name(id=name), op=operator, value=value):
+            found.name_changes.setdefault(name, []).append((operator, value))
         case ast.For() | ast.AsyncFor() | ast.comprehension():
             is_async = isinstance(node, ast.AsyncFor) or bool(getattr(node, "is_async", False))
             found.bind(node.target, None if is_async else node.iter, How.ELEMENT)

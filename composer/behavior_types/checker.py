@@ -5,20 +5,37 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from composer.behavior_source import BehaviorSource, Function
-from composer.behavior_source.flow import returned_values
+from composer.behavior_source import BehaviorSource, Function, Module
+from composer.behavior_source.flow import is_stub, reaches_end, returned_values
 from composer.behavior_source.receivers import lacks_self
 from composer.behavior_source.spans import attribute_span, span_of, start_span
+from composer.behavior_source.syntax import name_span
+from composer.behavior_types.annotations import annotated
+from composer.behavior_types.api_values import api_parameters
+from composer.behavior_types.arguments import api_signature, signature_of
 from composer.behavior_types.attributes import attribute_problem
 from composer.behavior_types.bindings import nodes_of
+from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.fitting import value_problem
-from composer.behavior_types.inference import BehaviorTypes, FunctionTypes, handler_arguments
+from composer.behavior_types.handlers import handler_arguments
+from composer.behavior_types.inference import BehaviorTypes
+from composer.behavior_types.operations import (
+    annotations_by_name,
+    annotations_of,
+    call_problems,
+    operation_problems,
+    uncallable,
+)
 from composer.behavior_types.problems import CodeProblem, Kind
 from composer.behavior_types.stored_calls import used_without_await
 from composer.behavior_types.values import (
     ApiMethod,
     ApiValue,
+    Collection,
+    CollectionMethod,
     InterfaceClass,
+    ModuleFunction,
+    OwnMethod,
     Parameters,
     Pending,
     Ports,
@@ -26,7 +43,8 @@ from composer.behavior_types.values import (
 )
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
-from composer.interfaces import Action, Field, Interfaces, Message, Service
+from composer.field_types import described
+from composer.interfaces import Action, Field, FieldType, Interfaces, Message, Service
 from composer.model import Node
 from composer.source import Span
 
@@ -79,6 +97,10 @@ class _FunctionChecker:
         """Yield the problems of the function."""
         yield from self._annotations()
         yield from self._returned()
+        for annotation in annotations_of(self.function):
+            for node in ast.walk(annotation):
+                if isinstance(node, ast.Attribute):
+                    yield from self._attribute(node)
         for pending in used_without_await(self.function, self.scope):
             yield self._missing_await(pending)
         for node in nodes_of(self.function):
@@ -92,6 +114,7 @@ class _FunctionChecker:
                 case ast.Assign(targets=[target], value=value):
                     yield from self._assignment(target, value)
             yield from self._unawaited(node)
+            yield from operation_problems(node, self.scope)
 
     # --- attributes
 
@@ -136,9 +159,40 @@ class _FunctionChecker:
                 hint = f"create {name}.{parts}()"
                 yield CodeProblem(Kind.VALUE, problem, self._span(node.func), hint)
             case ApiMethod(owner=owner, member=member):
+                signature = api_signature(owner.class_name, member.name)
+                types = api_parameters(owner.class_name, member.name)
+                found = list(call_problems(node, signature, self.scope, types))
+                yield from found
                 expected = self._expected(owner, member.name)
-                if expected is not None and node.args:
+                if expected is not None and node.args and not found:
                     yield from self._value(node.args[0], expected)
+            case OwnMethod(method=method, home=home) if method.node is not None:
+                if not lacks_self(method.node):
+                    yield from self._own_call(node, method.node, home, is_bound=True)
+            case ModuleFunction(node=function, home=home, is_bound=is_bound):
+                yield from self._own_call(node, function, home, is_bound=is_bound)
+            case CollectionMethod() | Collection():
+                pass
+            case other:
+                yield from self._element_added(node)
+                reason = uncallable(other)
+                if reason is not None:
+                    yield CodeProblem(Kind.VALUE, reason[0], self._span(node.func), reason[1])
+
+    def _own_call(
+        self, node: ast.Call, function: Function, home: Module, *, is_bound: bool
+    ) -> Iterator[CodeProblem]:
+        signature = signature_of(function, is_bound=is_bound)
+        if signature is not None:
+            expected = annotations_by_name(function, home, self.types)
+            yield from call_problems(node, signature, self.scope, expected)
+
+    def _element_added(self, node: ast.Call) -> Iterator[CodeProblem]:
+        """Check what ``append`` and ``insert`` add to a list in a message."""
+        if isinstance(node.func, ast.Attribute) and node.func.attr in {"append", "insert"}:
+            array = self.scope.type_of(node.func.value)
+            if isinstance(array, FieldType) and array.is_array and node.args:
+                yield from self._value(node.args[-1], array.element)
 
     def _constructor(self, node: ast.Call, message: Message) -> Iterator[CodeProblem]:
         for argument in node.args:
@@ -190,11 +244,22 @@ class _FunctionChecker:
             yield from self._field(value, field)
 
     def _returned(self) -> Iterator[CodeProblem]:
-        """Check what the handler of a service returns; None has a rule of its own."""
+        """Check what a function returns; None has a rule of its own in handlers of services."""
         match self.given:
             case (_, Message() as response):
                 for value in returned_values(self.function):
                     yield from self._value(value, response)
+                return
+        annotation = self.function.returns
+        if annotation is None or not reaches_end(self.function):
+            return
+        expected = annotated(annotation, self.scope.home, self.types.node, self.types.interfaces)
+        name = self.function.name
+        if _allows_none(annotation) or name.startswith("accept_") or is_stub(self.function):
+            return
+        if isinstance(expected, Message | FieldType):
+            problem = f"'{name}' returns {described(expected)}, but may end without a 'return'"
+            yield CodeProblem(Kind.RETURN, problem, self._name_span(), "return a value at its end")
 
     def _field(self, node: ast.expr, field: Field) -> Iterator[CodeProblem]:
         text = node.value if isinstance(node, ast.Constant) else None
@@ -209,6 +274,9 @@ class _FunctionChecker:
         if isinstance(found, Pending):
             yield self._missing_await(found)
             return
+        if isinstance(node, ast.List | ast.Tuple) and isinstance(expected, FieldType):
+            for item in node.elts if expected.is_array and expected.name != "byte" else ():
+                yield from self._value(item, expected.element)
         problem = value_problem(node, found, expected, self.types.interfaces)
         if problem is not None:
             yield CodeProblem(Kind.VALUE, problem[0], self._span(node), problem[1])
@@ -276,5 +344,17 @@ class _FunctionChecker:
                     self._span(argument.annotation),
                 )
 
+    def _name_span(self) -> Span:
+        return name_span(self.function, "def", self.scope.home.source)
+
     def _span(self, node: ast.expr) -> Span:
         return span_of(node, self.scope.home.source)
+
+
+def _allows_none(annotation: ast.expr) -> bool:
+    """Return whether an annotation mentions None, Optional or a text that may."""
+    return any(
+        (isinstance(node, ast.Constant) and (node.value is None or isinstance(node.value, str)))
+        or (isinstance(node, ast.Name) and node.id == "Optional")
+        for node in ast.walk(annotation)
+    )

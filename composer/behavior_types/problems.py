@@ -20,6 +20,10 @@ class Kind(Enum):
     INTERNAL = "an import of an internal module of the composer"
     NAME = "a name that is not defined"
     FRAME = "a frame ID that begins with a slash"
+    CALL = "a call with arguments that the function does not take"
+    UNUSED = "a comparison or a function whose value is not used"
+    ASYNCIO = "an awaited function of asyncio"
+    RETURN = "a function that may not return what its annotation says"
     ANNOTATION = "a handler that annotates its argument with another type"
 
 

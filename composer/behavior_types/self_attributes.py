@@ -23,7 +23,7 @@ def self_attributes(source: BehaviorSource, assigned: Iterable[str]) -> frozense
     for _, known in source.classes:
         found.update(method.name for method in known.methods)
         for statement in known.node.body:
-            found.update(_defined(statement))
+            found.update(defined_names(statement))
     return frozenset(found)
 
 
@@ -36,8 +36,13 @@ def escapes(source: BehaviorSource) -> bool:
     )
 
 
-def _defined(statement: ast.stmt) -> Iterator[str]:
-    """Yield the names that a statement of a class may define."""
+def defined_names(statement: ast.stmt, *, declared: bool = False) -> Iterator[str]:
+    """Yield the names that a statement of a class may define.
+
+    ``name: type`` alone defines nothing, except in a dataclass: if ``declared`` is true.
+    """
+    if isinstance(statement, ast.AnnAssign) and statement.value is None and not declared:
+        return
     is_function = isinstance(statement, Function)
     for node in walk([statement]):
         match node:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from composer.behavior_source import Function
 from composer.behavior_types.bindings import How, nodes_of
-from composer.behavior_types.inference import FunctionTypes
+from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.values import ApiMethod, InterfaceClass, Pending
 
 
@@ -46,7 +46,7 @@ def _uses(function: Function, names: dict[str, list[Pending]]) -> dict[str, list
 
 def _is_value(parent: ast.AST, scope: FunctionTypes) -> bool:
     match parent:
-        case ast.FormattedValue() | ast.BinOp():
+        case ast.FormattedValue() | ast.BinOp() | ast.If() | ast.IfExp() | ast.UnaryOp():
             return True
         case ast.Call(func=function):
             return isinstance(scope.type_of(function), InterfaceClass | ApiMethod)

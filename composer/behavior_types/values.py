@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterable
 from typing import TypeAlias
 
-from composer.behavior_source import Method, Module
+from composer.behavior_source import Class, Method, Module
 from composer.behavior_types.api import Member
 from composer.fast_dataclass import dataclass
 from composer.field_types import ANYTHING, ValueType
@@ -61,6 +62,41 @@ class ApiMethod:
     member: Member
 
 
+@dataclass(frozen=True, slots=True)
+class Collection:
+    """A list, dict, set, tuple or bytes of Python, with the type of its elements.
+
+    ``element`` is the type of the values of a dict, and ``key`` that of its keys.
+    """
+
+    python: type
+    element: Value = ANYTHING
+    key: Value = ANYTHING
+
+
+@dataclass(frozen=True, slots=True)
+class CollectionMethod:
+    """A method of a collection."""
+
+    owner: Collection
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class OwnClass:
+    """A class in a file of the behavior, other than that of the behavior."""
+
+    definition: Class
+    home: Module
+
+
+@dataclass(frozen=True, slots=True)
+class OwnObject:
+    """An object of such a class."""
+
+    of: OwnClass
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnMethod:
     """A method of the behavior."""
@@ -71,10 +107,11 @@ class OwnMethod:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModuleFunction:
-    """A function of the behavior's module."""
+    """A function of the behavior's module, or a method of an object of a class in it."""
 
     node: ast.FunctionDef | ast.AsyncFunctionDef
     home: Module
+    is_bound: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +125,7 @@ class Pending:
 
 Value: TypeAlias = (
     "ValueType | NoneType | Self | Ports | Parameters | InterfaceClass | ApiValue | ApiMethod"
-    " | OwnMethod | ModuleFunction | Pending"
+    " | OwnMethod | ModuleFunction | Pending | Collection | CollectionMethod | OwnClass | OwnObject"
 )
 
 
@@ -96,4 +133,17 @@ def join(first: Value, second: Value) -> Value:
     """Return the type of a value that is of one of two types; None is disregarded."""
     if first == second or second is NONE:
         return first
+    if isinstance(first, Collection) and isinstance(second, Collection):
+        if first.python is second.python:
+            element, key = join(first.element, second.element), join(first.key, second.key)
+            return Collection(first.python, element, key)
+        return ANYTHING
     return second if first is NONE else ANYTHING
+
+
+def join_all(found: Iterable[Value]) -> Value:
+    """Return the type of a value that is of one of several types, ANYTHING if there is none."""
+    result: Value | None = None
+    for type_ in found:
+        result = type_ if result is None else join(result, type_)
+    return ANYTHING if result is None else result

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from composer.analysis.behavior_code import diagnostics_of
 from composer.analysis.behaviors import Handler, distinct_behaviors, handlers
 from composer.analysis.context import Context
 from composer.behavior_source import Function, Method
 from composer.behavior_source.flow import empty_returns, reaches_end
 from composer.behavior_source.spans import span_of
+from composer.behavior_types import Kind
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import PortKind
 
@@ -17,10 +19,11 @@ RULE = register(
         code="RC448",
         name="missing-return",
         severity=Severity.ERROR,
-        summary="A handler of a service or of 'accept' may return None.",
+        summary="A handler or an annotated function may return None instead of its result.",
         why=(
             "A service handler returns the response; without it, the client gets a failure. A "
-            "goal is accepted only if 'accept_...' returns True."
+            "goal is accepted only if 'accept_...' returns True. A function with '-> Point' "
+            "returns one on every path."
         ),
         bad="""\
 # file: system.yaml
@@ -60,6 +63,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 what = _returned(handler)
                 if what is not None:
                     yield from _handler(handler, method, method.node, what)
+    yield from diagnostics_of(context, Kind.RETURN, RULE)
 
 
 def _returned(handler: Handler) -> str | None:

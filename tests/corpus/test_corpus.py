@@ -95,7 +95,8 @@ def _read(path: Path) -> Iterator[ProjectFiles]:
         yield ProjectFiles(name, document["files"], edits["mistakes"], edits["valid"])
 
 
-pytestmark = pytest.mark.slow
+# On a busy machine it takes a minute.
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 PROJECTS = [project for path in FILES for project in _read(path)]
 
 

@@ -40,6 +40,8 @@ import asyncio
 import math
 import threading
 import time
+from dataclasses import dataclass, field
+from enum import Enum
 
 from builtin_interfaces.msg import Time
 from composer_interfaces.action import Navigate
@@ -52,12 +54,31 @@ from std_srvs.srv import Trigger
 from composer.behavior import Behavior, CallError, Goal, SentGoal
 
 
+class Mode(Enum):
+    FAST = 1
+
+    @classmethod
+    def parse(cls, text):
+        return cls[text]
+
+
+@dataclass
+class Statistics:
+    frames: int = 0
+    scores: list[float] = field(default_factory=list)
+
+    def mean(self) -> float:
+        return sum(self.scores)
+
+
 class Code(Behavior):
     LIMIT = 3
+    declared: int
 
     def on_activate(self):
         self.last = None
         self.count = 0
+        self.statistics = Statistics()
         self.other = 0
         self.point: Point | None = None
 
@@ -78,6 +99,15 @@ class Code(Behavior):
     async def _wait(self) -> Point:
         await self.clock.sleep(0.1)
         return Point()
+
+    def scale(self, factor: float, name: str = ""):
+        return factor
+
+    def keep(self, *anything):
+        self.kept = anything
+
+    def keep_rates(self, rates: list[float]):
+        self.kept = rates
 
     def _text(self) -> str:
         return "text"
@@ -168,6 +198,55 @@ MISTAKES = [
         "Trigger",
         "Request()",
     ),
+    ("odometry", "Point(x=1)", "invalid-value", "1", "write 1.0"),
+    ("odometry", "Point(x=True)", "invalid-value", "True", "write 1.0"),
+    ("odometry", "Point(x=self.count)", "invalid-value", "self.count", "float(...)"),
+    ("odometry", "Point(x=len('a') - 1)", "invalid-value", "len('a') - 1", "float(...)"),
+    ("reset", "response.success = self.count", "invalid-value", "self.count", "bool(...)"),
+    ("odometry", "Time(sec=3 / 2)", "invalid-value", "3 / 2", "int(...)"),
+    ("odometry", "Time(sec=self.clock.now)", "invalid-value", "self.clock.now", "now()"),
+    ("odometry", "Path(poses=PoseStamped())", "invalid-value", "PoseStamped()", None),
+    ("odometry", "Path(poses=[Point()])", "invalid-value", "Point()", None),
+    ("odometry", "Path().poses.append((1.0, 2.0))", "invalid-value", "(1.0, 2.0)", None),
+    ("odometry", "String(data=['x'])", "invalid-value", "['x']", None),
+    ("odometry", "PoseStamped(pose=self.parameters.speed * 2)", "invalid-value", None, None),
+    ("odometry", "self.publishers.text.publish(Path().poses)", "invalid-value", None, None),
+    ("odometry", "self.publishers.text(String())", "invalid-value", None, "'publish'"),
+    # operations
+    ("odometry", "self.clock.stamp() - 0.5", "invalid-value", "self.clock.stamp() - 0.5", None),
+    ("odometry", "'a' + self.count", "invalid-value", "'a' + self.count", None),
+    ("odometry", "self.parameters.names[self.parameters.speed]", "invalid-value", None, None),
+    ("odometry", "len(self.count)", "invalid-value", "self.count", None),
+    ("odometry", "message.pose[0]", "invalid-value", "0", None),
+    ("odometry", "self.clock.now().to_msg()", "unknown-field", "to_msg", None),
+    # classes and collections of the file
+    ("odometry", "Mode.FASST", "unknown-attribute", "FASST", "'FAST'"),
+    ("odometry", "Statistics().framez", "unknown-attribute", "framez", "'frames'"),
+    ("odometry", "self.statistics.average()", "unknown-attribute", "average", None),
+    ("odometry", "self.statistics.frame += 1", "unknown-attribute", "frame", "'frames'"),
+    ("odometry", "{}.append(1)", "unknown-attribute", "append", None),
+    ("odometry", "self.paths = {}\nfor p in self.paths.value():\n    p", "unknown-attribute",
+     "value", None),
+    ("odometry", "self.declared", "unknown-attribute", "declared", None),
+    # calls
+    ("odometry", "self.scale()", "call-arguments", "self.scale", None),
+    ("odometry", "self.scale(1.0, 'a', 2)", "call-arguments", "2", None),
+    ("odometry", "self.scale(1.0, nam='a')", "call-arguments", "nam", "'name'"),
+    ("odometry", "self.scale(message)", "call-arguments", "message", None),
+    ("odometry", "self.scale('fast')", "call-arguments", "'fast'", None),
+    ("odometry", "self.keep_rates([0.1, '0.2'])", "call-arguments", "[0.1, '0.2']", None),
+    ("odometry", "self.statistics.mean(1)", "call-arguments", "1", None),
+    ("odometry", "self.publishers.text.publish()", "call-arguments", None, None),
+    ("configure", "await self.action_clients.turn.send_goal(Navigate.Goal(), feedback=print)",
+     "call-arguments", "feedback", "'on_feedback'"),
+    ("configure", "await self.clock.sleep(Time())", "call-arguments", "Time()", None),
+    # statements without effect
+    ("odometry", "self.count == 1", "unused-result", "self.count == 1", "'='"),
+    ("odometry", "self._text", "unused-result", "self._text", "()"),
+    # asyncio
+    ("configure", "await asyncio.sleep(1.0)", "asyncio-call", "asyncio.sleep", "self.clock.sleep"),
+    # annotations
+    ("odometry", "def inner(x: Navigate.Gaol):\n    pass", "unknown-field", "Gaol", "'Goal'"),
     # awaiting
     ("configure", "self.clock.sleep(1.0)", "missing-await", "self.clock.sleep", "'await'"),
     ("configure", "self._wait()", "missing-await", "self._wait", "'await'"),
@@ -175,6 +254,7 @@ MISTAKES = [
     ("odometry", "self._wait()", "missing-await", "self._wait", "'async def on_odometry'"),
     ("configure", "self._wait().x", "missing-await", "self._wait", None),
     ("configure", "point = self._wait()\npoint.x", "missing-await", "self._wait", None),
+    ("configure", "seen = self._wait()\nif seen:\n    pass", "missing-await", None, None),
     ("configure", "x, y = self._wait()", "missing-await", "self._wait", None),
     ("configure", "if self._wait():\n    pass", "missing-await", "self._wait", None),
     ("configure", "text = self._wait()\nself.log.info(f'{text}')", "missing-await", None, None),
@@ -216,7 +296,18 @@ RIGHT = [
     ("odometry", "String.get_fields_and_field_types()"),
     ("odometry", "BatteryState.POWER_SUPPLY_STATUS_FULL"),
     ("odometry", "BatteryState().POWER_SUPPLY_STATUS_FULL"),
-    ("odometry", "Point(x=1, y=True)"),
+    ("odometry", "Point(x=1.0, y=-1.5)"),
+    ("odometry", "Time(sec=True)"),
+    ("odometry", "self.rates = {}\nself.rates['a'] = 1\nself.rates.keys().isdisjoint('b')"),
+    ("odometry", "total = 0\nfor _ in range(3):\n    total += 0.5\nPoint(x=total)"),
+    ("odometry", "Path(poses=[PoseStamped()] * 2)"),
+    ("odometry", "self.scale(2)\nself.scale(factor=2.5, name='a')\nself.scale(*[1], **{})"),
+    ("odometry", "now = self.clock.stamp()\nnow.sec + now.nanosec * 1e-9"),
+    ("odometry", "names = sorted(self.parameters.names)\nnames.append('b')\nnames[0].upper()"),
+    ("odometry", "'%s and %d' % (self.count, 5)\n'a' * 3\n[0] * 3"),
+    ("odometry", "Mode.FAST.name, Mode['FAST'].value, Mode.parse('a')"),
+    ("odometry", "Statistics().scores.append(1.0)\nself.statistics.mean() * 2"),
+    ("odometry", "self.statistics.extra = 1\nself.statistics.extra"),
     ("odometry", "Point(x=self.parameters.speed, y=float('1'))"),
     ("odometry", "message.__class__.__name__"),
     ("odometry", "message.child_frame_id.upper()"),
@@ -241,8 +332,9 @@ RIGHT = [
     ("odometry", "try:\n    pass\nexcept CallError as error:\n    self.log.warn(str(error))"),
     ("odometry", "global later\nlater = 1"),
     ("configure", "task = self._wait()\nawait task"),
-    ("configure", "await asyncio.gather(self._wait(), wait(Time()))"),
-    ("configure", "tasks = [self._wait()]\nawait asyncio.wait(tasks)"),
+    ("configure", "asyncio.run(asyncio.sleep(0.1))\nawait asyncio.sleep(0.1)"),
+    ("configure", "self.keep(self._wait(), wait(Time()))"),
+    ("configure", "tasks = [self._wait()]\nself.keep(tasks)"),
     ("configure", "self.task = self._wait()\nif self.task is not None:\n    await self.task"),
     ("configure", "sent = await self.action_clients.turn.send_goal(Navigate.Goal())\n"
      "ended = await sent.result()\nended.result.message, ended.status, await sent.cancel()"),
@@ -257,7 +349,7 @@ RIGHT = [
     ("reset", "return Trigger.Response(success=True)"),
     ("reset", "def small():\n    return True\nresponse.success = small()"),
     ("reset", "raise ValueError(request)"),
-    ("follow", "goal.request.target\nsent.cancel"),
+    ("follow", "goal.request.target\nself.later = sent.cancel"),
     ("function", "stamp.sec\nstamp.nanosec"),
 ]  # fmt: skip
 

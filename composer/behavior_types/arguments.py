@@ -1,0 +1,106 @@
+"""Checks the arguments of calls against the functions of a behavior, and against the API."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Iterator
+from functools import cache
+
+from composer import behavior
+from composer.behavior_source import Function
+from composer.diagnostics import suggestion
+from composer.fast_dataclass import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """The parameters of a function, without ``self``.
+
+    ``positional`` may be given by position or name, the first ``positional_only`` only by
+    position, and ``keywords`` only by name. ``required`` have no default.
+    """
+
+    name: str
+    positional: tuple[str, ...]
+    keywords: tuple[str, ...]
+    required: frozenset[str]
+    positional_only: int = 0
+    takes_more: bool = False  # *arguments
+    takes_keywords: bool = False  # **arguments
+
+    def bound(self, call: ast.Call) -> Iterator[tuple[str, ast.expr]]:
+        """Yield the parameters that a call sets, each with its argument."""
+        if not any(isinstance(argument, ast.Starred) for argument in call.args):
+            yield from zip(self.positional, call.args, strict=False)
+        for keyword in call.keywords:
+            if keyword.arg is not None:
+                yield keyword.arg, keyword.value
+
+    def problem(self, call: ast.Call) -> tuple[str, ast.expr | ast.keyword, str | None] | None:
+        """Return why a call fails, the node that is wrong and a hint; None if it may be right."""
+        unpacks = any(isinstance(argument, ast.Starred) for argument in call.args)
+        unpacks_map = any(keyword.arg is None for keyword in call.keywords)
+        if not unpacks and not self.takes_more and len(call.args) > len(self.positional):
+            return self._too_many(call)
+        names = (*self.positional[self.positional_only :], *self.keywords)
+        for keyword in call.keywords:
+            if keyword.arg is not None and keyword.arg not in names and not self.takes_keywords:
+                message = f"'{self.name}' has no argument '{keyword.arg}'"
+                return message, keyword, suggestion(keyword.arg, names)
+        given = {name for name, _ in self.bound(call)}
+        missing = [name for name in (*self.positional, *self.keywords) if name in self.required]
+        missing = [name for name in missing if name not in given]
+        if missing and not unpacks and not unpacks_map:
+            listed = " and ".join(f"'{name}'" for name in missing)
+            plural = "s" if len(missing) > 1 else ""
+            return f"'{self.name}' needs the argument{plural} {listed}", call.func, None
+        return None
+
+    def _too_many(self, call: ast.Call) -> tuple[str, ast.expr, str | None]:
+        most = len(self.positional)
+        takes = "no argument" if most == 0 else f"{most} argument{'s' if most > 1 else ''}"
+        first = call.args[most]
+        return f"'{self.name}' takes {takes}, not {len(call.args)}", first, None
+
+
+def signature_of(function: Function, *, is_bound: bool) -> Signature | None:
+    """Return the parameters of a function; None if a decorator may change them.
+
+    If ``is_bound``, its first parameter is the object.
+    """
+    if function.decorator_list:
+        return None
+    arguments = function.args
+    positional = [argument.arg for argument in (*arguments.posonlyargs, *arguments.args)]
+    without_default = len(positional) - len(arguments.defaults)
+    required = positional[:without_default]
+    required += [
+        argument.arg
+        for argument, default in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True)
+        if default is None
+    ]
+    first = 1 if is_bound else 0
+    return Signature(
+        function.name,
+        tuple(positional[first:]),
+        tuple(argument.arg for argument in arguments.kwonlyargs),
+        frozenset(required) - frozenset(positional[:first]),
+        max(len(arguments.posonlyargs) - first, 0),
+        arguments.vararg is not None,
+        arguments.kwarg is not None,
+    )
+
+
+@cache
+def api_signature(class_name: str, method: str) -> Signature:
+    """Return the parameters of a method of the API for behaviors."""
+    parameters = inspect.signature(getattr(getattr(behavior, class_name), method)).parameters
+    items = [item for name, item in parameters.items() if name != "self"]
+    by_name = [item for item in items if item.kind is inspect.Parameter.KEYWORD_ONLY]
+    return Signature(
+        method,
+        tuple(item.name for item in items if item not in by_name),
+        tuple(item.name for item in by_name),
+        frozenset(item.name for item in items if item.default is inspect.Parameter.empty),
+    )

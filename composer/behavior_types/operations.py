@@ -1,0 +1,154 @@
+"""Checks operations, calls and statements that fail or have no effect."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping
+
+from composer.behavior_source import Function, Module
+from composer.behavior_source.method_body import dotted
+from composer.behavior_source.spans import span_of, start_span
+from composer.behavior_types.annotations import annotated
+from composer.behavior_types.arguments import Signature
+from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.fitting import argument_problem
+from composer.behavior_types.inference import BehaviorTypes
+from composer.behavior_types.operators import is_float, is_scalar, operation_problem
+from composer.behavior_types.problems import CodeProblem, Kind
+from composer.behavior_types.values import (
+    ApiMethod,
+    ApiValue,
+    Collection,
+    ModuleFunction,
+    OwnMethod,
+    OwnObject,
+    Parameters,
+    Ports,
+    Value,
+)
+from composer.field_types import described
+from composer.interfaces import FieldType, Message
+
+
+def call_problems(
+    call: ast.Call,
+    signature: Signature,
+    scope: FunctionTypes,
+    expected: Mapping[str, Value] | None = None,
+) -> Iterator[CodeProblem]:
+    """Yield why a call fails: its arguments, or one that contradicts an ``expected`` type."""
+    source = scope.home.source
+    problem = signature.problem(call)
+    if problem is not None:
+        message, node, hint = problem
+        if isinstance(node, ast.keyword):
+            span = start_span(node, len(str(node.arg)), source)
+        else:
+            span = span_of(node, source)
+        yield CodeProblem(Kind.CALL, message, span, hint)
+        return
+    for name, argument in signature.bound(call):
+        if expected is not None and name in expected:
+            wrong = argument_problem(argument, scope.type_of(argument), expected[name])
+            if wrong is not None:
+                message = f"argument '{name}' of '{signature.name}': {wrong}"
+                yield CodeProblem(Kind.CALL, message, span_of(argument, source))
+
+
+def annotations_by_name(
+    function: Function, home: Module, types: BehaviorTypes
+) -> Mapping[str, Value]:
+    """Return the types that the annotations of the parameters of a function name."""
+    arguments = function.args
+    return {
+        argument.arg: annotated(argument.annotation, home, types.node, types.interfaces)
+        for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)
+        if argument.annotation is not None
+    }
+
+
+def annotations_of(function: Function) -> Iterator[ast.expr]:
+    """Yield the annotations of the parameters and of the result of a function."""
+    arguments = function.args
+    for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
+        if argument.annotation is not None:
+            yield argument.annotation
+    if function.returns is not None:
+        yield function.returns
+
+
+def uncallable(value: Value) -> tuple[str, str | None] | None:
+    """Return why a value cannot be called, and a hint; None if it may be."""
+    match value:
+        case ApiValue(class_name="Publisher"):
+            return "a Publisher is not a function", "call its method 'publish'"
+        case ApiValue(class_name=name):
+            return f"a {name} is not a function", None
+        case Ports() | Parameters():
+            return "this is not a function", None
+        case Message() | OwnObject():
+            name = value.name if isinstance(value, Message) else value.of.definition.name
+            return (f"{name} is not a function", None) if isinstance(value, Message) else None
+        case FieldType() if is_scalar(value) or value.is_array:
+            return f"{described(value)} is not a function", None
+        case _:
+            return None
+
+
+def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield the problems of an operation or a statement."""
+    source = scope.home.source
+    match node:
+        case ast.BinOp(left=left, op=operator, right=right):
+            problem = operation_problem(scope.type_of(left), operator, scope.type_of(right))
+            if problem is not None:
+                yield CodeProblem(Kind.VALUE, problem, span_of(node, source))
+        case ast.Subscript(value=owner, slice=index):
+            problem = _index_problem(scope.type_of(owner), scope.type_of(index))
+            if problem is not None:
+                yield CodeProblem(Kind.VALUE, problem, span_of(index, source))
+        case ast.Call(func=ast.Name(id="len"), args=[argument]):
+            found = scope.type_of(argument)
+            if isinstance(found, Message) or (is_scalar(found) and found != _TEXT):
+                message = f"{described(found)} has no length"  # type: ignore[arg-type]
+                yield CodeProblem(Kind.VALUE, message, span_of(argument, source))
+        case ast.Expr(value=value):
+            yield from _unused(value, scope)
+        case ast.Await(value=ast.Call(func=function)):
+            name = scope.global_name(dotted(function))
+            if name.startswith("asyncio.") and not _runs_asyncio(scope.home):
+                message = f"'{name}' needs the event loop of asyncio, which does not run here"
+                hint = "use self.clock.sleep" if name == "asyncio.sleep" else None
+                yield CodeProblem(Kind.ASYNCIO, message, span_of(function, source), hint)
+
+
+def _runs_asyncio(home: Module) -> bool:
+    """Return whether a file may run an event loop of asyncio, such as in a thread."""
+    starts = ("asyncio.run(", "run_until_complete", "run_forever", "asyncio.Runner")
+    return any(start in home.source.text for start in starts)
+
+
+_TEXT = FieldType("string")
+
+
+def _index_problem(owner: Value, index: Value) -> str | None:
+    is_list = isinstance(owner, FieldType) and owner.is_array
+    is_sequence = isinstance(owner, Collection) and owner.python in (list, tuple, bytes)
+    if (is_list or is_sequence) and is_float(index):
+        return "an index must be an integer, not a float"
+    if isinstance(owner, Message) or (is_scalar(owner) and owner != _TEXT):
+        return f"{described(owner)} is not a list"  # type: ignore[arg-type]
+    return None
+
+
+def _unused(value: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    source = scope.home.source
+    match value:
+        case ast.Compare(ops=[ast.Eq(), *_]):
+            message = "the result of this comparison is not used"
+            yield CodeProblem(Kind.UNUSED, message, span_of(value, source), "assign with '='")
+        case ast.Attribute(attr=name) | ast.Name(id=name):
+            found = scope.type_of(value)
+            if isinstance(found, OwnMethod | ModuleFunction | ApiMethod):
+                message = f"'{name}' is not called"
+                yield CodeProblem(Kind.UNUSED, message, span_of(value, source), "add '()'")
