@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from composer.fast_dataclass import dataclass
+from composer.installed_projects import installed_projects
 from composer.project import Project
 from composer.resources import interfaces_folder, nodes_folder
 
@@ -17,16 +18,21 @@ _TYPE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}")
 
 @dataclass(frozen=True, slots=True)
 class NodeTypes:
-    """The node types in the folders of a project; the first folder that has a name wins."""
+    """The node types in the folders of a project; the first folder that has a name wins.
+
+    ``installed`` are those of the folders that belong to installed packages.
+    """
 
     folders: tuple[Path, ...]
     project: Project
+    installed: frozenset[Path] = frozenset()
 
     @classmethod
     def of(cls, project: Project) -> NodeTypes:
-        """Return the node types of ``project`` and those that come with the composer."""
-        folders = (*project.node_folders, nodes_folder().resolve())
-        return cls(tuple(dict.fromkeys(folders)), project)
+        """Return the node types of ``project``, of installed packages, and the built-in ones."""
+        installed = tuple(item.node_folder for item in installed_projects())
+        folders = (*project.node_folders, *installed, nodes_folder().resolve())
+        return cls(tuple(dict.fromkeys(folders)), project, frozenset(installed))
 
     def find(self, name: str) -> Path | None:
         """Return the file of the node type ``name``, or None."""
@@ -54,8 +60,12 @@ class NodeTypes:
     def _file(self, name: str) -> Path | None:
         if not _TYPE_NAME.fullmatch(name):
             return None
-        candidates = (folder / f"{name}{SUFFIX}" for folder in self.folders)
-        return next((path for path in candidates if path.is_file()), None)
+        for folder in self.folders:
+            path = folder / f"{name}{SUFFIX}"
+            if path.is_file():
+                # With colcon's --symlink-install, the file and its behavior are in the sources.
+                return path.resolve() if folder in self.installed else path
+        return None
 
     def _is_outside_project(self, path: Path) -> bool:
         if not path.is_symlink() or path.parent == nodes_folder().resolve():

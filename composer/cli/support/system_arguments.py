@@ -22,7 +22,9 @@ _SUFFIXES = ("", ".yaml", ".yml")
 
 def complete_system(incomplete: str) -> list[str]:
     """Complete the names of the project's systems and of example systems, and paths."""
-    known = sorted({*project_systems(), *example_systems()})
+    from composer.installed_projects import installed_systems
+
+    known = sorted({*project_systems(), *installed_systems(), *example_systems()})
     names = [name for name in known if name.startswith(incomplete)]
     return [*names, *_matching_paths(incomplete)]
 
@@ -60,22 +62,31 @@ AnyRunningSystem = Annotated[
 def system_file(text: str) -> Path:
     """Return the path ``text``, or the file of the system with that name.
 
-    Systems of the project come before example systems. Raises UsageError.
+    Systems of the project come before those of installed packages, and these before example
+    systems. Raises UsageError.
     """
+    from composer.installed_projects import installed_systems
+
     path = Path(text)
     if path_exists(path) and not _is_folder(path):
         return path  # the loader reports what is wrong with it
     own, examples = project_systems(), example_systems()
     if text in own:
         return _own_system(text, own[text], examples.get(text))
+    installed = installed_systems()
+    if text in installed:
+        return installed[text]
     if text in examples:
         return examples[text]
     if _is_folder(path):
         raise UsageError(f"'{text}' is a folder, not a system file")
     from composer.diagnostics import nearest
 
-    close = nearest_path(path) or nearest(text, (*own, *examples))
+    close = nearest_path(path) or nearest(text, (*own, *installed, *examples))
     listed = "example systems: " + ", ".join(sorted(examples))
+    if installed:
+        packages = sorted(name for name in installed if "/" in name)
+        listed = f"installed systems: {', '.join(packages)}\n{listed}"
     raise UsageError(
         f"there is no file '{text}' and no example system of that name",
         hint=listed if close is None else f"did you mean '{close}'?\n{listed}",
