@@ -30,6 +30,8 @@ COMMANDS = {
     "graph": "graph",
     "diff": "diff",
     "import": "import_nodes",
+    "new": "new",
+    "interfaces": "interfaces",
     "lifecycle": "lifecycle",
     "node": "node",
     "topic": "topic",

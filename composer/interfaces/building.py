@@ -13,6 +13,8 @@ def how_to_build(package: str, folder: Path | None) -> str:
     A package with a pyproject.toml can be built by pip, without colcon.
     """
     by_colcon = f"colcon build --packages-select {package}, then source install/setup.bash"
-    if folder is None or not (folder / "pyproject.toml").is_file():
+    if folder is None:
         return by_colcon
+    if not (folder / "pyproject.toml").is_file():
+        return f"compose interfaces build {package}   or: {by_colcon}"
     return f"pip install {shown_path(folder)}   or: {by_colcon}"

@@ -4,10 +4,29 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
 from composer.cli.support.errors import CommandError
+
+
+def write_new_files(root: Path, files: Mapping[str, str]) -> None:
+    """Write new files below ``root``, all or none, and their folders. Raises CommandError."""
+    for path in files:
+        if (root / path).exists():
+            raise CommandError(
+                f"'{root / path}' exists already", hint="choose another name, or remove it first"
+            )
+    written: list[Path] = []
+    try:
+        for path, text in files.items():
+            write_new_file(root / path, text)
+            written.append(root / path)
+    except CommandError:
+        for file in written:
+            file.unlink(missing_ok=True)
+        raise
 
 
 def write_new_file(path: Path, text: str) -> None:

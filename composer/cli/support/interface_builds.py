@@ -1,0 +1,70 @@
+"""Build interface packages with pip or colcon."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from importlib.metadata import distributions
+from pathlib import Path
+
+from composer.cli.support.errors import CommandError
+from composer.cli.support.terminal import say
+from composer.scaffolding.interface_package import InvalidPackage, read_package
+
+_WHEEL_PREFIX = "ros-"
+
+
+def wheel_versions() -> dict[str, str]:
+    """Return the versions of the ROS packages that pip has installed, by their ROS names."""
+    found = {}
+    for item in distributions():
+        name = item.metadata["Name"] or ""
+        if name.startswith(_WHEEL_PREFIX):
+            found[name.removeprefix(_WHEEL_PREFIX).replace("-", "_")] = item.version
+    return found
+
+
+def complete_package(name: str, folder: Path, target: Path) -> None:
+    """Write the complete package to ``target``, which is replaced. Raises CommandError."""
+    try:
+        files = read_package(name, folder).files(wheel_versions())
+        shutil.rmtree(target, ignore_errors=True)
+        for path, text in files.items():
+            file = target / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text, encoding="utf-8")
+    except InvalidPackage as error:
+        raise CommandError(str(error), hint="with a sourced ROS 2, use --generate") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise CommandError(f"cannot complete package '{name}': {error}") from error
+
+
+def install_package(name: str, folder: Path) -> None:
+    """Build a complete package with pip, and install it for this Python. Raises CommandError."""
+    if "rclpy" not in wheel_versions():
+        raise CommandError(
+            "pip can build interfaces only where ROS 2 is installed from PyPI",
+            hint=f"colcon build --base-paths {folder}",
+        )
+    say(f"building {name}, which takes up to a minute")
+    done = subprocess.run(  # noqa: S603 - this very Python
+        [
+            sys.executable,
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--no-deps",
+            "--force-reinstall",
+            folder,
+        ],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+    if done.returncode != 0:
+        say(done.stdout + done.stderr)
+        raise CommandError(f"package '{name}' was not built", hint="see the output of pip above")

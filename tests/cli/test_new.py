@@ -1,0 +1,53 @@
+"""``compose new``: what it creates is valid and has a passing test."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.cli.compose import compose
+
+_SUFFIXES = (".yaml", ".py", ".xml", ".md", ".msg")
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    done = compose("new", "project", "my_robot")
+    assert done.code == 0, done.err
+    assert "my_robot/systems/my_robot.yaml" in done.out.splitlines()
+    monkeypatch.chdir(tmp_path / "my_robot")
+    return tmp_path / "my_robot"
+
+
+def test_a_project_and_what_is_added_to_it_are_valid(project: Path) -> None:
+    assert compose("validate", "--strict", ".").code == 0
+    for kind, name in (("system", "arm"), ("node", "gripper"), ("interfaces", "my_msgs")):
+        done = compose("new", kind, name)
+        assert done.code == 0, done.err
+        for path in done.out.splitlines():
+            assert (project / path).is_file()
+    done = compose("validate", "--strict", ".")
+    assert done.code == 0, done.out
+    assert "my_msgs/msg/Status" in compose("interface", "list").out
+    texts = [path.read_text() for path in project.rglob("*") if path.suffix in _SUFFIXES]
+    assert not [text for text in texts if "@name@" in text or "@class@" in text]
+
+
+def test_files_are_not_replaced(project: Path) -> None:
+    before = (project / "nodes" / "counter.py").read_text()
+    done = compose("new", "node", "counter")
+    assert done.code == 1
+    assert "counter.yaml' exists already" in done.err
+    assert (project / "nodes" / "counter.py").read_text() == before
+    (project / "systems" / "arm.yaml").touch()
+    assert compose("new", "system", "arm").code == 1
+    assert not (project / "tests" / "test_arm.py").exists()
+
+
+@pytest.mark.parametrize("name", ["My", "9lives", "a-b", "a__b", "a/b", "", "composer"])
+def test_names_that_ros_or_python_do_not_accept_are_refused(name: str, project: Path) -> None:
+    done = compose("new", "node", name)
+    assert done.code == 2
+    assert f"'{name}'" in done.err
