@@ -17,7 +17,7 @@ from composer.interfaces.definitions import parts
 from composer.resources import interfaces_folder
 
 FOLDERS = ("msg", "srv", "action")
-#: What the generated code of each kind of interface uses, beside the types of its fields.
+#: What the generated code of each kind of interface uses, in addition to the types of its fields.
 _IMPLIED: Mapping[str, tuple[str, ...]] = {
     "msg": (),
     "srv": ("service_msgs",),
