@@ -195,6 +195,7 @@ class Behavior:
         "clock",
         "log",
         "name",
+        "node",
         "parameters",
         "publishers",
     )
@@ -206,6 +207,7 @@ class Behavior:
     action_clients: Any  # self.action_clients.navigate: an ActionClient
     log: Logger
     clock: Clock
+    node: Any  # an rclpy Node for libraries that need one; what it creates follows the lifecycle
 
 
 Changes = Mapping[str, Any]

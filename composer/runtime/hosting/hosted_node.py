@@ -26,6 +26,7 @@ from composer.runtime.hosting.errors import HostingError
 from composer.runtime.hosting.instance import HostedEntities, Instance, InstanceSettings
 from composer.runtime.hosting.logger import HostedLogger
 from composer.runtime.hosting.names import action_names, remapping_arguments
+from composer.runtime.hosting.shared_state import SharedState
 from composer.runtime.hosting.user_code import ThreadedCall
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import BehaviorLoadError, behavior_class
@@ -63,7 +64,7 @@ class HostedNode(LocalNode):
         self._entities = HostedEntities()
         self._log_level: LogLevel = options.log_level
         self._instance: Instance | None = None
-        self._restore: list[Callable[[], None]] = []
+        self._shared: SharedState | None = None
         self._overrides = {
             parameter.name.value: RosParameter(parameter.name.value, value=ros_value(parameter))
             for parameter in model.parameters
@@ -104,7 +105,7 @@ class HostedNode(LocalNode):
         instance = self._new_instance()
         self._instance, self._entities = instance, instance.entities
         vars(self._ros)["_composer_instance"] = instance
-        self._remember_shared_state()
+        self._shared = SharedState(self._ros)
         target = node_class(self._hosted.reference)
         await self._in_thread(instance, partial(self._construct, target, instance), "constructor")
         self._report_ports(instance.ports)
@@ -158,8 +159,8 @@ class HostedNode(LocalNode):
         for service in instance.lasting_services:
             self.loop.remove(service)
             self._ros.destroy_service(service)
-        while self._restore:
-            self._restore.pop()()
+        if self._shared is not None:
+            self._shared.restore()
         self._check_threads(instance.threads)
 
     # --- parts
@@ -209,18 +210,6 @@ class HostedNode(LocalNode):
             if follow is not None:
                 follow()
 
-    def _remember_shared_state(self) -> None:
-        """Restore what an instance changes of the ROS node when the instance ends."""
-        node: Any = self._ros
-        for shared in (
-            node._parameters,
-            node._descriptors,
-            node._pre_set_parameters_callbacks,
-            node._on_set_parameters_callbacks,
-            node._post_set_parameters_callbacks,
-        ):
-            self._restore.append(partial(_restore, shared, shared.copy()))
-
     def _report_ports(self, ports: DeclaredPorts) -> None:
         log = self._context.log
         for port in ports.undeclared:
@@ -249,14 +238,6 @@ class HostedNode(LocalNode):
 
 
 _STATE_IDS = {"unconfigured": 1, "inactive": 2, "active": 3, "finalized": 4}
-
-
-def _restore(shared: Any, before: Any) -> None:
-    shared.clear()
-    if isinstance(shared, dict):
-        shared.update(before)
-    else:
-        shared.extend(before)
 
 
 def node_class(reference: BehaviorReference) -> type[RosNode]:

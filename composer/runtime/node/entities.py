@@ -11,7 +11,7 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import ReactionClient, RunningReaction
 from composer.runtime.intra_process.publisher import GatedPublisher
 from composer.runtime.node.behavior_loader import method
-from composer.runtime.node.local_node import RunningPort
+from composer.runtime.node.local_node import Entities, RunningPort
 from composer.runtime.ports.action_client import ActionClientPort
 from composer.runtime.ports.action_server import ActionServerPort, Handlers
 from composer.runtime.ports.client import ClientPort
@@ -40,6 +40,7 @@ class NodeEntities:
     timers: dict[str, TimerPort] = field(default_factory=dict)
     transitions: dict[Event, RunningReaction] = field(default_factory=dict)
     always_on: list[RunningPort] = field(default_factory=list)
+    of_libraries: Entities | None = None  # created with the behavior's `node`
 
     @property
     def senders(self) -> dict[str, GatedPublisher]:
@@ -48,7 +49,7 @@ class NodeEntities:
 
     @property
     def ports(self) -> Iterator[RunningPort]:
-        """All ports: first those that send, then those that receive, then timers."""
+        """All ports: first those that send, then those that receive, timers, those of libraries."""
         yield from self.publishers.values()
         yield from self.clients.values()
         yield from self.action_clients.values()
@@ -56,6 +57,8 @@ class NodeEntities:
         yield from self.services.values()
         yield from self.action_servers.values()
         yield from self.timers.values()
+        if self.of_libraries is not None:
+            yield from self.of_libraries.ports
 
     @property
     def gated(self) -> Iterator[RunningPort]:

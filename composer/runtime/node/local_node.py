@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from time import monotonic
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from rclpy.node import Node as RosNode
 
@@ -74,6 +74,21 @@ class Entities(Protocol):
     @property
     def action_servers(self) -> Mapping[str, ActionServing]:
         """The action servers among them, by name."""
+
+
+class LibraryNode(Protocol):
+    """An rclpy node for the libraries that a behavior uses: what they create follows the node."""
+
+    @property
+    def node(self) -> Any:
+        """The rclpy node."""
+
+    @property
+    def entities(self) -> Entities:
+        """What was created with it."""
+
+    def end(self) -> None:
+        """Release it, once its entities are destroyed."""
 
 
 class LocalNode(ABC):

@@ -25,11 +25,12 @@ from composer.runtime.node.behavior_loader import (
     named_ports,
 )
 from composer.runtime.node.entities import NodeEntities
-from composer.runtime.node.local_node import LocalNode
+from composer.runtime.node.local_node import LibraryNode, LocalNode
 from composer.runtime.node.managed_node import NodeListener
 from composer.runtime.node.options import NodeOptions
 from composer.runtime.node.outcome import TransitionOutcome
 from composer.runtime.node.parameters import NodeParameters, ParameterValues
+from composer.runtime.ports.timer import TimerPort
 
 _EVENTS = {
     "configure": Event.CONFIGURE,
@@ -60,6 +61,8 @@ class RunningNode(LocalNode):
         super().__init__(model, loop, options, listener, statistics)
         self._behavior: Any = None
         self._cleaned_up_behavior: Any = None  # for ``on_shutdown``
+        self._make_library_node = options.make_library_node
+        self._library: LibraryNode | None = None
         self._entities = NodeEntities(self._context, self._always_on_context)
         parameters = NodeParameters(
             self._ros, model.parameters, check=self._check_timers, changed=self._parameters_changed
@@ -99,6 +102,10 @@ class RunningNode(LocalNode):
         behavior.publishers = named_ports("publisher", entities.senders)
         behavior.clients = named_ports("client", entities.clients)
         behavior.action_clients = named_ports("action client", entities.action_clients)
+        if self._make_library_node is not None and not hasattr(behavior, "node"):
+            library: LibraryNode = self._make_library_node(self)
+            self._library, entities.of_libraries = library, library.entities
+            behavior.node = library.node
         self._set_used(behavior, behavior.publishers, *entities.senders.values())
 
     def _set_used(self, *used: object) -> None:
@@ -138,6 +145,9 @@ class RunningNode(LocalNode):
         is_clean = outcome is not None and outcome.transition == "cleanup" and outcome.success
         self._cleaned_up_behavior = self._behavior if is_clean else None
         self._entities = NodeEntities(self._context, self._always_on_context)
+        if self._library is not None:
+            self._library.end()
+            self._library = None
         self._behavior = None
         self._set_used()
 
@@ -147,8 +157,9 @@ class RunningNode(LocalNode):
         self._context.strand.post(self._follow_clock)
 
     def _follow_clock(self) -> None:
-        for timer in self._entities.timers.values():
-            timer.follow_clock()
+        for timer in self._entities.ports:
+            if isinstance(timer, TimerPort):
+                timer.follow_clock()
 
     def _check_timers(self, values: Mapping[str, Any]) -> str | None:
         """Return why a timer cannot use the new parameter values, or None."""

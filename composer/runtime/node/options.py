@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from rclpy.node import Node as RosNode
 
@@ -31,6 +33,7 @@ class NodeOptions:
     those of the system; ``seen_messages`` is set if messages are checked for changes by callbacks;
     ``parallel`` is true if its loop has several threads; ``system_is_up`` is false during the
     bring-up, when errors do not count as faults: some nodes wait for others.
+    ``make_library_node(node)`` returns the rclpy node that the libraries of its behavior use.
     """
 
     router: LocalRouter
@@ -41,3 +44,4 @@ class NodeOptions:
     log_level: LogLevel = LogLevel.INFO
     transition_timeout_s: float = 10.0
     system_is_up: bool = False
+    make_library_node: Callable[[Any], Any] | None = None

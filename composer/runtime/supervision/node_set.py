@@ -26,6 +26,7 @@ from composer.runtime.children.outside_node import OutsideContext
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.factory import log_exception, make_loop, place_threads
 from composer.runtime.executors.loop import Loop
+from composer.runtime.hosting.behavior_node import NodeOfBehavior
 from composer.runtime.hosting.hosted_node import HostedNode
 from composer.runtime.intra_process.eligibility import shared_channels
 from composer.runtime.intra_process.router import LocalRouter
@@ -241,6 +242,7 @@ class NodeSet:
             log_level=self._options.log_level,
             transition_timeout_s=self._timeout_s(node),
             system_is_up=before is not None,
+            make_library_node=lambda owner: NodeOfBehavior(owner, self._options.log_level),
         )
         loop = self._loop_of(executor)
         kind = RunningNode if node.hosted_class is None else HostedNode

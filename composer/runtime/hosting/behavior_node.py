@@ -1,0 +1,55 @@
+"""The rclpy node of a behavior, for libraries such as tf2_ros and message_filters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from composer.model import LogLevel
+from composer.runtime.hosting.adopted_node import AdoptedNode
+from composer.runtime.hosting.declared_ports import DeclaredPorts
+from composer.runtime.hosting.dispatch import install
+from composer.runtime.hosting.instance import HostedEntities, Instance, InstanceSettings
+from composer.runtime.hosting.logger import HostedLogger
+from composer.runtime.hosting.shared_state import SharedState
+from composer.runtime.node.local_node import LocalNode
+
+
+class NodeOfBehavior:
+    """Adopts the ROS node of a behavior, from its configuration to its cleanup.
+
+    What is created with it is gated by the lifecycle state. None of it is a declared port.
+    """
+
+    def __init__(self, owner: LocalNode, level: LogLevel) -> None:
+        install()
+        context, _ = owner.contexts
+        self._shared = SharedState(context.node)
+        self._instance = Instance(
+            owner.contexts,
+            DeclaredPorts(replace(owner.model, ports=())),
+            InstanceSettings(
+                overrides={},
+                logger=HostedLogger(context.log, context.node.get_logger().name, level),
+                action_names={},
+                finish=lambda reason: context.error_log.error("node", reason),
+                request=lambda transition: context.error_log.error("node", transition),
+                current_state=lambda: (0, owner.state),
+            ),
+        )
+        node: Any = AdoptedNode.__new__(AdoptedNode)
+        node._composer_instance = self._instance
+        AdoptedNode.__init__(node)
+        self.node = node
+
+    @property
+    def entities(self) -> HostedEntities:
+        """What was created with the node."""
+        return self._instance.entities
+
+    def end(self) -> None:
+        """Release the node: its handle is not valid any more."""
+        self._instance.ended.set()
+        for executor in self._instance.executors:
+            executor.shutdown(0.0)
+        self._shared.restore()
