@@ -46,10 +46,9 @@ def remove_incomplete_ports(domain_id: int, folder: Path = SHARED_MEMORY) -> Non
     if not folder.is_dir():
         return
     ports = ports_of_domain(domain_id)
-    for path in sorted(folder.iterdir()):
-        port = _PORT.fullmatch(path.name)
-        if port is None:
-            continue
+    names = sorted(path.name for path in folder.iterdir())
+    for port in filter(None, map(_PORT.fullmatch, names)):
+        path = folder / port[0]
         status = _status(path)
         if status is None:
             continue
