@@ -147,7 +147,10 @@ class ExecutableNode(OutsideNode):
         child, remote = self._child, self._remote
         if child is None or remote is None:
             raise TransitionRefused("its process does not run", UNCONFIGURED)
-        request = self.loop.run_task(remote.change(transition, monotonic() + self._timeout_s))
+        limit_s = self._timeout_s
+        if self._end_s is not None:
+            limit_s = min(limit_s, max(0.0, self._end_s - monotonic()) * _END_SHARE)
+        request = self.loop.run_task(remote.change(transition, monotonic() + limit_s))
         child.ended.add_done_callback(lambda _: request.cancel())
         try:
             await self._until(request.done, float("inf"))
@@ -157,7 +160,7 @@ class ExecutableNode(OutsideNode):
             success, state = request.result()
         except NotAnswered as error:
             await self._end_process()
-            text = f"{error} within {self._timeout_s:g} s; its process was ended"
+            text = f"{error} within {limit_s:.3g} s; its process was ended"
             raise TransitionRefused(text, UNCONFIGURED) from error
         if not success:
             raise TransitionRefused(f"its service reports a failure; it is {state}", state)
