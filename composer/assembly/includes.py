@@ -119,7 +119,11 @@ class IncludeResolver:
         nodes = tree.get("nodes")
         names = tuple(entry.name for entry in nodes) if isinstance(nodes, Mapping) else ()
         wildcards = Wildcards(names, self.limits)
-        changes = {"nodes": wildcards.in_nodes, "connections": wildcards.in_connections}
+        changes = {
+            "nodes": wildcards.in_nodes,
+            "processes": wildcards.in_processes,
+            "connections": wildcards.in_connections,
+        }
         return Mapping(
             tuple(
                 Entry(entry.key, changes[entry.name](entry.value))

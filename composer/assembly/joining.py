@@ -16,6 +16,7 @@ INCLUDE = "include"
 _MAPS = {
     "qos_profiles": "QoS profile",
     "executors": "executor",
+    "processes": "process",
     "nodes": "node",
     "chains": "chain",
 }

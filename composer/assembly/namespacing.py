@@ -44,6 +44,7 @@ def add_namespace(tree: Mapping, placement: Placement, includer: Path, folder: P
         "nodes": lambda part: names.change_nodes(part, defaults),
         "connections": names.change_connections,
         "chains": names.change_chains,
+        "processes": names.change_processes,
         "parameter_files": lambda part: _relative_to(includer, folder, part),
     }
     return Mapping(
@@ -123,6 +124,12 @@ class _NameChanges:
             Entry(self._prefixed_key(entry.key), _changed(entry.value, renamed)) for entry in tree
         )
         return Mapping(tuple(chains), tree.span)
+
+    def change_processes(self, tree: Tree) -> Tree:
+        def renamed(entry: Entry) -> Tree:
+            return self._add_prefix(entry.value) if entry.name == "nodes" else entry.value
+
+        return _changed(tree, lambda process: _changed(process.value, renamed))
 
     def _node(self, entry: Entry, defaults: dict[str, Mapping]) -> Entry:
         key = self._prefixed_key(entry.key)

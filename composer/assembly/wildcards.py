@@ -29,6 +29,16 @@ class Wildcards:
             return tree
         return Sequence(tuple(self._in_connection(item) for item in tree.items), tree.span)
 
+    def in_processes(self, tree: Tree) -> Tree:
+        """Return ``processes`` with all nodes that match patterns."""
+        return _changed(tree, lambda process: _changed(process.value, self._in_process))
+
+    def _in_process(self, entry: Entry) -> Tree:
+        tree = entry.value
+        if entry.name == "nodes" and isinstance(tree, Sequence) and _has_wildcard(tree.items):
+            return Sequence(tuple(self._names(tree.items)), tree.span)
+        return tree
+
     def in_nodes(self, tree: Tree) -> Tree:
         """Return ``nodes`` with dependencies on all nodes that match patterns."""
         return _changed(tree, lambda node: self._in_node(node.value))

@@ -77,8 +77,12 @@ def _has_lifecycle(node: Node) -> bool:
 
 
 def _is_manager(system: System, other: ObservedNode) -> bool:
-    """Return whether this is the manager node of the system."""
-    return other.full_name.endswith(f"/{system.name.value}/{_MANAGER}") and any(
+    """Return whether this is the manager node of the system, or of one of its processes."""
+    name = system.name.value
+    processes = (f"{name}/{process.name.value}" for process in system.processes)
+    return any(
+        other.full_name.endswith(f"/{part}/{_MANAGER}") for part in (name, *processes)
+    ) and any(
         endpoint.name == f"{other.full_name}/{_MANAGER_SERVICE}" for endpoint in other.endpoints
     )
 
@@ -127,12 +131,8 @@ def _of_state(node: Node, observed: ObservedNode, state: str) -> Iterator[Drift]
         )
 
 
-_REACHED = {"configure": "inactive", "activate": "active"}
-
-
 def states_after_bring_up(system: System, autostart: PrimaryState | None = None) -> dict[str, str]:
     """Return the lifecycle state that the bring-up moves each node to, by its key in the system."""
-    states = dict.fromkeys((node.name.value for node in system.nodes), "unconfigured")
-    for step in bring_up(system, autostart).steps:
-        states[step.node] = _REACHED.get(step.transition, states[step.node])
-    return states
+    states = {node.name.value: PrimaryState.UNCONFIGURED for node in system.nodes}
+    reached = bring_up(system, autostart).states_after(states)
+    return {name: state.value for name, state in reached.items()}

@@ -37,6 +37,7 @@ from composer.model.ports import (
     Timer,
     TimerClock,
 )
+from composer.model.processes import Process, member_system
 from composer.model.supervision import (
     DEFAULT_SUPERVISION,
     OnFailure,
@@ -104,6 +105,7 @@ __all__ = [
     "PortKind",
     "PortOfNode",
     "PrimaryState",
+    "Process",
     "Qos",
     "QosReference",
     "Reaction",
@@ -118,4 +120,5 @@ __all__ = [
     "UnmatchedParameters",
     "Watch",
     "channels",
+    "member_system",
 ]

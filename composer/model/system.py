@@ -30,6 +30,7 @@ from composer.model.ports import (
     Reaction,
     Timer,
 )
+from composer.model.processes import Process
 from composer.model.supervision import DEFAULT_SUPERVISION, Supervision
 from composer.source import Located, SourceFile, Span
 from composer.tree import Plain
@@ -125,6 +126,7 @@ class Node:
     reactions: tuple[tuple[Event, Reaction], ...] = ()
     remappings: tuple[Remapping, ...] = ()
     executor: Located[str] | None = None
+    process: Located[str] | None = None  # not set: that of the system
     depends_on: tuple[Dependency, ...] = ()
     autostart: Located[PrimaryState] | None = None
     supervision: Supervision = DEFAULT_SUPERVISION
@@ -140,6 +142,11 @@ class Node:
     def ros_name(self) -> Located[str]:
         """The name of the node in ROS, without its namespace."""
         return self.name if self.own_name is None else self.own_name
+
+    @property
+    def in_process(self) -> bool:
+        """Whether the node runs in the process of its system."""
+        return self.process is None and self.implementation.in_process
 
     @property
     def implementation(self) -> ImplementationKind:
@@ -300,6 +307,7 @@ class System:
     qos_profiles: tuple[NamedQos, ...] = ()
     qos_references: tuple[QosReference, ...] = ()
     executors: tuple[Executor, ...] = ()
+    processes: tuple[Process, ...] = ()
     autostart: PrimaryState = PrimaryState.ACTIVE
     supervision: Supervision = DEFAULT_SUPERVISION
     implied_dependencies: bool = True

@@ -32,6 +32,16 @@ class Step:
         return f"#{self.number} {self.transition} {self.full_name}{after}: {self.cause}"
 
 
+#: The state in which each transition ends; shutdown leaves the primary states of a plan.
+_REACHED = {
+    "configure": PrimaryState.INACTIVE,
+    "activate": PrimaryState.ACTIVE,
+    "deactivate": PrimaryState.INACTIVE,
+    "cleanup": PrimaryState.UNCONFIGURED,
+    "shutdown": PrimaryState.UNCONFIGURED,
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Plan:
     """Steps in an order in which they can be carried out."""
@@ -47,6 +57,11 @@ class Plan:
         """
         grouped = groupby(self.steps, key=lambda step: step.transition)
         return tuple(tuple(steps) for _, steps in grouped)
+
+    def states_after(self, states: Mapping[str, PrimaryState]) -> Mapping[str, PrimaryState]:
+        """Return the states to which the plan leads from ``states``, by the keys of nodes."""
+        reached = {step.node: _REACHED[step.transition] for step in self.steps}
+        return {**states, **reached}
 
     def __str__(self) -> str:
         return "\n".join(str(step) for step in self.steps)

@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 
 from composer.remote.name_matching import NotFoundError, not_found_error
 from composer.remote.session import Deadline, NoResponseError, Session
-from composer.remote.systems import Systems
+from composer.remote.systems import Systems, without_members
 from composer.runtime.process.instance_lock import local_systems
 
 #: Managers publish their last report to each new subscription, and again every second.
@@ -22,7 +22,11 @@ def find_managed_nodes(
     A target is a full name, the last part of a name, or a pattern. Raises NotFoundError;
     NoResponseError if a target is not found and a system does not respond.
     """
-    names = {*session.wait_until_settled(systems.discover, deadline), *local_systems()}
+    names: Iterable[str] = {
+        *session.wait_until_settled(systems.discover, deadline),
+        *local_systems(),
+    }
+    names = without_members(names)  # the others move their nodes for one of these
     reports = systems.reports(names, Deadline(min(_REPORT_WITHIN_S, deadline.left_s)))
     system_of = {
         node.node: name for name, report in reports.items() if report for node in report.nodes

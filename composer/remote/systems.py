@@ -105,6 +105,7 @@ class Systems:
         )
         if not known:
             raise NotFoundError("no system is running", "start one with 'compose run'")
+        known = without_members(known)
         if len(known) > 1:
             raise NotFoundError(
                 "more than one system is running", f"specify one of: {', '.join(known)}"
@@ -270,6 +271,12 @@ class _ProcessDeadline(Deadline):
     def has_process_ended(self) -> bool:
         """Whether the process has ended."""
         return self._is_local and self._system not in local_systems()
+
+
+def without_members(systems: Iterable[str]) -> list[str]:
+    """Return the systems without those that are processes of another one in the list."""
+    names = sorted(systems)
+    return [name for name in names if name.rpartition("/")[0] not in names]
 
 
 def _matches(name: str, systems: Iterable[str]) -> list[str]:

@@ -77,7 +77,7 @@ def _executable(entry: Entry, tree: Mapping, folder: Path) -> Executable:
         command=texts(tree.get("command")),
         arguments=_words(tree.get("arguments")),
         environment=tuple(
-            (key(item), _word(item.value)) for item in entries(tree.get("environment"))
+            (key(item), word(item.value)) for item in entries(tree.get("environment"))
         ),
         working_directory=text(tree.get("working_directory")),
         kind=default.kind if kind is None else kind.value,
@@ -105,10 +105,10 @@ def _milliseconds(tree: Tree | None, default: float) -> float:
 
 def _words(tree: Tree | None) -> tuple[Located[str], ...]:
     items = getattr(tree, "items", ())
-    return tuple(Located(_word(item), item.span) for item in items if isinstance(item, Scalar))
+    return tuple(Located(word(item), item.span) for item in items if isinstance(item, Scalar))
 
 
-def _word(tree: Tree) -> str:
+def word(tree: Tree) -> str:
     """Return a scalar as a program sees it in its arguments or environment."""
     if not isinstance(tree, Scalar) or tree.value is None:
         return ""

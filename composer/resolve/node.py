@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from collections.abc import Mapping as Map
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,6 +50,7 @@ class SystemContext:
     introspection: Tree | None
     parameter_files: ParameterFiles
     use_sim_time: tuple[Entry, ...]  # the system's entry, if it has one
+    processes: Map[str, Located[str]]  # by the nodes that they name
     diagnostics: list[Diagnostic]
 
 
@@ -113,6 +115,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         reactions=declared.reactions,
         remappings=remappings,
         executor=text(tree.get("executor")),
+        process=text(tree.get("process")) or context.processes.get(entry.name),
         depends_on=_dependencies(lifecycle.get("depends_on")),
         autostart=state(lifecycle.get("autostart")),
         supervision=read_supervision(lifecycle, context.supervision),

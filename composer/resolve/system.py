@@ -23,6 +23,7 @@ from composer.resolve.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import read_parameter_files
 from composer.resolve.parameters import with_use_sim_time, with_values
+from composer.resolve.processes import processes_of_nodes, read_processes
 from composer.resolve.qos import qos_table
 from composer.resolve.source_folders import SourceFolders
 from composer.resolve.tree_values import (
@@ -58,6 +59,7 @@ def resolve_system(
     written = tree.get("parameter_files")
     files = read_parameter_files(written, folders.home, folders.node_types.project, diagnostics)
     clock = _use_sim_time(tree, overrides)
+    processes = read_processes(tree.get("processes"))
     context = SystemContext(
         folders,
         namespace,
@@ -69,6 +71,7 @@ def resolve_system(
         tree.get("introspection"),
         files,
         clock,
+        processes_of_nodes(processes),
         diagnostics,
     )
     nodes = tuple(resolve_node(entry, context) for entry in entries(tree.get("nodes")))
@@ -86,6 +89,7 @@ def resolve_system(
         qos_profiles=qos.named,
         qos_references=tuple(qos.references),
         executors=tuple(_executor(entry) for entry in entries(tree.get("executors"))),
+        processes=processes,
         autostart=autostart.value if autostart is not None else PrimaryState.ACTIVE,
         supervision=system_supervision,
         delivery=delivery.value if delivery is not None else Delivery.AUTO,

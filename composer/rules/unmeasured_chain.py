@@ -52,7 +52,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for chain in context.system.chains:
         for endpoint in chain.through:
             node = context.system.node(endpoint.node)
-            if node is None or node.implementation.in_process:
+            if node is None or node.in_process:
                 continue
             yield Diagnostic(
                 RULE,

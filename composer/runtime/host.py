@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
@@ -32,13 +32,14 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import get_rmw_implementation_identifier, try_shutdown
 
-from composer.model import LogLevel, Node, PrimaryState, System
+from composer.model import LogLevel, Node, PrimaryState, Process, System
 from composer.model.dependencies import dependency_edges, in_dependency_order
 from composer.names import join
 from composer.plan import Fault, Plan
+from composer.runtime.executors.process_limits import memory_excess, place_process
 from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
 from composer.runtime.manager.other_instances import Instance
-from composer.runtime.node.managed_node import ManagedNode, NodeListener
+from composer.runtime.node.managed_node import NodeListener
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
 from composer.runtime.process.dds_profiles import use_large_system_profile
@@ -61,7 +62,6 @@ from composer.runtime.supervision.supervisor import Supervisor
 #: The longest share of the time for the tear-down that one step may take.
 _STEP_SHARE = 0.6
 _URGENT_S = 0.2
-_REACHED = {"configure": PrimaryState.INACTIVE, "activate": PrimaryState.ACTIVE}
 #: This many nodes can be destroyed one by one within half a second.
 _FEW_NODES = 20
 #: Joining the ROS graph takes a tenth of a second, on a busy machine some tenths.
@@ -77,6 +77,9 @@ class HostOptions:
     ``tracing`` records callback timings, also of callbacks without a ``budget_ms``;
     ``check_mutation`` checks after each callback whether it has modified a message.
     ``fail_on_error`` makes errors of user code and failed calls a failure of the run.
+
+    ``process`` is set if the system is the part of another one that a process of it runs;
+    ``member_command`` starts such processes of this system, with ``--process NAME`` after it.
 
     ``end_within(seconds)`` has to end the process after that time, whatever hangs in it; None
     cancels that. It is called with ``grace_s`` as soon as the system stops, and never canceled
@@ -96,6 +99,8 @@ class HostOptions:
     check_mutation: bool = False
     fail_on_error: bool = False
     ends_process: bool = False
+    process: Process | None = None
+    member_command: Sequence[str] = ()
 
 
 class Host:
@@ -125,6 +130,9 @@ class Host:
                 transition_timeout_s=self._options.transition_timeout_s,
                 tracing=self._options.tracing,
                 check_mutation=self._options.check_mutation,
+                namespace=join(system.namespace, system.name.value),
+                member_command=self._options.member_command,
+                write_log=self._reporter.log,
             ),
         )
         self._supervisor = Supervisor(
@@ -158,6 +166,8 @@ class Host:
         signals = stop_signals(
             self.stop, self._main_queue.wakeup, ends_process=self._options.ends_process
         )
+        if self._options.process is not None:
+            self._node_set.warnings += place_process(self._options.process)
         with hold_instance_lock(namespace), signals:
             self._limit_start()
             try:
@@ -190,7 +200,13 @@ class Host:
         )
         use_sim_time = self._system.use_sim_time
         try:
-            return ManagerNode(namespace, self._status, callbacks, use_sim_time=use_sim_time)
+            return ManagerNode(
+                namespace,
+                self._status,
+                callbacks,
+                use_sim_time=use_sim_time,
+                is_member=self._options.process is not None,
+            )
         except rclpy_implementation.RCLError as error:
             raise start_refused(error) from error
 
@@ -261,11 +277,10 @@ class Host:
 
     def _reached(self) -> Mapping[str, PrimaryState]:
         """Return the states that the bring-up has reached, also of nodes that have failed since."""
-        states = dict(self._node_set.states())
-        for step in self._up.steps:
-            if step.node in self._supervisor.desired.unhandled:
-                states[step.node] = _REACHED.get(step.transition, states[step.node])
-        return states
+        states = self._node_set.states()
+        planned = self._up.states_after(states)
+        failed = self._supervisor.desired.unhandled.keys() & planned.keys()
+        return {**states, **{name: planned[name] for name in failed}}
 
     def _supervise(self) -> None:
         run_for_s = self._options.run_for_s
@@ -300,6 +315,10 @@ class Host:
         nodes = tuple(self._node_set.nodes.items())
         self._status.measure({name: node.statistics for name, node in nodes})
         self._status.update_states({name: node.state for name, node in nodes})
+        excess = None if self._options.process is None else memory_excess(self._options.process)
+        if excess is not None and not self._main_queue.stopping:
+            self._reporter.log(LogLevel.ERROR, "composer", excess)
+            self._fail(excess)
 
     # --- end
 
@@ -324,7 +343,7 @@ class Host:
             limit_s = _STEP_SHARE * stop_within_s
             if not self._supervisor.tear_down(self._down, self._tear_down_end_s, limit_s):
                 self._failed = True
-        self._summary = tuple(_summary(node) for node in self._node_set.nodes.values())
+        self._summary = self._node_set.summaries()
         if self._options.fail_on_error and any(node.errors for node in self._summary):
             self._failed = True
 
@@ -370,17 +389,3 @@ def _start_ros() -> None:
         rclpy.init(args=list(ROS_ARGUMENTS), signal_handler_options=SignalHandlerOptions.NO)
     except rclpy_implementation.RCLError as error:
         raise start_refused(error) from error
-
-
-def _summary(node: ManagedNode) -> NodeSummary:
-    counters = node.statistics
-    return NodeSummary(
-        node=node.full_name,
-        state=node.state,
-        received=counters.received,
-        sent=counters.sent,
-        calls=counters.calls,
-        dropped=counters.dropped,
-        skipped=counters.skipped,
-        errors=counters.errors,
-    )

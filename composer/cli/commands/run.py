@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import signal
 import sys
 from dataclasses import replace
@@ -11,14 +12,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.support.errors import FAILED, CommandError
+from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.options import Namespace, examples, finite
 from composer.cli.support.ros import require_interfaces, require_ros
 from composer.cli.support.system_arguments import SystemName, load_system, system_file
 from composer.cli.support.terminal import say, write
 
 if TYPE_CHECKING:
-    from composer.model import System
+    from composer.model import Process, System
     from composer.plan import Plan
     from composer.runtime.host import HostOptions
     from composer.runtime.supervision.events import Outcome
@@ -34,6 +35,7 @@ EPILOGS = {
         "compose run pipeline --use-sim-time                   use the time of a simulator",
         "compose run pipeline --autostart inactive             configure nodes, do not activate",
         "compose run pipeline --wait --timeout 10              run in the background",
+        "compose run robot.yaml --process perception           run one of its processes alone",
     )
 }
 
@@ -140,6 +142,15 @@ def run(
             show_default="no limit; 60 with --wait",
         ),
     ] = None,
+    process: Annotated[
+        str | None,
+        typer.Option(
+            "--process",
+            metavar="NAME",
+            help="Run only this process of the system; 'compose run' without it moves its nodes.",
+            show_default=False,
+        ),
+    ] = None,
     grace: Annotated[
         float,
         typer.Option(
@@ -154,16 +165,28 @@ def run(
     """Run a system.
 
     The system is validated first, and nothing is started if it has errors. All nodes run in this
-    process. They are brought up in dependency order and shut down in reverse order. If the bring-up
-    fails, it is rolled back. Press Ctrl-C to shut down.
+    process, except for executables and the nodes of other processes, which it starts. They are
+    brought up in dependency order and shut down in reverse order. If the bring-up fails, it is
+    rolled back. Press Ctrl-C to shut down.
 
     Exit code 1 if the system has errors, the bring-up fails, or a node fails permanently. Errors of
     handlers are reported in the summary; use --fail-on-error in tests.
     """
-    declared = _load(system, settings or [], namespace, use_sim_time=use_sim_time)
-    from composer.model import PrimaryState
+    declared = _load(
+        system,
+        settings or [],
+        namespace,
+        use_sim_time=use_sim_time,
+        only_errors=process is not None,  # the coordinating process prints the warnings
+    )
+    from composer.model import PrimaryState, member_system
     from composer.plan import bring_up
 
+    member = None if process is None else _member(declared, process)
+    if member is not None:
+        os.environ.update({name.value: value for name, value in member.environment})
+        declared = member_system(declared, member.name.value)
+        autostart = Autostart.UNCONFIGURED
     plan = bring_up(declared, PrimaryState(autostart.value) if autostart is not None else None)
     if dry_run:
         if plan.steps:
@@ -175,29 +198,46 @@ def run(
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     require_ros("compose run")
     require_interfaces(declared)
+    switches = ["--use-sim-time"] if use_sim_time else []
+    switches += [] if tracing else ["--no-tracing"]
+    switches += ["--check-mutation"] if check_mutation else []
     if wait:
         from composer.cli.support.process import run_in_background
 
         up_s = _WAIT_S if timeout is None else timeout
         given = _arguments(system, settings or [], namespace, autostart, log_level)
-        given += ["--use-sim-time"] if use_sim_time else []
-        given += [] if tracing else ["--no-tracing"]
-        given += ["--check-mutation"] if check_mutation else []
+        given += switches
         given += ["--fail-on-error"] if fail_on_error else []
+        given += [] if process is None else ["--process", process]
         limits = _numbers({"--for": run_for, "--timeout": up_s, "--grace": grace})
         limit_s = up_s + grace + _START_S
         write(run_in_background(declared.name.value, [*given, *limits], limit_s))
         return
     options = _options(run_for, timeout, grace, log_level)
+    from composer.cli.support.process import compose_command
+
+    given = _arguments(system, settings or [], namespace, None, log_level)
     options = replace(
-        options, tracing=tracing, check_mutation=check_mutation, fail_on_error=fail_on_error
+        options,
+        tracing=tracing,
+        check_mutation=check_mutation,
+        fail_on_error=fail_on_error,
+        process=member,
+        member_command=(*compose_command(), "run", *given, *switches),
     )
     outcome = _run(declared, plan, options)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
 
 
-def _load(text: str, settings: list[str], namespace: str | None, *, use_sim_time: bool) -> System:
+def _load(
+    text: str,
+    settings: list[str],
+    namespace: str | None,
+    *,
+    use_sim_time: bool,
+    only_errors: bool,
+) -> System:
     path = system_file(text)
     result = load_system(
         path,
@@ -205,6 +245,7 @@ def _load(text: str, settings: list[str], namespace: str | None, *, use_sim_time
         settings=settings,
         namespace=namespace,
         use_sim_time=use_sim_time,
+        only_errors=only_errors,
     )
     if result.system is not None and result.system.node_type:
         raise CommandError(
@@ -214,6 +255,17 @@ def _load(text: str, settings: list[str], namespace: str | None, *, use_sim_time
     if result.system is None or not result.is_runnable:
         raise typer.Exit(FAILED)
     return result.system
+
+
+def _member(system: System, name: str) -> Process:
+    """Return a process of the system by its name."""
+    from composer.diagnostics import suggestion
+
+    found = {process.name.value: process for process in system.processes}
+    if name not in found:
+        hint = suggestion(name, list(found)) or "the system has no 'processes'"
+        raise UsageError(f"'{name}' is not a process of system '{system.name}'", hint=hint)
+    return found[name]
 
 
 def _arguments(
@@ -263,7 +315,8 @@ def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
             outcome = host.run()
         except StartRefused as refusal:
             raise CommandError(str(refusal), hint=refusal.hint) from refusal
-        say(summary(outcome))
+        if options.process is None or sys.stderr.isatty():
+            say(summary(outcome))
     if outcome.hung:
         end_now(outcome.exit_code)
     return outcome

@@ -24,6 +24,12 @@ _MIN_DELAY_S = 0.001
 _LAST_RESORT_S = 1.0
 
 
+def compose_command() -> tuple[str, ...]:
+    """Return the first words of a command line that runs this program again."""
+    # -P: do not import modules from the current folder
+    return (sys.executable, "-P", "-m", "composer")
+
+
 def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> str:
     """Start ``compose run`` with ``arguments``; return its report once the system is up.
 
@@ -37,8 +43,7 @@ def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> 
     with os.fdopen(reading, encoding="utf-8") as pipe, output:
         try:
             process = subprocess.Popen(  # noqa: S603 - this very program
-                # -P: do not import modules from the current folder
-                [sys.executable, "-P", "-m", "composer", "run", *arguments],
+                [*compose_command(), "run", *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,
@@ -68,9 +73,16 @@ def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> 
     return f"{report} (process {process.pid}, log {log})"
 
 
-def report_ready(text: str) -> None:
+def take_ready_descriptor() -> str | None:
+    """Return where to report that the system is up, if a command waits for that.
+
+    Child processes do not inherit it.
+    """
+    return os.environ.pop(READY_VARIABLE, None)
+
+
+def report_ready(descriptor: str | None, text: str) -> None:
     """Report to the command that started this process in the background that the system is up."""
-    descriptor = os.environ.pop(READY_VARIABLE, None)
     if descriptor is not None:
         with os.fdopen(int(descriptor), "w", encoding="utf-8") as pipe:
             pipe.write(text)

@@ -9,7 +9,7 @@ from typing import TextIO
 from composer.characters import escape_lines
 from composer.cli.support.callback_tables import summary_table
 from composer.cli.support.line_format import Line, LineFormat
-from composer.cli.support.process import report_ready
+from composer.cli.support.process import report_ready, take_ready_descriptor
 from composer.cli.support.terminal import columns, lines, use_color
 from composer.runtime.supervision.events import (
     BroughtUp,
@@ -44,13 +44,15 @@ class Progress:
         self._stream = stream
         self._color = use_color(stream)
         self._format = line_format
+        self._ready = take_ready_descriptor()
 
     def show(self, event: Event) -> None:
         """Print the event."""
         if isinstance(event, CallbackFailed):
             return
         if isinstance(event, BroughtUp):
-            report_ready(str(event))
+            report_ready(self._ready, str(event))
+            self._ready = None
         line = self._line(event)
         code = _code(event)
         if self._color and code:

@@ -168,10 +168,12 @@ def load_system(
     settings: Iterable[str] = (),
     namespace: str | None = None,
     use_sim_time: bool = False,
+    only_errors: bool = False,
 ) -> LoadResult:
     """Read and check the system in ``path``; print errors and warnings to stderr.
 
-    Only ``compose validate`` reports diagnostics of severity info.
+    With ``only_errors``, leave out the warnings. Only ``compose validate`` reports diagnostics of
+    severity info.
     """
     from composer.diagnostics import Severity
     from composer.loading import load
@@ -183,7 +185,8 @@ def load_system(
         shown=str(path) if shown is None or not path_exists(Path(shown)) else shown,
         overrides=OverrideOptions(tuple(settings), namespace, use_sim_time),
     )
-    reported = [item for item in result.diagnostics if item.severity is not Severity.INFO]
+    severities = (Severity.ERROR,) if only_errors else (Severity.ERROR, Severity.WARNING)
+    reported = [item for item in result.diagnostics if item.severity in severities]
     if reported:
         say_raw(render(reported, color=use_color(sys.stderr)))
     return result

@@ -129,11 +129,14 @@ def _groups(system: System, several: bool) -> Iterator[ExecutorGroup]:
     prefix = f"{system.name.value} · " if several else ""
     for name in dict.fromkeys([*declared, *map(_executor_name, system.nodes)]):
         kind = _kind(declared.get(name))
-        label = f"{prefix}{name}" if name in _OUTSIDE.values() else f"{prefix}{name}: {kind}"
+        has_kind = name not in _OUTSIDE.values() and not name.startswith(_PROCESS)
+        label = f"{prefix}{name}: {kind}" if has_kind else f"{prefix}{name}"
         yield ExecutorGroup(_executor_key(system, name), label)
 
 
 def _executor_name(node: Node) -> str:
+    if node.process is not None:
+        return f"{_PROCESS}{node.process.value}"
     if not node.implementation.in_process:
         return _OUTSIDE[node.implementation]
     return node.executor.value if node.executor is not None else DEFAULT_EXECUTOR
@@ -142,6 +145,7 @@ def _executor_name(node: Node) -> str:
 #: The kinds of nodes that are noted on them.
 _NOTED = (ImplementationKind.CLASS, ImplementationKind.EXECUTABLE, ImplementationKind.EXTERNAL)
 #: The groups of nodes that no executor runs.
+_PROCESS = "process "
 _OUTSIDE = {
     ImplementationKind.EXECUTABLE: "child processes",
     ImplementationKind.EXTERNAL: "external nodes",

@@ -37,6 +37,7 @@ def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
         "executable": str(node.executable) if node.executable is not None else None,
         "external": node.external is not None or None,
         "executor": _executor(node),
+        "process": node.process.value if node.process is not None else None,
         "description": node.description or None,
         "declared_at": str(node.span),
         "depends_on": [

@@ -25,6 +25,7 @@ from composer.runtime.executors.futures import Future
 _READ_BYTES = 65_536
 #: How long the launcher may take to kill what is left, on a busy machine.
 _LAUNCHER_ENDS_WITHIN_S = 2.0
+_POLL_S = 0.005
 
 
 class StartFailed(Exception):
@@ -51,6 +52,7 @@ class Child:
     started: Future[int] = field(default_factory=Future)  # its process id
     ended: Future[int] = field(default_factory=Future)
     outputs: dict[int, OutputLines] = field(default_factory=dict)  # by descriptor
+    is_ending: bool = False
 
     @property
     def pid(self) -> int | None:
@@ -122,11 +124,19 @@ class ChildProcesses:
     def end(self, child: Child, terminate_s: float, kill_s: float) -> None:
         """Interrupt a child; terminate it after ``terminate_s``, kill it after ``kill_s`` more."""
         if not child.ended.done():
+            child.is_ending = True
             with suppress(OSError):  # the launcher is gone, and with it its children
                 self._send({"end": child.number, "terminate_s": terminate_s, "kill_s": kill_s})
 
-    def close(self) -> None:
-        """End all children that are left at once, and the launcher."""
+    def close(self, end_s: float = 0.0) -> None:
+        """End the launcher, and before it all children that have not ended by ``end_s``.
+
+        Until then (monotonic), it waits for those that are ending already.
+        """
+        while time.monotonic() < end_s and any(
+            child.is_ending for child in tuple(self._children.values())
+        ):
+            time.sleep(_POLL_S)
         with self._lock:
             connection, self._connection = self._connection, None
             running = self._launcher

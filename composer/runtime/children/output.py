@@ -12,7 +12,10 @@ _CUT = b" ..."
 #: More lines than this within a second are dropped: they cannot be read, and the log has to go on.
 _MAX_LINES_PER_S = 500
 #: The format that the composer asks the loggers of ROS for, see ``CONSOLE_FORMAT``.
-_ROS_LINE = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[([^\]\s]+)\]:? (.*)", re.DOTALL)
+#: Lines of ``compose run`` itself begin with the time since its start.
+_ROS_LINE = re.compile(
+    r"(?:\[\d+\.\d+\] )?\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[([^\]\s]+)\]:? (.*)", re.DOTALL
+)
 _COLORS = re.compile(rb"\x1b\[[0-9;]*m")
 
 

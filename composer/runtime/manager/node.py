@@ -108,8 +108,12 @@ class ManagerNode:
         host: ManagerCallbacks,
         *,
         use_sim_time: bool = False,
+        is_member: bool = False,
     ) -> None:
-        """Join the ROS graph. With ``use_sim_time``, stamps have the time of /clock."""
+        """Join the ROS graph. With ``use_sim_time``, stamps have the time of /clock.
+
+        With ``is_member``, another process of the system moves all nodes by this manager.
+        """
         self._status = status
         self._host = host
         self._started_s = time.monotonic()
@@ -147,7 +151,7 @@ class ManagerNode:
             on_older=host.on_older_instance,
             on_permanent=self._warn_of_instance,
         )
-        if any(node.left_to_manager for node in status.snapshot().nodes):
+        if is_member or any(node.left_to_manager for node in status.snapshot().nodes):
             ProxyLifecycleService(self._node, self._loop, host.nodes, self._publish)
         self._graph = GraphObserver(self._node, self._state.topic_name)
         queries = ManagerQueries(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,10 +19,13 @@ from composer.model import (
     System,
 )
 from composer.runtime.callbacks.chains import Chains
+from composer.runtime.callbacks.log import Write
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.children.executable_node import ExecutableNode
 from composer.runtime.children.external_node import ExternalNode
+from composer.runtime.children.member_node import MemberNode
+from composer.runtime.children.member_process import MemberContext, MemberProcess
 from composer.runtime.children.outside_node import OutsideContext
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.factory import log_exception, make_loop, place_threads
@@ -37,6 +41,7 @@ from composer.runtime.node.node import RunningNode
 from composer.runtime.node.options import NodeOptions, ProcessContext
 from composer.runtime.node.outcome import FINALIZED
 from composer.runtime.node.parameters import ParameterError
+from composer.runtime.supervision.events import NodeSummary
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.source import Located
 
@@ -62,13 +67,18 @@ class NodeSetOptions:
     """How all nodes are run.
 
     ``transition_timeout_s`` overrides the system's; ``tracing`` records callback timings;
-    ``check_mutation`` checks whether callbacks change messages.
+    ``check_mutation`` checks whether callbacks change messages. ``namespace`` is that of the
+    manager, ``member_command`` starts the other processes of the system, and
+    ``write_log`` receives what they print.
     """
 
     log_level: LogLevel
     transition_timeout_s: float | None
     tracing: bool
     check_mutation: bool
+    namespace: str = ""
+    member_command: Sequence[str] = ()
+    write_log: Write = lambda *_: None
 
 
 class NodeSet:
@@ -95,6 +105,8 @@ class NodeSet:
         self.hung: set[str] = set()
         self._keeps_entities = False
         self._children = ChildProcesses()
+        self._processes = {process.name.value: process for process in system.processes}
+        self._members: dict[str, MemberProcess] = {}
         #: What Linux or the middleware does not allow, each with a hint.
         self.warnings: list[str] = []
 
@@ -119,6 +131,8 @@ class NodeSet:
             except Exception as error:
                 reason = f"cannot be created: {describe(error)}"
                 raise CreationFailed(node.full_name, reason) from error
+        for member in self._members.values():
+            member.start_soon()
         for name, loop in self.loops.items():
             loop.start()
             if name in self._executors:
@@ -146,6 +160,22 @@ class NodeSet:
             figures(node.full_name, callback)
             for node in tuple(self.nodes.values())
             for callback in tuple(node.statistics.callbacks.values())
+        )
+
+    def summaries(self) -> tuple[NodeSummary, ...]:
+        """Return the states and the counters of all nodes."""
+        return tuple(
+            NodeSummary(
+                node=node.full_name,
+                state=node.state,
+                received=node.statistics.received,
+                sent=node.statistics.sent,
+                calls=node.statistics.calls,
+                dropped=node.statistics.dropped,
+                skipped=node.statistics.skipped,
+                errors=node.statistics.errors,
+            )
+            for node in self.nodes.values()
         )
 
     def chains(self) -> tuple[ChainFigures, ...]:
@@ -209,7 +239,9 @@ class NodeSet:
         Return False if some are left to the end of the process: Fast DDS takes longer for each
         endpoint the more there are, seconds for 100 nodes, and a hung loop never ends.
         """
-        self._children.close()
+        for member in self._members.values():
+            member.close()
+        self._children.close(end_s)
         if self._keeps_entities:
             return False
         complete = not self.hung
@@ -230,7 +262,7 @@ class NodeSet:
         statistics = (
             Statistics(tracing=self._options.tracing) if before is None else before.statistics
         )
-        if not node.implementation.in_process:
+        if not node.in_process:
             return self._make_outside(node, statistics)
         executor = self._executor_of(node)
         options = NodeOptions(
@@ -259,11 +291,31 @@ class NodeSet:
             timeout_s=self._timeout_s(node),
             log_level=self._options.log_level,
         )
+        if node.process is not None:
+            return MemberNode(node, self._member_process(node.process.value), context)
         if node.external is not None:
             return ExternalNode(node, node.external, context)
         if node.executable is not None:
             return ExecutableNode(node, node.executable, context)
         raise AssertionError(f"{node.full_name} runs in this process")
+
+    def _member_process(self, name: str) -> MemberProcess:
+        """Return a process of the system, for the first of its nodes a new one."""
+        if name not in self._members:
+            process = self._processes[name]
+            host = None if process.host is None else process.host.value
+            loop = Executor(Located(_OUTSIDE, process.span), ExecutorKind.EVENTS, process.span)
+            context = MemberContext(
+                loop=self._loop_of(loop),
+                manager=self._process.manager,
+                children=self._children,
+                namespace=self._options.namespace,
+                command=self._options.member_command,
+                is_local=host in (None, "localhost", socket.gethostname()),
+                write_log=self._options.write_log,
+            )
+            self._members[name] = MemberProcess(process, context)
+        return self._members[name]
 
     def _loop_of(self, executor: Executor) -> Loop:
         name = executor.name.value

@@ -252,6 +252,7 @@ class Supervisor:
         self._reporter.report(
             NodeFailed(self._reporter.elapsed_s, node.full_name, fault.text, consequence)
         )
+        self._publish_desired()  # before the node moves: not to be taken for an external transition
         if fault.kind is FaultKind.LOST:
             node.lifecycle.fail_request()
             self._abandon_loop(name)

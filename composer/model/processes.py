@@ -1,0 +1,60 @@
+"""The processes of a system, each with some of its nodes."""
+
+from __future__ import annotations
+
+from dataclasses import field, replace
+from typing import TYPE_CHECKING
+
+from composer.fast_dataclass import dataclass
+from composer.source import Located, Span
+
+if TYPE_CHECKING:
+    from composer.model.system import System
+
+
+@dataclass(frozen=True, slots=True)
+class Process:
+    """A process with nodes of the system.
+
+    ``nodes`` are the nodes that it names; a node may also name its process itself. ``cpus`` and
+    ``priority`` are as for executors, and apply to all of its threads. If it uses more than
+    ``memory_mb`` of memory, it fails. Without a ``host``, it runs on the computer of the system.
+    """
+
+    name: Located[str]
+    span: Span = field(compare=False)
+    nodes: tuple[Located[str], ...] = ()
+    cpus: tuple[int, ...] = ()
+    priority: int | None = None
+    environment: tuple[tuple[Located[str], str], ...] = ()
+    memory_mb: Located[float] | None = None
+    host: Located[str] | None = None
+
+
+def member_system(system: System, process: str) -> System:
+    """Return the part of a system that one of its processes runs, as a system of its own.
+
+    The process that runs the whole system coordinates it: it decides when nodes of this part are
+    brought up, and how their failures are handled. So they have no dependencies here, stay
+    unconfigured at first, and are only taken down if they fail.
+    """
+    nodes = tuple(
+        replace(
+            node,
+            process=None,
+            depends_on=(),
+            autostart=None,
+            supervision=replace(node.supervision, on_failure=None),
+        )
+        for node in system.nodes
+        if node.process is not None and node.process.value == process
+    )
+    return replace(
+        system,
+        name=system.name.map(lambda name: f"{name}/{process}"),
+        nodes=nodes,
+        connections=(),
+        implied_dependencies=False,
+        supervision=replace(system.supervision, on_failure=None),
+        processes=(),
+    )
