@@ -20,7 +20,7 @@ from composer.runtime.executors.futures import Future
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.supervision.commands import Commands
 from composer.runtime.supervision.events import Reporter
-from composer.runtime.supervision.main_queue import Item, MainQueue, NodeEvent
+from composer.runtime.supervision.main_queue import Command, Item, MainQueue, NodeEvent
 from composer.runtime.supervision.node_listener import SupervisionListener
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
@@ -336,7 +336,7 @@ class Supervision(RuleBasedStateMachine):
     def command(self, name: str, script: Script) -> None:
         self.world.allow(*NAMES)
         self.world.play(script)
-        self.is_reconciled, _ = self.commands.run(name)
+        self.is_reconciled, _ = self.commands.run(Command(name, lambda *_: None))
 
     @invariant()
     def external_transitions_last(self) -> None:
