@@ -150,7 +150,7 @@ def hosted(*, long: bool) -> list[Row]:
 
 
 def external(*, long: bool) -> list[Row]:
-    """Measure the CPU of one of two processes that exchange a single message."""
+    """Measure the CPU of one of two processes that exchange a single message, and large ones."""
     rounds, seconds = (9, 3.0) if long else (5, 2.0)
     variants = (COMPOSED, SINGLE, EVENTS, BARE) if long else (COMPOSED, EVENTS, BARE)
     case = Case("ring", 2, seconds, rounds, apart=True)
@@ -158,7 +158,10 @@ def external(*, long: bool) -> list[Row]:
         near = run_time_slices(variants, case)
     far = run_time_slices(variants, case)
     measured = rows("external process, one processor", CPU, near, cpu_us)
-    return measured + rows("external process, all processors", CPU, far, cpu_us)
+    measured += rows("external process, all processors", CPU, far, cpu_us)
+    images = Case("ring", 2, seconds, rounds, message="Image", apart=True)
+    turns = run_rounds((COMPOSED, EVENTS), images)
+    return measured + rows("external process, Image", "us/message", turns, _interval_us)
 
 
 def tracing(*, long: bool) -> list[Row]:
@@ -171,6 +174,11 @@ def tracing(*, long: bool) -> list[Row]:
 def cpu_us(result: Mapping[str, Any]) -> float | None:
     """Return the CPU time per message; None if none was delivered."""
     return 1e6 * result["cpu_s"] / result["delivered"] if result["delivered"] else None
+
+
+def _interval_us(result: Mapping[str, Any]) -> float | None:
+    """Return the time per message of the process; None if none was delivered."""
+    return 1e6 * result["wall_s"] / result["delivered"] if result["delivered"] else None
 
 
 def _lost(case: Case) -> Figure:
