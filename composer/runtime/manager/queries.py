@@ -8,20 +8,26 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import ParameterValue
 
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.proxy_services import ProxyParameterStore
-from composer.runtime.node.parameter_services import in_slices
+from composer.runtime.node.parameter_services import count_items, in_slices
 from composer.runtime.process.query_socket import GRAPH, NODE, NODES, PARAMETERS, STATUS, Answer
 from composer.runtime.ros.manager_protocol import full_parameter_name
+from composer.runtime.ros.parameter_description import ParameterDescription
 from composer.runtime.ros.parameter_values import description, plain_value
 
 #: Commands wait a little longer. A node that hangs does not answer.
 _PARAMETERS_WITHIN_S = 0.4
+#: Parameters, array items and characters in one answer: writing it as JSON holds the GIL. Larger
+#: values are left to the parameter services.
+_MAX_ITEMS = 20_000
 
 
 class ManagerQueries:
@@ -79,15 +85,21 @@ class ManagerQueries:
             return None
         return future.result()
 
-    async def _collect(self, nodes: list[str]) -> dict[str, list[Any]]:
-        return {node: await self._of_node(node) for node in nodes}
+    async def _collect(self, nodes: list[str]) -> dict[str, list[Any]] | None:
+        """Return the parameters of the nodes, None if they are too many or too large."""
+        left = _MAX_ITEMS
+        found: dict[str, list[Any]] = {}
+        for node in nodes:
+            found[node] = []
+            names = await self._parameters.names_of(node)
+            async for described, value in in_slices(names, partial(self._parameter, node)):
+                left -= 1 + count_items(value)
+                if left < 0:
+                    return None
+                found[node].append([asdict(described), plain_value(value)])
+        return found
 
-    async def _of_node(self, node: str) -> list[Any]:
+    async def _parameter(self, node: str, name: str) -> tuple[ParameterDescription, ParameterValue]:
         store = self._parameters
-
-        async def one(parameter: str) -> list[Any]:
-            name = parameter if node == store.manager else full_parameter_name(node, parameter)
-            described = description(parameter, await store.descriptor(name))
-            return [asdict(described), plain_value(await store.value(name))]
-
-        return [item async for item in in_slices(await store.names_of(node), one)]
+        full_name = name if node == store.manager else full_parameter_name(node, name)
+        return description(name, await store.descriptor(full_name)), await store.value(full_name)

@@ -168,7 +168,7 @@ class ParameterServices:
         values: list[ParameterValue] = []
         items = 0
         async for value in in_slices(request.names, self._store.value):
-            items += _items(value)
+            items += count_items(value)
             if items > MAX_ITEMS:
                 reason = f"more than {MAX_ITEMS} array items and characters in one response"
                 self._refuse("get_parameters", reason, response)
@@ -218,7 +218,8 @@ class _NextTurn:
         yield
 
 
-def _items(value: ParameterValue) -> int:
+def count_items(value: ParameterValue) -> int:
+    """Return the number of array items and characters of a value."""
     return len(value.string_value) + sum(
         map(
             len,
