@@ -47,7 +47,11 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
     entry_points={
-        "console_scripts": [f"{name} = {target}" for name, target in PROJECT["scripts"].items()]
+        group: [f"{name} = {target}" for name, target in scripts.items()]
+        for group, scripts in {
+            "console_scripts": PROJECT["scripts"],
+            **PROJECT["entry-points"],
+        }.items()
     },
     zip_safe=False,
 )

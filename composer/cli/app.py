@@ -30,6 +30,7 @@ COMMANDS = {
     "graph": "graph",
     "diff": "diff",
     "import": "import_nodes",
+    "export": "export",
     "new": "new",
     "interfaces": "interfaces",
     "lifecycle": "lifecycle",

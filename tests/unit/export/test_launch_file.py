@@ -1,0 +1,45 @@
+"""Launch files that run a system."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from tests.cli.compose import compose
+
+SYSTEM = "system: robot\nnodes: {a: {on_activate: {log: hello}}}\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "systems").mkdir()
+    (tmp_path / "systems" / "robot.yaml").write_text(SYSTEM)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_launch_file_names_the_system_relative_to_itself(folder: Path) -> None:
+    done = compose("export", "launch", "systems/robot.yaml", "-o", "launch/robot.launch.py")
+    assert (done.code, done.out) == (0, ""), done.err
+    text = (folder / "launch" / "robot.launch.py").read_text()
+    ast.parse(text)
+    assert "SYSTEM = (Path(__file__).parent / '../systems/robot.yaml').resolve()" in text
+    done = compose("export", "launch", "systems/robot.yaml", "-o", "launch/robot.launch.py")
+    assert done.code == 1
+    assert "exists already" in done.err
+
+
+def test_on_stdout_the_path_is_absolute(folder: Path) -> None:
+    done = compose("export", "launch", "robot")
+    assert done.code == 0, done.err
+    assert f"SYSTEM = Path({str(folder / 'systems' / 'robot.yaml')!r})\n" in done.out
+
+
+def test_a_system_with_errors_is_not_exported(folder: Path) -> None:
+    (folder / "systems" / "robot.yaml").write_text("system: robot\nnodes: {a: {type: nothing}}\n")
+    done = compose("export", "launch", "robot", "-o", "robot.launch.py")
+    assert done.code == 1
+    assert "unknown-node-type" in done.err
+    assert not (folder / "robot.launch.py").exists()
