@@ -91,6 +91,7 @@ class Scheduler(BaseLoop):
         end_s = inf if timeout_s is None else monotonic() + timeout_s
         timer = None if timeout_s is None else self.call_later(timeout_s, self._leave)
         future.add_done_callback(self._leave)
+        self._timers.next_due_s()  # without the timer that is calling now, if any
         running = self._running
         try:
             while True:

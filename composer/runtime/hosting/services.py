@@ -97,8 +97,14 @@ def hosted_future(instance: Instance, error: BaseException) -> HostedFuture:
     """Return a future that has failed with ``error``."""
     future = HostedFuture()
     future._instance = instance
-    future.set_exception(error)
+    fail(future, error)
     return future
+
+
+def fail(future: Future, error: BaseException) -> None:
+    """Fail a future. rclpy prints exceptions that are never retrieved; this one need not be."""
+    future.set_exception(error)
+    future.exception()
 
 
 class ClientPort:
@@ -120,7 +126,7 @@ class ClientPort:
         gate = self._instance.context.gate
         for future in tuple(self._client._pending_requests.values()):
             future._set_executor(self._instance.context.node.executor)
-            future.set_exception(CallCancelled(gate.refusal))
+            fail(future, CallCancelled(gate.refusal))
 
     def destroy(self) -> None:
         """Fail the pending calls and destroy the client."""

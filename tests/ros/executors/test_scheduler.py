@@ -360,6 +360,20 @@ def test_waits_within_waits_end_inside_out(on: Bench) -> None:
     assert order == ["served", "inner", "outer"]
 
 
+def test_a_timer_that_waits_longer_than_its_period_is_called_again_after_it(on: Bench) -> None:
+    answered: Future[None] = Future()
+    waits: list[bool] = []
+    others: list[float] = []
+    timer = on.loop.call_every(0.001, lambda: waits.append(on.loop.wait_for(answered, 5.0)))
+    on.loop.call_every(0.002, lambda: others.append(time.monotonic()))
+    wait_until(lambda: len(others) >= 10)
+    assert waits == []
+    answered.set_result(None)
+    wait_until(lambda: len(waits) >= 3)
+    timer.cancel()
+    assert on.errors() == []
+
+
 def test_a_wait_ends_in_time_and_when_the_loop_stops(on: Bench) -> None:
     never: Future[None] = Future()
     results: list[bool] = []
