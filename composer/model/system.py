@@ -23,6 +23,7 @@ from composer.model.ports import (
     Delivery,
     Event,
     Isolation,
+    LogLevel,
     Parameter,
     Port,
     PortKind,
@@ -127,6 +128,7 @@ class Node:
     remappings: tuple[Remapping, ...] = ()
     executor: Located[str] | None = None
     process: Located[str] | None = None  # not set: that of the system
+    log_level: Located[LogLevel] | None = None  # None: that of the run
     depends_on: tuple[Dependency, ...] = ()
     autostart: Located[PrimaryState] | None = None
     supervision: Supervision = DEFAULT_SUPERVISION

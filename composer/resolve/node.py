@@ -13,6 +13,7 @@ from composer.model import (
     DRIVEN_BY_MANAGER,
     USE_SIM_TIME,
     Dependency,
+    LogLevel,
     Node,
     Port,
     PrimaryState,
@@ -31,7 +32,15 @@ from composer.resolve.parameter_files import ParameterFiles
 from composer.resolve.parameters import with_use_sim_time, with_values
 from composer.resolve.qos import QosTable
 from composer.resolve.source_folders import SourceFolders
-from composer.resolve.tree_values import entries, is_opaque, key, plain_text, text, text_or_opaque
+from composer.resolve.tree_values import (
+    choice,
+    entries,
+    is_opaque,
+    key,
+    plain_text,
+    text,
+    text_or_opaque,
+)
 from composer.source import Located
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
@@ -116,6 +125,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         remappings=remappings,
         executor=text(tree.get("executor")),
         process=text(tree.get("process")) or context.processes.get(entry.name),
+        log_level=choice(tree.get("log_level"), LogLevel),
         depends_on=_dependencies(lifecycle.get("depends_on")),
         autostart=state(lifecycle.get("autostart")),
         supervision=read_supervision(lifecycle, context.supervision),

@@ -271,10 +271,10 @@ class NodeSet:
             process=self._process,
             seen_messages=self._seen_messages,
             parallel=executor.kind is ExecutorKind.MULTI_THREADED,
-            log_level=self._options.log_level,
+            log_level=self._log_level_of(node),
             transition_timeout_s=self._timeout_s(node),
             system_is_up=before is not None,
-            make_library_node=lambda owner: NodeOfBehavior(owner, self._options.log_level),
+            make_library_node=lambda owner: NodeOfBehavior(owner, self._log_level_of(node)),
         )
         loop = self._loop_of(executor)
         kind = RunningNode if node.hosted_class is None else HostedNode
@@ -289,7 +289,7 @@ class NodeSet:
             listener=self._make_listener(node),
             statistics=statistics,
             timeout_s=self._timeout_s(node),
-            log_level=self._options.log_level,
+            log_level=self._log_level_of(node),
         )
         if node.process is not None:
             return MemberNode(node, self._member_process(node.process.value), context)
@@ -326,6 +326,9 @@ class NodeSet:
     def _timeout_s(self, node: Node) -> float:
         override_s = self._options.transition_timeout_s
         return node.supervision.timeout_ms / 1000.0 if override_s is None else override_s
+
+    def _log_level_of(self, node: Node) -> LogLevel:
+        return self._options.log_level if node.log_level is None else node.log_level.value
 
     def _executor_of(self, node: Node) -> Executor:
         """Return the executor that runs the node: by default ``default``, an event loop.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -97,7 +98,11 @@ def test_a_class_has_the_names_and_parameters_of_ros2_run(tmp_path: Path, peer: 
         try:
             expected = described(peer)
         finally:
-            program.terminate()
+            program.send_signal(signal.SIGINT)
+            try:
+                program.wait(10.0)
+            except subprocess.TimeoutExpired:
+                program.kill()
     wait_until(lambda: peer.node.count_publishers("/all/scan") == 0)
     assert expected["parameters"]["gains"] == [1.0, 2.5]
     with running(SYSTEM, tmp_path) as system:

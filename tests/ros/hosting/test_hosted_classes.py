@@ -12,6 +12,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Int64, String
 from std_srvs.srv import SetBool, Trigger
 
+from composer.runtime.supervision.events import Logged
 from tests.ros.support.in_process import Peer, end_limit_s, running, wait_until
 from tests.ros.support.node_classes import LATCHED
 
@@ -320,3 +321,45 @@ def test_the_log_of_a_class_goes_to_the_console_and_to_rosout(tmp_path: Path, pe
         wait_until(lambda: any(line.name == "listener.part" for line in lines))
         assert not logger.debug("not logged")
         assert [line for line in system.log() if line == "got 1"] == ["got 1"]
+
+
+def test_a_callback_group_of_the_class_is_named_and_log_levels_are_set_per_node(
+    tmp_path: Path,
+) -> None:
+    text = f"""
+    system: levels
+    nodes:
+      loud: {{class: "{CLASSES}:Grouped", log_level: debug}}
+      quiet: {{class: "{CLASSES}:Grouped", log_level: error}}
+      own:
+        log_level: warn
+        timers: {{tick: {{period_ms: 10, log: ticking}}}}
+    """
+    with running(text, tmp_path) as system:
+        system.wait_for_log("tick 3")
+        wait_until(lambda: system.node("quiet").instance.count >= 3)
+        loggers = {event.logger for event in system.reported(Logged)}
+        assert loggers == {"loud"}
+        warning = "callback group OwnGroup of the class is not asked: its callbacks exclude each"
+        assert warning in system.log_text()
+
+
+def test_isolation_share_assures_that_messages_are_not_used_again(
+    tmp_path: Path, peer: Peer
+) -> None:
+    text = f"""
+    system: shared
+    nodes:
+      reuser:
+        class: {CLASSES}:Reuser
+        publishers: {{numbers: {{type: std_msgs/msg/Int64, isolation: share}}}}
+      listener:
+        class: {CLASSES}:Listener
+        subscriptions: {{numbers: {{type: std_msgs/msg/Int64, isolation: share}}}}
+    """
+    with running(text, tmp_path) as system:
+        peer.publisher(String, "/go").publish(String())
+        listener = system.node("listener").instance
+        wait_until(lambda: len(listener.numbers) == 3)
+        assert listener.numbers[-1] == 3
+        assert listener.numbers != [1, 2, 3]  # one object, which this class does change

@@ -77,6 +77,7 @@ def test_a_handler_can_refuse_a_transition(tmp_path: Path, peer: Peer) -> None:
         ("SpinsInConstructor", "spins its node in its constructor or a transition"),
         ("MakesSecondNode", "creates a second node, 'helper'"),
         ("HasOwnArguments", "command-line arguments of its own; use 'remappings'"),
+        ("HasWaitable", "has a waitable of its own, Waitable; run it as an 'executable'"),
         ("Exits", "the constructor ends the process: SystemExit(3)"),
         ("NotANode", "is not derived from rclpy's Node"),
         ("Missing", "has no class 'Missing'"),

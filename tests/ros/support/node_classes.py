@@ -15,13 +15,18 @@ import rclpy
 from composer_interfaces.action import Navigate
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.action import ActionClient, ActionServer, CancelResponse
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.callback_groups import (
+    CallbackGroup,
+    MutuallyExclusiveCallbackGroup,
+    ReentrantCallbackGroup,
+)
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, State, TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.waitable import Waitable
 from std_msgs.msg import Int64, String
 from std_srvs.srv import SetBool, Trigger
 
@@ -188,6 +193,32 @@ class Groups(Node):
 
     def on_finish(self, _: String) -> None:
         self.done.set()
+
+
+class OwnGroup(CallbackGroup):
+    """A callback group of the class's own."""
+
+    def can_execute(self, entity: Any) -> bool:
+        return True
+
+    def beginning_execution(self, entity: Any) -> bool:
+        return True
+
+    def ending_execution(self, entity: Any) -> None:
+        pass
+
+
+class Grouped(Node):
+    """A timer in a callback group of the class's own."""
+
+    def __init__(self) -> None:
+        super().__init__("grouped")
+        self.count = 0
+        self.create_timer(0.01, self.tick, callback_group=OwnGroup())
+
+    def tick(self) -> None:
+        self.count += 1
+        self.get_logger().debug(f"tick {self.count}")
 
 
 class Counter(LifecycleNode):
@@ -378,6 +409,12 @@ class Exits(Node):
     def __init__(self) -> None:
         super().__init__("exits")
         raise SystemExit(3)
+
+
+class HasWaitable(Node):
+    def __init__(self) -> None:
+        super().__init__("waitable")
+        self.add_waitable(Waitable(self.default_callback_group))
 
 
 class WantsArguments(Node):
