@@ -60,6 +60,7 @@ from composer.runtime.ros.manager_protocol import (
     STATE_QOS,
     STATE_TOPIC,
 )
+from composer.runtime.ros.type_description import limit_type_descriptions
 from composer.runtime.supervision.main_queue import Command
 from composer.runtime.supervision.status import Status
 
@@ -127,6 +128,7 @@ class ManagerNode:
             enable_rosout=False,
             start_parameter_services=False,  # see parameter_services.py
         )
+        limit_type_descriptions(self._node)
         self._log = Log(self._node, LogLevel.INFO, host.write_log)
         store = ProxyParameterStore(self._node, host.nodes)
         ParameterServices(self._node, store, self._log.warn)

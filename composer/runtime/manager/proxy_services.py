@@ -35,6 +35,7 @@ from composer.runtime.node.parameter_services import (
     set_parameters,
     value_of,
 )
+from composer.runtime.ros.limited_requests import TooLarge, limited
 from composer.runtime.ros.manager_protocol import CHANGE_STATE, full_parameter_name
 
 #: Returns the nodes of the system by their full names.
@@ -51,10 +52,13 @@ class ProxyLifecycleService:
         self._loop = loop
         self._nodes = nodes
         self._publish_states = publish_states
-        service = node.create_service(ChangeState, f"~/{CHANGE_STATE}", unused_callback)
+        service = node.create_service(limited(ChangeState), f"~/{CHANGE_STATE}", unused_callback)
         loop.add_service(service, self._on_request)
 
     def _on_request(self, request: Any, reply: Reply) -> None:
+        if isinstance(request, TooLarge):
+            reply(ChangeState.Response(success=False))
+            return
         self._loop.run_task(self._change_state(request, reply))
 
     async def _change_state(self, request: Any, reply: Reply) -> None:

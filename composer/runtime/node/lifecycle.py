@@ -36,6 +36,7 @@ from composer.runtime.executors.loop import Reply, unused_callback
 from composer.runtime.executors.tasks import within
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.outcome import TransitionOutcome
+from composer.runtime.ros.limited_requests import TooLarge, limited
 
 _NAMES = {
     Transition.TRANSITION_CONFIGURE: "configure",
@@ -296,7 +297,11 @@ class Lifecycle:
 
     # --- the services
 
-    def _on_change_state(self, request: ChangeState.Request, reply: Reply) -> None:
+    def _on_change_state(self, request: ChangeState.Request | TooLarge, reply: Reply) -> None:
+        if isinstance(request, TooLarge):
+            self._warn("size", f"refused a request of 'change_state': {request.reason}")
+            reply(ChangeState.Response(success=False))
+            return
         if self._acquire() is not None:
             self._refuse(_label(request), f"the node is {self.state}")
             reply(ChangeState.Response(success=False))
@@ -364,7 +369,7 @@ def _services(node: Node, machine: Any) -> list[Service]:
     services = [
         Service(handle, kind, handle.name, unused_callback, group, QoSProfile(**handle.qos))
         for handle, kind in (
-            (machine.service_change_state, ChangeState),
+            (machine.service_change_state, limited(ChangeState)),
             (machine.service_get_state, GetState),
             (machine.service_get_available_states, GetAvailableStates),
             (machine.service_get_available_transitions, GetAvailableTransitions),

@@ -10,6 +10,7 @@ from rclpy.node import Node as RosNode
 from rclpy.parameter import Parameter
 
 from composer.model import Node
+from composer.runtime.ros.type_description import limit_type_descriptions
 
 
 class _NoPublisher:
@@ -39,7 +40,7 @@ def make_ros_node(model: Node, arguments: Sequence[str] = ()) -> RosNode:
     overrides = []
     if not offers.type_description:
         overrides.append(Parameter("start_type_description_service", value=False))
-    return kind(
+    node = kind(
         model.ros_name.value,
         namespace=model.namespace.value,
         cli_args=list(arguments),
@@ -48,3 +49,5 @@ def make_ros_node(model: Node, arguments: Sequence[str] = ()) -> RosNode:
         start_parameter_services=False,  # see parameter_services.py
         parameter_overrides=overrides,
     )
+    limit_type_descriptions(node)
+    return node

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -26,6 +27,7 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 from rclpy.type_support import check_is_valid_srv_type
+from type_description_interfaces.srv import GetTypeDescription
 
 #: Names in one request; a response with so many values takes a few milliseconds.
 MAX_NAMES = 10_000
@@ -33,6 +35,8 @@ MAX_NAMES = 10_000
 MAX_PARAMETERS = 1000
 #: Array items and characters of all values in one request or response.
 MAX_ITEMS = 1_000_000
+#: Characters of a label of a transition, or of the name of a type: names are shorter.
+MAX_CHARACTERS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +69,12 @@ class _Parameter(ctypes.Structure):
     ]
 
 
+class _Transition(ctypes.Structure):
+    """lifecycle_msgs/msg/Transition."""
+
+    _fields_ = [("id", ctypes.c_uint8), ("label", _Sequence)]
+
+
 #: Returns why the request at an address is too large, or None.
 _Check = Callable[[int], str | None]
 _Convert = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)
@@ -81,7 +91,7 @@ _functions: list[Any] = []
 
 @cache
 def limited(service: Any) -> Any:
-    """Return ``service``, a type of rcl_interfaces, with limited requests.
+    """Return ``service``, one of those below, with limited requests.
 
     A node that creates a server with the returned type takes a :class:`TooLarge` instead of a
     request that is too large.
@@ -122,6 +132,15 @@ def _check_parameters(address: int) -> str | None:
     return _over(items, MAX_ITEMS, "array items and characters")
 
 
+def _check_transition(address: int) -> str | None:
+    return _over(_Transition.from_address(address).label.size, MAX_CHARACTERS, "characters")
+
+
+def _check_type(address: int) -> str | None:
+    name_and_hash = (_Sequence * 2).from_address(address)
+    return _over(sum(text.size for text in name_and_hash), MAX_CHARACTERS, "characters")
+
+
 def _over(number: int, limit: int, what: str) -> str | None:
     return f"{number} {what} in one request, at most {limit}" if number > limit else None
 
@@ -133,4 +152,6 @@ _CHECKS: dict[Any, _Check] = {
     ListParameters: _check_prefixes,
     SetParameters: _check_parameters,
     SetParametersAtomically: _check_parameters,
+    ChangeState: _check_transition,
+    GetTypeDescription: _check_type,
 }

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import (
     GetParameters,
@@ -15,6 +17,7 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 from rclpy.parameter import Parameter as RosParameter
+from type_description_interfaces.srv import GetTypeDescription
 
 from composer.runtime.ros import limited_requests
 from tests.ros.support.commands import hand_written
@@ -77,6 +80,24 @@ def test_a_huge_request_is_refused_and_holds_up_no_callback(system: RunningSyste
     ]
     log = system.log_text()
     assert "refused a request of 'get_parameters': 100000 names in one request, at most" in log
+
+
+def test_long_texts_are_refused(system: RunningSystem, peer: Peer) -> None:
+    for length in (1000, 1001):
+        request = ChangeState.Request(transition=Transition(label="x" * length))
+        assert not peer.call(ChangeState, "/subject/change_state", request).success
+    log = system.log_text()
+    assert "refused 'xxx" in log
+    assert "refused a request of 'change_state': 1001 characters in one request, at most" in log
+    for node in ("/subject", "/served/manager"):
+        reasons = []
+        for type_hash in ("x", "x" * 1000):
+            asked = GetTypeDescription.Request(type_name="a/msg/B", type_hash=type_hash)
+            answer = peer.call(GetTypeDescription, f"{node}/get_type_description", asked)
+            assert not answer.successful
+            reasons.append(answer.failure_reason)
+        refused = "1007 characters in one request, at most 1000"
+        assert reasons == ["Failed to parse type hash", refused]
 
 
 def change(name: str, kind: int, **fields: Any) -> Parameter:
