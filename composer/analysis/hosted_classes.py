@@ -16,7 +16,14 @@ from composer.source import Span
 
 #: Where rclpy's node classes come from.
 _RCLPY = "rclpy"
-_LIBRARY_FOLDER = "rclpy"
+_NODES = frozenset(
+    {
+        ("rclpy.node", "Node"),
+        ("rclpy.lifecycle", "Node"),
+        ("rclpy.lifecycle", "LifecycleNode"),
+        ("rclpy.lifecycle.node", "LifecycleNode"),
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +49,7 @@ class ClassOfNode:
         """The methods of the class and of its bases outside of rclpy, nearest first."""
         seen: set[str] = set()
         for module, known in self.source.classes:
-            if _LIBRARY_FOLDER in module.path.parts:
+            if _RCLPY in module.path.parts:
                 continue
             for method in known.methods:
                 if method.name not in seen:
@@ -77,7 +84,7 @@ def hosted_classes(context: Context) -> tuple[ClassOfNode, ...]:
             continue
         key = (reference.text.value, reference.folder)
         if key not in read:
-            read[key] = find_behavior(reference)
+            read[key] = find_behavior(reference, _NODES)
         found.append(ClassOfNode(node, hosted, read[key]))
     return tuple(found)
 

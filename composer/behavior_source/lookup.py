@@ -73,9 +73,15 @@ class BehaviorSource:
         return next((method for method in self.methods if method.name == name), None)
 
 
-def find_behavior(reference: BehaviorReference) -> BehaviorSource:
-    """Read the class that ``reference`` names. Never raises, never imports."""
-    reader = _Reader(reference.folder, Project.at(reference.folder))
+def find_behavior(
+    reference: BehaviorReference, known_bases: frozenset[tuple[str, str]] = frozenset()
+) -> BehaviorSource:
+    """Read the class that ``reference`` names. Never raises, never imports.
+
+    ``known_bases`` are classes, by module and name, whose methods do not matter: they are not read.
+    """
+    plain = _PLAIN_BASES | known_bases
+    reader = _Reader(reference.folder, Project.at(reference.folder), plain)
     try:
         path = module_file(reference.module, reference.folder, reader.project)
         module = reader.module(path) if path is not None else None
@@ -127,6 +133,7 @@ class _Reader:
 
     folder: Path
     project: Project
+    plain_bases: frozenset[tuple[str, str]]
     modules: dict[Path, Module] = field(default_factory=dict)
 
     def module(self, path: Path) -> Module:
@@ -231,7 +238,7 @@ class _Reader:
         if base == "object":
             return True
         imported = imported_from(module, base)
-        return imported is not None and (imported.module, imported.name) in _PLAIN_BASES
+        return imported is not None and (imported.module, imported.name) in self.plain_bases
 
 
 def imported_from(module: Module, name: str) -> Import | None:
