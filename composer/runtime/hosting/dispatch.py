@@ -27,7 +27,7 @@ from composer.runtime.hosting.adopted_node import (
 )
 from composer.runtime.hosting.errors import HostingError
 from composer.runtime.hosting.instance import Instance
-from composer.runtime.hosting.user_code import current_instance
+from composer.runtime.hosting.user_code import current_instance, on_thread_start
 
 _SECOND_NODE = (
     "the class creates a second node, {name}; declare it as a node of the system,"
@@ -147,9 +147,7 @@ def _install_threads() -> None:
     start = threading.Thread.start
 
     def start_thread(self: threading.Thread) -> None:
-        instance = current_instance()
-        if instance is not None:
-            instance.threads.append(self)
+        on_thread_start(self)
         start(self)
 
     threading.Thread.start = start_thread  # type: ignore[method-assign]
@@ -166,6 +164,12 @@ def _wait_until_ended(instance: Instance) -> None:
 
 def _install_context() -> None:
     init, shutdown, try_shutdown = rclpy.init, rclpy.shutdown, utilities.try_shutdown
+    is_ok = utilities.ok
+
+    def ok(**options: Any) -> bool:
+        # Threads of classes loop while it is true.
+        instance = current_instance()
+        return not (instance is not None and instance.ended.is_set()) and bool(is_ok(**options))
 
     def init_context(**options: Any) -> Any:
         # It is initialized already.
@@ -185,6 +189,7 @@ def _install_context() -> None:
         else:
             instance.finish("it called rclpy.try_shutdown()")
 
+    rclpy.ok = ok  # type: ignore[attr-defined]
     rclpy.init = init_context
     rclpy.shutdown = shut_down
     rclpy.try_shutdown = try_to_shut_down  # type: ignore[attr-defined]

@@ -22,11 +22,23 @@ class _Current(threading.local):
 
 
 _CURRENT = _Current()
+_STARTED_BY = "_composer_instance"
 
 
 def current_instance() -> Instance | None:
-    """Return the instance whose code the calling thread runs, or None."""
-    return _CURRENT.instance
+    """Return the instance whose code the calling thread runs, or None.
+
+    Threads that an instance has started run its code.
+    """
+    return _CURRENT.instance or getattr(threading.current_thread(), _STARTED_BY, None)
+
+
+def on_thread_start(thread: threading.Thread) -> None:
+    """Remember which instance has started a thread, if any."""
+    instance = current_instance()
+    if instance is not None:
+        instance.threads.append(thread)
+        setattr(thread, _STARTED_BY, instance)
 
 
 class UserFunction:

@@ -229,8 +229,11 @@ def test_callback_groups_exclude_each_other_on_several_threads(tmp_path: Path, p
         wait_until(lambda: system.node("groups").instance.together == 1)
 
 
-def test_a_thread_of_the_class_that_spins_ends_with_the_instance(tmp_path: Path) -> None:
-    text = f'system: spins\nnodes: {{spinner: {{class: "{CLASSES}:Spinner"}}}}'
+@pytest.mark.parametrize("name", ["Spinner", "Poller"])
+def test_a_thread_of_the_class_that_follows_rclpy_ends_with_the_instance(
+    tmp_path: Path, name: str
+) -> None:
+    text = f'system: spins\nnodes: {{spinner: {{class: "{CLASSES}:{name}"}}}}'
     with running(text, tmp_path) as system:
         spinner = system.node("spinner").instance
         wait_until(lambda: system.node("spinner").statistics.sent >= 3)

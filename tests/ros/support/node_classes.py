@@ -167,6 +167,21 @@ class Spinner(Node):
         self.thread.start()
 
 
+class Poller(Node):
+    """A thread that polls a device while rclpy is up, as many drivers have."""
+
+    def __init__(self) -> None:
+        super().__init__("poller")
+        self.publisher = self.create_publisher(Int64, "numbers", 10)
+        self.thread = threading.Thread(target=self.poll, name="poller")
+        self.thread.start()
+
+    def poll(self) -> None:
+        while rclpy.ok():
+            self.publisher.publish(Int64(data=1))
+            time.sleep(0.01)
+
+
 class Stubborn(Node):
     """A thread that outlives the node."""
 
