@@ -81,3 +81,23 @@ STYLE = (
     + color_rules(colors(dark=True))
     + "}"
 )
+
+
+def page_style() -> str:
+    """Return the style sheet of pictures in a page, whose ``data-theme`` may choose the colors.
+
+    Every color is a variable (``--page``, ``--node-line``), for the rest of the page as well.
+    """
+    light, dark = (_variables(colors(dark=side)) for side in (False, True))
+    names = {name: f"var(--{name})" for name in colors(dark=False)}
+    return (
+        f":root{{{light}}}"
+        f"@media (prefers-color-scheme:dark){{:root:not([data-theme=light]){{{dark}}}}}"
+        f":root[data-theme=dark]{{{dark}}}"
+        f"@media print{{:root:root{{{light}}}}}"
+        f"{FORMS}{color_rules(names)}"
+    )
+
+
+def _variables(values: Mapping[str, str]) -> str:
+    return "".join(f"--{name}:{value};" for name, value in values.items())

@@ -4,7 +4,7 @@
  * A node is visible if its namespace is selected. A topic, service or action is visible if a node
  * connected to it is, or if it has no connection. A line is visible if both of its ends are.
  */
-function createFilter(pictures) {
+export function createFilter(pictures) {
   const menu = document.querySelector(".filter");
   const choices = [...menu.querySelectorAll("input[type=checkbox]")];
 
@@ -49,7 +49,8 @@ function createFilter(pictures) {
   });
 }
 
-function applyTo(picture, hidden) {
+/** Show what is in a picture unless its kind or namespace is hidden: {kinds, namespaces}. */
+export function applyTo(picture, hidden) {
   const shown = new Set();
   const reached = new Map();
   for (const line of picture.lines) {
@@ -81,10 +82,10 @@ function applyTo(picture, hidden) {
   }
 }
 
-function isNode(item) {
+export function isNode(item) {
   return item.kind === "node" || item.kind === "port";
 }
 
-function isWithin(namespace, around) {
+export function isWithin(namespace, around) {
   return namespace === around || namespace.startsWith(around === "/" ? around : `${around}/`);
 }

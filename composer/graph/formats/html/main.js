@@ -1,4 +1,12 @@
 /** Connects the parts of the page. */
+import { createAppearance } from "./appearance.js";
+import { createFilter } from "./filter.js";
+import { readPicture } from "./picture.js";
+import { createSearch } from "./search.js";
+import { createSelection, listenToItems } from "./selection.js";
+import { createTabs } from "./tabs.js";
+import { createViewport } from "./viewport.js";
+
 const ZOOM_STEP = 1.25;
 
 function main() {
@@ -24,10 +32,26 @@ function main() {
       if (selection.isOpen()) selection.mark();
     },
   });
-  const selection = createSelection(currentPicture, viewportOf);
-  const search = createSearch(currentPicture, selection.goTo);
+  const articles = new Map();
+  for (const article of document.querySelectorAll(".listing [data-about]")) {
+    articles.set(article.dataset.about, article);
+  }
+  const element = (id) => document.getElementById(id);
+  const panel = {
+    panel: element("details"),
+    about: element("about"),
+    neighbors: element("neighbors"),
+    close: element("close"),
+  };
+  const selection = createSelection(panel, currentPicture, viewportOf, {
+    articleOf: (key) => articles.get(key)?.cloneNode(true),
+  });
+  const search = createSearch({ input: element("search"), output: element("matches") }, currentPicture, {
+    detailsOf: (key) => articles.get(key)?.textContent.toLowerCase() ?? "",
+    goTo: selection.goTo,
+  });
   createFilter(pictures);
-  createAppearance();
+  createAppearance(element("appearance"));
   for (const picture of pictures) listenToItems(picture, selection, viewportOf(picture));
 
   const commands = {

@@ -12,10 +12,10 @@ from composer.graph.diagram import Graph, VertexKind
 from composer.graph.formats.html.articles import articles
 from composer.graph.formats.svg import contents
 from composer.graph.formats.svg_elements import markers, number, text
-from composer.graph.formats.theme import FORMS, color_rules, colors
+from composer.graph.formats.theme import page_style
 from composer.graph.layout import Layout
 
-#: The parts of the script, each before those that use it.
+#: The modules of the script, each before those that import it.
 _SCRIPTS = (
     "picture.js",
     "viewport.js",
@@ -26,6 +26,8 @@ _SCRIPTS = (
     "appearance.js",
     "main.js",
 )
+#: What modules have and scripts do not.
+_MODULE_SYNTAX = re.compile(r"^(import .*\n+|export )", re.MULTILINE)
 _KINDS = (VertexKind.NODE, VertexKind.TOPIC, VertexKind.SERVICE, VertexKind.ACTION)
 
 Picture = tuple[Graph, Layout]
@@ -120,7 +122,7 @@ def _filters(graphs: Sequence[Graph]) -> Iterator[str]:
     namespaces = {vertex.namespace for vertex in vertices if vertex.kind is VertexKind.NODE}
     namespaces |= {block.namespace for block in blocks}
     yield '<details class="filter"><summary>Filter</summary><div class="menu">'
-    yield "<fieldset><legend>VertexKind</legend>"
+    yield "<fieldset><legend>Kind</legend>"
     yield from (_choice("kind", kind.value, f"{kind.value}s") for kind in _KINDS if kind in kinds)
     yield "</fieldset><fieldset><legend>Namespace</legend>"
     yield from (
@@ -181,25 +183,13 @@ def _panel() -> Iterator[str]:
 
 
 def _script() -> str:
-    parts = "\n".join(_asset(name) for name in _SCRIPTS)
+    """Join the modules into one script: a page that is opened as a file cannot import modules."""
+    parts = "\n".join(_MODULE_SYNTAX.sub("", _asset(name)) for name in _SCRIPTS)
     return f'(() => {{\n"use strict";\n{parts}}})();\n'
 
 
 def _style() -> str:
-    names = colors(dark=False)
-    variables = {name: f"var(--{name})" for name in names}
-    light, dark = (_variables(colors(dark=side)) for side in (False, True))
-    return (
-        f":root{{{light}}}"
-        f"@media (prefers-color-scheme:dark){{:root:not([data-theme=light]){{{dark}}}}}"
-        f":root[data-theme=dark]{{{dark}}}"
-        f"@media print{{:root:root{{{light}}}}}"
-        f"{FORMS}{color_rules(variables)}\n{_asset('page.css')}"
-    )
-
-
-def _variables(values: dict[str, str]) -> str:
-    return "".join(f"--{name}:{value};" for name, value in values.items())
+    return f"{page_style()}\n{_asset('page.css')}"
 
 
 def _asset(name: str) -> str:

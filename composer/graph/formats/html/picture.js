@@ -4,7 +4,7 @@
  * An item is a vertex, a block or a port: {key, kind, namespace, name, words, element}.
  * A line connects two items: {key, kind, source, target, parts}; the parts are its path and label.
  */
-function readPicture(view) {
+export function readPicture(view) {
   const svg = view.querySelector(".picture");
   const items = new Map();
   for (const element of svg.querySelectorAll("[data-key]")) {
@@ -29,6 +29,6 @@ function readPicture(view) {
 }
 
 /** Return the bounding box of an item in SVG units, which do not depend on the zoom. */
-function boxOf(item) {
+export function boxOf(item) {
   return item.element.querySelector(".shape").getBBox();
 }

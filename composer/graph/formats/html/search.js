@@ -1,20 +1,15 @@
 /**
  * Searches the visible picture. Items that do not match are dimmed; Enter goes to the next match.
  *
- * An item matches if its text in the picture or its details contain every word.
+ * An item matches if its text in the picture or its details, which `detailsOf` returns for its key
+ * in lower case, contain every word.
  */
-function createSearch(currentPicture, goTo) {
-  const input = document.getElementById("search");
-  const output = document.getElementById("matches");
-  const details = new Map();
-  for (const article of document.querySelectorAll(".listing [data-about]")) {
-    details.set(article.dataset.about, article.textContent.toLowerCase());
-  }
+export function createSearch({ input, output }, currentPicture, { detailsOf, goTo }) {
   let matches = [];
   let position = -1;
 
   function textOf(item) {
-    return `${item.words.join(" ")} ${details.get(item.key) ?? ""}`.toLowerCase();
+    return `${item.words.join(" ")} ${detailsOf(item.key)}`.toLowerCase();
   }
 
   function update() {

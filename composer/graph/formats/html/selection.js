@@ -1,8 +1,11 @@
+import { boxOf } from "./picture.js";
+
 /**
  * The selection: the panel shows its details, its connections are highlighted, the rest is dimmed.
  *
  * Tab moves the focus to one item of the picture, the arrow keys move it to the next item in that
- * direction, and Enter selects the item.
+ * direction, and Enter selects the item. `articleOf` returns a new element with the details of a key,
+ * or nothing; `changed` is called with the selected key, or null.
  */
 const DIRECTIONS = {
   ArrowLeft: { x: -1, y: 0 },
@@ -11,32 +14,32 @@ const DIRECTIONS = {
   ArrowDown: { x: 0, y: 1 },
 };
 
-function createSelection(currentPicture, viewportOf) {
-  const panel = document.getElementById("details");
-  const about = document.getElementById("about");
-  const neighbors = document.getElementById("neighbors");
-  const articles = new Map();
-  for (const article of document.querySelectorAll(".listing [data-about]")) {
-    articles.set(article.dataset.about, article);
-  }
+export function createSelection(
+  { panel, about, neighbors, close },
+  currentPicture,
+  viewportOf,
+  { articleOf, changed = () => {} },
+) {
   let chosen = null;
 
   function choose(key) {
     unmark();
     chosen = key;
-    const article = articles.get(key);
-    about.replaceChildren(...(article ? [article.cloneNode(true)] : []));
+    const article = articleOf(key);
+    about.replaceChildren(...(article ? [article] : []));
     panel.hidden = false;
     panel.scrollTop = 0;
     mark();
     const item = currentPicture().items.get(key);
     if (item) viewportOf(currentPicture()).uncover(item.element, panel);
+    changed(key);
   }
 
   function clear() {
     unmark();
     chosen = null;
     panel.hidden = true;
+    changed(null);
   }
 
   /** Highlight the selected item in the visible picture, if that contains it. */
@@ -83,7 +86,7 @@ function createSelection(currentPicture, viewportOf) {
     choose(item.key);
   }
 
-  document.getElementById("close").addEventListener("click", clear);
+  close.addEventListener("click", clear);
   return { choose, clear, goTo, mark, unmark, isOpen: () => !panel.hidden };
 }
 
@@ -113,7 +116,7 @@ function labelOf(item) {
 }
 
 /** Let the user select the items of a picture with the pointer and the keyboard. */
-function listenToItems(picture, selection, viewport) {
+export function listenToItems(picture, selection, viewport) {
   const items = [...picture.items.values()];
   for (const item of items) {
     item.element.setAttribute("role", "button");

@@ -1,5 +1,5 @@
 /** Shows the views as tabs, following the tabs pattern of the ARIA Authoring Practices Guide. */
-function createTabs(pictures, onChange) {
+export function createTabs(pictures, onChange) {
   const tabs = [...document.querySelectorAll("[role=tab]")];
   let current = pictures.find((picture) => !picture.view.hidden);
 

@@ -13,7 +13,7 @@ const MIN_READABLE_PIXELS_PER_UNIT = 1.1;
 const MIN_DRAG_PIXELS = 4;
 const CLEARANCE_PIXELS = 24;
 
-function createViewport(picture) {
+export function createViewport(picture) {
   const { svg, world } = picture;
   const size = svg.viewBox.baseVal;
   let scale = 1;
