@@ -6,6 +6,7 @@ The messages may be those of another version, or of any node that publishes on t
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.fast_dataclass import dataclass
@@ -26,6 +27,7 @@ class NodeReport:
     """A node as its manager reports it. ``since_s`` is in seconds since 1970.
 
     ``depends_on`` are the states that the nodes it depends on must have, by their full names.
+    ``sent``, ``received`` and ``dropped`` count messages by topic; the last is without zeros.
     """
 
     node: str
@@ -44,12 +46,16 @@ class NodeReport:
     queue_drops: int
     qos_events: Mapping[str, int]
     depends_on: Mapping[str, str]
+    sent: Mapping[str, int]
+    received: Mapping[str, int]
+    dropped: Mapping[str, int]
 
 
 @dataclass(frozen=True, slots=True)
 class SystemReport:
     """A system as its manager reports it. ``name`` is the namespace of the manager.
 
+    ``at_s`` is the time of a report that was published, in seconds since 1970 or simulated time.
     ``callbacks`` and ``chains`` are included on request, with their time ``callbacks_at_s``.
     """
 
@@ -59,6 +65,7 @@ class SystemReport:
     host: str
     pid: str
     nodes: tuple[NodeReport, ...]
+    at_s: float = 0.0
     callbacks: tuple[CallbackFigures, ...] = ()
     chains: tuple[ChainFigures, ...] = ()
     callbacks_at_s: float = 0.0
@@ -71,7 +78,9 @@ Status: TypeAlias = tuple[str, str, Mapping[str, str]]
 def parse_state(name: str, message: DiagnosticArray) -> SystemReport:
     """Return the report of the system ``name``. Raises InvalidReportError."""
     statuses = [(status.name, status.message, report_values(status)) for status in message.status]
-    return system_report(name, statuses)
+    stamp = message.header.stamp
+    at_s = float(stamp.sec + stamp.nanosec * 1e-9)
+    return replace(system_report(name, statuses), at_s=at_s)
 
 
 def system_report(name: str, statuses: Iterable[Status]) -> SystemReport:
@@ -133,6 +142,9 @@ def _node_report(status_name: str, values: Mapping[str, str]) -> NodeReport:
         queue_drops=int(values["queue_drops"]),
         qos_events=_counts(values["qos_events"]),
         depends_on=_pairs(values["depends_on"]),
+        sent=_counts(values["sent"]),
+        received=_counts(values["received"]),
+        dropped=_counts(values["dropped"]),
     )
 
 

@@ -87,11 +87,12 @@ def _as_json(systems: Mapping[str, SystemReport | None], others: Mapping[str, st
 def _report(report: SystemReport) -> dict[str, Any]:
     """Return the report with the callbacks below their nodes."""
     content = asdict(report)
-    content.pop("callbacks_at_s")
+    for time_of_report in ("at_s", "callbacks_at_s"):
+        content.pop(time_of_report)
     callbacks = content.pop("callbacks")
     for node in content["nodes"]:
         node["callbacks"] = [
-            {key: value for key, value in callback.items() if key != "node"}
+            {key: callback[key] for key in callback if key not in ("node", "histogram")}
             for callback in callbacks
             if callback["node"] == node["node"]
         ]

@@ -76,10 +76,16 @@ def top_data(report: SystemReport, callbacks: list[CallbackRates]) -> dict[str, 
         "activity": report.activity,
         "chains": [asdict(chain) for chain in report.chains],
         "callbacks": [
-            asdict(item.figures) | {"calls_hz": item.calls_hz, "busy": item.busy}
+            _without_histogram(item.figures) | {"calls_hz": item.calls_hz, "busy": item.busy}
             for item in callbacks
         ],
     }
+
+
+def _without_histogram(figures: CallbackFigures) -> dict[str, Any]:
+    values = asdict(figures)
+    values.pop("histogram")
+    return values
 
 
 def _summary_row(item: CallbackFigures) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
@@ -64,9 +64,18 @@ def _of_node(system: str, node: NodeStatus) -> DiagnosticStatus:
         "slowest": node.slowest,
         "overruns": str(node.overruns),
         "queue_drops": str(node.queue_drops),
-        "qos_events": " ".join(f"{name}={count}" for name, count in node.qos_events.items()),
+        "qos_events": _pairs(node.qos_events),
     }
-    return _status(f"{system}: {node.node}", system, level, message, values)
+    status = _status(f"{system}: {node.node}", system, level, message, values)
+    for key, counts in (("sent", node.sent), ("received", node.received)):
+        status.values.append(KeyValue(key=key, value=_pairs(counts)))
+    status.values.append(KeyValue(key="dropped", value=_pairs(node.dropped)))
+    return status
+
+
+def _pairs(counts: Mapping[str, int]) -> str:
+    """Return counts by name as text, which is not cut: a part of a name would be another name."""
+    return " ".join(f"{name}={count}" for name, count in counts.items())
 
 
 def _status(

@@ -16,7 +16,8 @@ class CallbackFigures:
 
     ``total_ms`` is the time that they kept a thread; ``late_...`` the time from when a timer call
     was due to its start. ``p99_ms`` is right within 10 %. ``kind``, ``overruns`` and ``dropped``
-    are those of :class:`composer.runtime.metrics.statistics.CallbackStatistics`.
+    are those of :class:`composer.runtime.metrics.statistics.CallbackStatistics`. ``histogram`` is
+    the text of :attr:`composer.runtime.metrics.histogram.Histogram.text`.
     """
 
     node: str
@@ -31,6 +32,7 @@ class CallbackFigures:
     late_longest_ms: float = 0.0
     overruns: int = 0
     dropped: int = 0
+    histogram: str = ""
 
     @property
     def callback(self) -> str:
@@ -54,6 +56,7 @@ def figures(node: str, statistics: CallbackStatistics) -> CallbackFigures:
         late_longest_ms=lateness.longest_s * _MS,
         overruns=statistics.overruns,
         dropped=statistics.dropped,
+        histogram=times.text,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from bisect import bisect, bisect_left
 from collections.abc import Iterable
@@ -101,6 +102,12 @@ class Histogram:
         """The mean; 0 without any."""
         return self.total_s / max(1, self.count)
 
+    @property
+    def text(self) -> str:
+        """The buckets that are not empty, with their counts: ``45:3 46:12``."""
+        self.flush()
+        return " ".join(f"{index}:{count}" for index, count in enumerate(self._buckets) if count)
+
     def percentile_s(self, share: float) -> float:
         """Return the duration that ``share`` (0 to 1) of them do not exceed, within 10 %; or 0."""
         self.flush()
@@ -110,6 +117,21 @@ class Histogram:
         rank = share * counted[-1]
         index = next(index for index, below in enumerate(counted) if below >= rank and below)
         return min(self._longest_s, _MIDDLES_S[index])
+
+
+def parse_buckets(text: str) -> list[tuple[float, int]]:
+    """Return the bounds of the buckets in :attr:`Histogram.text`, in seconds, and the counts.
+
+    The longest durations have no bound: infinity. Raises ValueError.
+    """
+    buckets = []
+    for item in text.split():
+        index, _, count = item.partition(":")
+        bucket = int(index)
+        if not 0 <= bucket <= len(BOUNDS_S):
+            raise ValueError(f"there is no bucket {bucket}")
+        buckets.append((BOUNDS_S[bucket] if bucket < len(BOUNDS_S) else math.inf, int(count)))
+    return buckets
 
 
 _MIDDLES_S = (

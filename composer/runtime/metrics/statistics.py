@@ -116,6 +116,25 @@ class Statistics:
         return sum(subscription.count for subscription in tuple(self.subscriptions.values()))
 
     @property
+    def sent_by_port(self) -> dict[str, int]:
+        """The number of messages that each publisher has sent."""
+        return {name: counted.count for name, counted in tuple(self.publishers.items())}
+
+    @property
+    def received_by_port(self) -> dict[str, int]:
+        """The number of messages that each subscription received while the node was active."""
+        return {name: counted.count for name, counted in tuple(self.subscriptions.items())}
+
+    @property
+    def dropped_by_port(self) -> dict[str, int]:
+        """The number of messages that the full queue of a subscription dropped, if any."""
+        return {
+            callback.name: callback.dropped
+            for callback in tuple(self.callbacks.values())
+            if callback.dropped and callback.name in self.subscriptions
+        }
+
+    @property
     def busy_s(self) -> float:
         """The total time that callbacks kept a thread."""
         return sum(callback.times.total_s for callback in tuple(self.callbacks.values()))

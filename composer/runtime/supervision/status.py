@@ -6,6 +6,7 @@ import os
 import socket
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -32,6 +33,7 @@ class NodeStatus:
     callbacks took. ``slowest`` is the callback with the longest call so far, and its time.
     ``overruns`` counts calls over their ``budget_ms``, ``queue_drops`` messages and calls that full
     queues dropped, ``qos_events`` the events of :mod:`composer.runtime.ports.qos_events` by name.
+    ``sent``, ``received`` and ``dropped`` count messages by topic.
     """
 
     node: str
@@ -52,6 +54,9 @@ class NodeStatus:
     overruns: int = 0
     queue_drops: int = 0
     qos_events: Mapping[str, int] = field(default_factory=dict)
+    sent: Mapping[str, int] = field(default_factory=dict)
+    received: Mapping[str, int] = field(default_factory=dict)
+    dropped: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +130,10 @@ class Status:
         self._counters_before: dict[str, _Counters] = {}
         now_s = time.time()
         models = {node.name.value: node for node in system.nodes}
+        self._topics = {
+            name: {port.name.value: port.full_name for port in node.ports}
+            for name, node in models.items()
+        }
         goals = start_goals(system, PrimaryState.ACTIVE)
         needed = needed_states(system)
         self._status = SystemStatus(
@@ -224,8 +233,17 @@ class Status:
             overruns=counters.overruns,
             queue_drops=counters.queue_drops,
             qos_events=dict(counters.qos_events),
+            sent=self._by_topic(name, counters.sent_by_port),
+            received=self._by_topic(name, counters.received_by_port),
+            dropped=self._by_topic(name, counters.dropped_by_port),
         )
         return self._counters[name].with_rates(node, self._counters_before.get(name))
+
+    def _by_topic(self, name: str, counts: Mapping[str, int]) -> Mapping[str, int]:
+        found: Counter[str] = Counter()
+        for port, count in counts.items():
+            found[self._topics[name].get(port, port)] += count
+        return found
 
     def _change(self, name: str, **changes: object) -> None:
         with self._lock:
