@@ -29,7 +29,7 @@ def environments() -> dict[str, tuple[list[str], list[str]]]:
     build = [*_build_requirements(ROOT), EDITABLE]
     interfaces = [*_build_requirements(ROOT / "interfaces"), *BUILD_PROGRAMS]
     return {
-        "run": (["ros"], build),
+        "run": (["ros", "dashboard"], build),
         "dev": (["ros", "dev", "docs"], build),
         "test": (["test"], build),
         "interfaces": ([], interfaces),

@@ -29,6 +29,7 @@ COMMANDS = {
     "config": "config",
     "graph": "graph",
     "diff": "diff",
+    "dashboard": "dashboard",
     "import": "import_nodes",
     "export": "export",
     "new": "new",

@@ -48,7 +48,7 @@ class GraphObserver:
         """Return the graph once discovery is complete, or at the deadline."""
         session = self._session
         graph = session.graph
-        ends = dict(session.wait_until_settled(lambda: _endpoints(graph), deadline))
+        ends = dict(session.wait_until_settled(lambda: endpoints(graph), deadline))
         counts = Counter(_names(graph))
         services = {
             node: {end.name: end.type for end in found if end.kind is PortKind.SERVICE}
@@ -162,8 +162,8 @@ def _offering(services: dict[str, dict[str, str]], last: str, type_name: str) ->
     }
 
 
-def _endpoints(graph: RosGraph) -> tuple[tuple[str, tuple[ObservedEndpoint, ...]], ...]:
-    """Return the endpoints of all nodes as a hashable value."""
+def endpoints(graph: RosGraph) -> tuple[tuple[str, tuple[ObservedEndpoint, ...]], ...]:
+    """Return the nodes discovered so far with their endpoints, as a hashable value."""
     ends = _endpoints_by_node(graph)
     return tuple((name, tuple(ends[name])) for name in sorted(ends))
 

@@ -126,6 +126,25 @@ class Systems:
         self._session.wait_for(lambda: all(map(self._is_fresh, requested)) or None, deadline)
         return {name: self._report(name) if name in self._states else None for name in requested}
 
+    def current(self) -> dict[str, SystemReport | None]:
+        """Return the last report of each system that is subscribed to, None before the first."""
+        return {
+            name: self._report(name) if self._has_reported(name) else None
+            for name in tuple(self._subscriptions)
+        }
+
+    def forget(self, names: Iterable[str]) -> None:
+        """Destroy the subscriptions to systems that have ended."""
+        for name in names:
+            for subscription in self._subscriptions.pop(name, ()):
+                self._session.node.destroy_subscription(subscription)
+            for reports in (self._states, self._callbacks, self._arrivals_s):
+                reports.pop(name, None)
+
+    def close(self) -> None:
+        """Destroy all subscriptions."""
+        self.forget(tuple(self._subscriptions))
+
     def newer(self, name: str, than_s: float) -> SystemReport | None:
         """Return the report of a system if its callbacks are newer than ``than_s``, else None."""
         if self._callbacks[name].at_s <= than_s:

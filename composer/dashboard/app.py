@@ -1,0 +1,199 @@
+"""The routes of the dashboard, behind one check of every request."""
+
+from __future__ import annotations
+
+import html
+import mimetypes
+from collections.abc import Awaitable, Callable, MutableMapping
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from typing import Any
+from urllib.parse import quote
+
+from starlette.applications import Starlette
+from starlette.datastructures import Headers
+from starlette.requests import Request as HttpRequest
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from composer.dashboard.access import Refusal, Request
+from composer.dashboard.connection import Connection
+from composer.dashboard.context import Dashboard
+
+Scope = MutableMapping[str, Any]
+AsgiReceive = Callable[[], Awaitable[MutableMapping[str, Any]]]
+AsgiSend = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+
+#: Browsers and programs that are connected at the same time.
+MAX_CONNECTIONS = 32
+_TRY_AGAIN_LATER = 1013
+_METHODS = ("GET", "HEAD")
+#: The addresses of the views; the page reads the rest of the path.
+_VIEWS = ("graph", "nodes", "topics", "services", "actions", "parameters", "log", "timing")
+_PAGE = files("composer.dashboard") / "page"
+#: Scripts that the page shares with the pages of ``compose graph``.
+_GRAPH_SCRIPTS = files("composer.graph.formats.html")
+_MAX_PATH = 200
+
+
+def make_app(dashboard: Dashboard) -> AccessCheck:
+    """Return the application."""
+    connections: set[Connection] = set()
+
+    async def websocket(socket: WebSocket) -> None:
+        await socket.accept()
+        if len(connections) >= MAX_CONNECTIONS:
+            reason = f"{MAX_CONNECTIONS} connections are open already"
+            await socket.close(_TRY_AGAIN_LATER, reason)
+            return
+        connection = Connection(dashboard, socket)
+        connections.add(connection)
+        try:
+            await connection.run()
+        finally:
+            connections.discard(connection)
+
+    routes = [
+        Route("/", _index),
+        *(Route(f"/{view}", _index) for view in _VIEWS),
+        *(Route(f"/{view}/{{rest:path}}", _index) for view in _VIEWS),
+        Route("/page/graph/{name}", _graph_script),
+        Route("/page/{path:path}", _file),
+        Route("/theme.css", _theme),
+        WebSocketRoute("/ws", websocket),
+    ]
+    app = Starlette(routes=routes)
+    return AccessCheck(app, dashboard, connections)
+
+
+class AccessCheck:
+    """Lets only allowed requests pass to the application, and sets the headers of all responses."""
+
+    def __init__(self, app: Starlette, dashboard: Dashboard, connections: set[Connection]) -> None:
+        self._app = app
+        self._access = dashboard.access
+        self._connections = connections
+
+    async def close(self) -> None:
+        """Close all connections."""
+        for connection in tuple(self._connections):
+            await connection.close()
+
+    async def __call__(self, scope: Scope, receive: AsgiReceive, send: AsgiSend) -> None:
+        """Answer one request."""
+        if scope["type"] not in ("http", "websocket"):
+            return
+        headers = Headers(scope=scope)
+        request = Request(
+            path=scope["path"],
+            query=scope["query_string"].decode("latin-1"),
+            headers=headers,
+            is_websocket=scope["type"] == "websocket",
+        )
+        host = headers.get("host", "")
+        response = self._response(request, scope)
+        if response is not None:
+            await _secured(response, host)(scope, receive, send)
+            return
+        if scope["type"] == "websocket":
+            await self._app(scope, receive, send)
+            return
+
+        async def send_secured(message: MutableMapping[str, Any]) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [*message["headers"], *_security_headers(host)]
+            await send(message)
+
+        await self._app(scope, receive, send_secured)
+
+    def _response(self, request: Request, scope: Scope) -> Response | None:
+        """Return the response to a request that does not reach the application, or None."""
+        refusal = self._access.refusal(request)
+        if refusal is not None:
+            return _refusal_page(refusal)
+        if request.is_websocket:
+            return None
+        if scope["method"] not in _METHODS:
+            return _refusal_page(Refusal(405, "only GET is possible"))
+        if "token=" in request.query:
+            # The address without the token, so that it is not in the history of the browser.
+            location = "/" + quote(request.path.lstrip("/"))
+            headers = {"Location": location, "Set-Cookie": self._access.cookie}
+            return Response(status_code=303, headers=headers)
+        return None
+
+
+async def _index(_: HttpRequest) -> Response:
+    return _content("index.html")
+
+
+async def _file(request: HttpRequest) -> Response:
+    return _content(request.path_params["path"])
+
+
+async def _graph_script(request: HttpRequest) -> Response:
+    name = request.path_params["name"]
+    if not name.endswith(".js"):
+        return _not_found(name)
+    return _content(name, _GRAPH_SCRIPTS)
+
+
+async def _theme(_: HttpRequest) -> Response:
+    from composer.graph.formats.theme import page_style
+
+    return _of_page(page_style().encode(), "text/css")
+
+
+def _content(path: str, folder: Traversable = _PAGE) -> Response:
+    """Return a file of the page."""
+    parts = path.split("/")
+    is_odd = any(part in ("", ".", "..") or part.startswith(".") for part in parts)
+    found = folder.joinpath(*parts) if not is_odd and len(path) <= _MAX_PATH else None
+    if found is None or not found.is_file():
+        return _not_found(path)
+    kind = mimetypes.guess_type(path)[0] or "application/octet-stream"
+    if kind == "application/javascript":
+        kind = "text/javascript"
+    return _of_page(found.read_bytes(), kind)
+
+
+def _of_page(content: bytes, kind: str) -> Response:
+    return Response(content, media_type=kind, headers={"Cache-Control": "no-cache"})
+
+
+def _not_found(path: str) -> Response:
+    return _refusal_page(Refusal(404, f"there is no file '{path[:_MAX_PATH]}'"))
+
+
+def _refusal_page(refusal: Refusal) -> Response:
+    text = html.escape(refusal.reason)
+    page = (
+        '<!DOCTYPE html><html lang="en"><meta charset="utf-8"><title>ros2-composer</title>'
+        f"<h1>{refusal.status}</h1><p>{text}.</p></html>\n"
+    )
+    return HTMLResponse(page, status_code=refusal.status)
+
+
+def _secured(response: Response, host: str) -> Response:
+    response.raw_headers.extend(_security_headers(host))
+    return response
+
+
+def _security_headers(host: str) -> list[tuple[bytes, bytes]]:
+    """Return headers that keep the page from loading or running anything of another origin."""
+    is_plain = all(letter.isalnum() or letter in ".-:[]" for letter in host)
+    socket = f" ws://{host}" if host and is_plain else ""
+    policy = (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:;"
+        f" connect-src 'self'{socket}; font-src 'self'; worker-src 'self'; base-uri 'none';"
+        " form-action 'none'; frame-ancestors 'none'"
+    )
+    return [
+        (b"content-security-policy", policy.encode("latin-1")),
+        (b"x-content-type-options", b"nosniff"),
+        (b"x-frame-options", b"DENY"),
+        (b"referrer-policy", b"no-referrer"),
+        (b"cross-origin-opener-policy", b"same-origin"),
+        (b"cross-origin-resource-policy", b"same-origin"),
+    ]

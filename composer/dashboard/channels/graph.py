@@ -1,0 +1,190 @@
+"""``graph``: the diagram of the ROS graph or of the system; ``graph.live``: states and rates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from composer.dashboard.declared import Declared, required
+from composer.dashboard.feeds import Feed
+from composer.dashboard.messages import Values, to_json
+from composer.dashboard.outbox import Update
+from composer.dashboard.report_pairs import ReportPairs
+
+if TYPE_CHECKING:
+    from composer.dashboard.observed import Topology
+    from composer.dashboard.ros_side import RosGraphSide
+    from composer.drift import ObservedEndpoint
+    from composer.remote.system_reports import NodeReport
+
+VIEWS = ("nodes", "connections", "lifecycle", "deployment", "states")
+_DECLARED_ONLY = ("lifecycle", "deployment")
+#: Topics without a report are measured, but no more than these.
+_MAX_MEASURED = 60
+_MANAGER = "manager"
+
+
+class PictureFeed(Feed):
+    """The diagram, again whenever the graph has changed. The layout runs on a worker thread."""
+
+    period_s = 0.25
+
+    def __init__(self, values: Values, declared: Declared | None) -> None:
+        """Read the parameters of the channel. Raises BadRequestError, RequestError."""
+        self._view = values.choice("view", VIEWS, "nodes")
+        source = "declared" if self._view in _DECLARED_ONLY else "live"
+        self._is_live = values.choice("source", ("live", "declared"), source) == "live"
+        self._is_live = self._is_live and self._view not in _DECLARED_ONLY
+        values.end()
+        self._declared = None if self._is_live else required(declared, f"the view {self._view}")
+        self._ros: RosGraphSide
+        self._drawn: tuple[int, frozenset[str]] | None = None
+        self._is_drawing = False
+        self._finished: list[Update] = []
+
+    def start(self, ros: RosGraphSide) -> None:
+        """Subscribe to the reports of systems, which have the states of nodes."""
+        self._ros = ros
+        self._drawn, self._is_drawing = None, False
+        ros.observed.reports.acquire()
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        self._ros.observed.reports.release()
+
+    def poll(self) -> Iterator[Update]:
+        """Yield the diagram if it is new."""
+        finished, self._finished = self._finished, []
+        yield from finished
+        if self._is_drawing:
+            return
+        observed = self._ros.observed
+        topology = observed.topology()
+        states = observed.states() if self._is_live else {}
+        #: Nodes with a state have one more line.
+        wanted = (topology.revision if self._is_live else 0, frozenset(states))
+        if wanted != self._drawn:
+            self._drawn = wanted
+            self._is_drawing = self._ros.work(lambda: self._draw(topology, states))
+
+    def _draw(self, topology: Topology, states: Mapping[str, str | None]) -> None:
+        from composer.dashboard.pictures import declared_scene, live_scene, picture
+        from composer.graph import View
+
+        try:
+            if self._declared is not None:
+                scene = declared_scene(self._declared)
+            else:
+                scene = live_scene(topology.snapshot(states))
+            data = picture(scene, View(self._view))
+            self._finished.append(Update(to_json({"revision": topology.revision, **data})))
+        finally:
+            self._is_drawing = False
+
+
+class LiveFeed(Feed):
+    """States of nodes, and rates and drops of edges, once a second.
+
+    Rates of a system are in its reports. Other topics are measured.
+    """
+
+    def __init__(self, values: Values, declared: Declared | None) -> None:
+        """Read the parameters of the channel. Raises BadRequestError."""
+        del declared
+        values.end()
+        self._ros: RosGraphSide
+        self._pairs = ReportPairs(lambda report: report.at_s)
+        self._measured: set[str] = set()
+
+    def start(self, ros: RosGraphSide) -> None:
+        """Subscribe to the reports of systems."""
+        self._ros = ros
+        ros.observed.reports.acquire()
+
+    def close(self) -> None:
+        """Stop measuring."""
+        for topic in self._measured:
+            self._ros.observed.meters.release(topic)
+        self._measured.clear()
+        self._ros.observed.reports.release()
+
+    def poll(self) -> Iterator[Update]:
+        """Yield all states and rates."""
+        observed = self._ros.observed
+        reports = {name: item for name, item in observed.reports.current().items() if item}
+        nodes: dict[str, Any] = {
+            name: {"state": state} for name, state in observed.states().items()
+        }
+        edges: dict[str, Any] = {}
+        reported: set[str] = set()
+        for report in reports.values():
+            nodes |= {node.node: _state(node) for node in report.nodes}
+            reported |= {topic for node in report.nodes for topic in (*node.sent, *node.received)}
+        for pair in self._pairs.update(reports).values():
+            known = {} if pair.before is None else {node.node: node for node in pair.before.nodes}
+            for node in pair.now.nodes:
+                edges |= _edges(node, known.get(node.node), pair.passed_s)
+        topics = self._measure(reported)
+        yield Update(to_json({"nodes": nodes, "edges": edges, "topics": topics}))
+
+    def _measure(self, reported: set[str]) -> dict[str, Any]:
+        """Measure the topics that no system reports; return their rates."""
+        meters = self._ros.observed.meters
+        of_topics = self._ros.observed.topology().of_topics()
+        managers = {f"{system}/{_MANAGER}" for system in self._ros.observed.reports.current()}
+
+        def is_reporting(end: tuple[str, ObservedEndpoint]) -> bool:
+            """Return whether this is for tools: managers report only while others listen."""
+            return end[1].is_for_tools or end[0] in managers
+
+        wanted = [
+            topic
+            for topic, ends in of_topics.items()
+            if topic not in reported and not all(map(is_reporting, ends))
+        ][:_MAX_MEASURED]
+        for topic in self._measured - set(wanted):
+            meters.release(topic)
+            self._measured.discard(topic)
+        for topic in wanted:
+            ends = [end for _, end in of_topics[topic]]
+            if topic not in self._measured and meters.acquire(topic, ends):
+                self._measured.add(topic)
+        meters.poll()
+        found = {topic: meters.figures(topic) for topic in sorted(self._measured)}
+        return {
+            topic: {"rate_hz": figures.rate_hz, "lost": figures.lost}
+            for topic, figures in found.items()
+            if figures is not None
+        }
+
+
+def _state(node: NodeReport) -> dict[str, Any]:
+    return {
+        "state": node.state,
+        "desired": node.desired,
+        "since_s": node.since_s,
+        "errors": node.errors,
+        "restarts": node.restarts,
+        "held_down": node.held_down,
+        "last_error": node.last_error,
+    }
+
+
+def _edges(node: NodeReport, before: NodeReport | None, passed_s: float) -> dict[str, Any]:
+    """Return the rates of the topics of a node by the keys of their edges."""
+    found: dict[str, Any] = {}
+    for kind, now, earlier in (
+        ("publisher", node.sent, {} if before is None else before.sent),
+        ("subscription", node.received, {} if before is None else before.received),
+    ):
+        for topic, count in now.items():
+            rate_hz = None
+            if passed_s > 0.0 and before is not None:
+                rate_hz = max(0, count - earlier.get(topic, 0)) / passed_s
+            edge: dict[str, Any] = {"rate_hz": rate_hz}
+            if kind == "subscription":
+                total = node.dropped.get(topic, 0)
+                known = total if before is None else before.dropped.get(topic, 0)
+                edge |= {"dropped": max(0, total - known), "dropped_total": total}
+            found[f"{kind}:{node.node}.{topic}"] = edge
+    return found

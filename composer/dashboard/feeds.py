@@ -1,0 +1,172 @@
+"""Runs the feeds of all channels on one thread, each only while a browser subscribes to it."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from composer.dashboard.errors import RequestError
+from composer.dashboard.messages import to_json
+from composer.dashboard.outbox import Delivery, Update
+
+if TYPE_CHECKING:
+    from composer.dashboard.ros_side import RosGraphSide
+
+_LOG = logging.getLogger(__name__)
+#: A feed that fails is tried again after this time.
+_RETRY_S = 1.0
+_INTERNAL = "an internal error of the dashboard: see its output"
+
+
+class Feed(ABC):
+    """The data of a channel for one set of parameters. All methods run on the thread of feeds.
+
+    They must not block: what takes longer belongs to the worker threads of ``ros``.
+    """
+
+    #: How updates wait for a slow browser.
+    delivery = Delivery.LATEST
+    #: Whether subscriptions with equal parameters share one feed.
+    is_shared = True
+    #: Whether it changes something, which a read-only dashboard refuses.
+    changes = False
+    #: How often :meth:`poll` is called.
+    period_s = 1.0
+
+    def start(self, ros: RosGraphSide) -> None:  # noqa: B027 - optional
+        """Begin to observe; called once before the first poll. Raises RequestError."""
+
+    @abstractmethod
+    def poll(self) -> Iterable[Update]:
+        """Return what is new. Raises RequestError, which is sent; the next poll follows."""
+
+    def close(self) -> None:  # noqa: B027 - optional
+        """Stop observing."""
+
+
+class RunningFeed:
+    """A feed with its receivers and the time of its next poll."""
+
+    def __init__(self, feed: Feed, key: str) -> None:
+        self.feed = feed
+        self.key = key
+        self.receivers: dict[Receiver, None] = {}
+        self.due_s = 0.0
+        self.last: Update | None = None
+        self.is_started = False
+        self.last_error = ""
+
+
+#: Takes the updates of a feed, on any thread.
+Receiver = Callable[[Update], None]
+
+
+class Feeds:
+    """All running feeds. Receivers may be added and removed on any thread."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._running: dict[str, RunningFeed] = {}
+        self._closing: list[RunningFeed] = []
+        self._is_open = True
+
+    def add(self, key: str, feed: Feed, receiver: Receiver) -> None:
+        """Add a receiver to the running feed with this key, or else to ``feed``."""
+        with self._changed:
+            running = self._running.get(key)
+            if running is None:
+                running = self._running[key] = RunningFeed(feed, key)
+            running.receivers[receiver] = None
+            last = running.last
+            if last is not None:
+                receiver(last)
+            self._changed.notify()
+
+    def remove(self, key: str, receiver: Receiver) -> None:
+        """Remove a receiver; a feed without receivers is closed."""
+        with self._changed:
+            running = self._running.get(key)
+            if running is None:
+                return
+            running.receivers.pop(receiver, None)
+            if not running.receivers:
+                self._closing.append(self._running.pop(key))
+                self._changed.notify()
+
+    def stop(self) -> None:
+        """Make :meth:`run` return."""
+        with self._changed:
+            self._is_open = False
+            self._changed.notify()
+
+    def run(self, ros: RosGraphSide, is_needed: Callable[[], bool]) -> None:
+        """Poll the feeds until ``is_needed()`` is false or :meth:`stop` is called."""
+        try:
+            while self._is_open and is_needed():
+                closing, due = self._wait()
+                for running in closing:
+                    self._close(running)
+                for running in due:
+                    self._poll(running, ros)
+        finally:
+            with self._changed:
+                known = [*self._closing, *self._running.values()]
+                self._closing.clear()
+            for running in known:
+                self._close(running)
+
+    def _wait(self) -> tuple[list[RunningFeed], list[RunningFeed]]:
+        """Wait until something is to do, for a second at most; return what to close and poll."""
+        with self._changed:
+            now_s = time.monotonic()
+            next_s = min((item.due_s for item in self._running.values()), default=now_s + 1.0)
+            if not self._closing and next_s > now_s:
+                self._changed.wait(min(next_s - now_s, 1.0))
+                now_s = time.monotonic()
+            closing, self._closing = self._closing, []
+            return closing, [item for item in self._running.values() if item.due_s <= now_s]
+
+    def _poll(self, running: RunningFeed, ros: RosGraphSide) -> None:
+        running.due_s = max(running.due_s + running.feed.period_s, time.monotonic())
+        try:
+            if not running.is_started:
+                running.due_s = time.monotonic() + running.feed.period_s
+                running.feed.start(ros)
+                running.is_started = True
+            for update in running.feed.poll():
+                running.last_error = ""
+                self._send(running, update)
+        except RequestError as error:
+            self._fail(running, error)
+        except Exception as error:  # an unexpected message must not end the other feeds
+            _LOG.exception("the channel %s failed", running.key)
+            self._fail(running, RequestError("internal", f"{_INTERNAL}: {error!r:.200}"))
+
+    def _fail(self, running: RunningFeed, error: RequestError) -> None:
+        running.due_s = time.monotonic() + max(_RETRY_S, running.feed.period_s)
+        text = to_json(error.as_data())
+        if text != running.last_error:
+            running.last_error = text
+            self._send(running, Update(text, is_error=True))
+
+    def _send(self, running: RunningFeed, update: Update) -> None:
+        with self._changed:
+            if running.feed.delivery is Delivery.LATEST:
+                running.last = update  # for later receivers
+            receivers = tuple(running.receivers)
+        for receiver in receivers:
+            receiver(update)
+
+    def _close(self, running: RunningFeed) -> None:
+        if not running.is_started:
+            return
+        running.is_started = False
+        running.last = None
+        try:
+            running.feed.close()
+        except Exception:
+            _LOG.exception("the channel %s could not be closed", running.key)

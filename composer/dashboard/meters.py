@@ -1,0 +1,166 @@
+"""Rates and sizes of topics, measured while anything shows them.
+
+Messages are taken as bytes and not deserialized. Sequence numbers tell how many were published in
+between, so the rate is right although a fast topic is not read completely.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from composer.model import PortKind
+from composer.qos import Durability, QosProfile, Reliability
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from composer.drift import ObservedEndpoint
+    from composer.remote.shared_session import SampledTopic, SharedSession
+
+_DEPTH = 100
+#: Messages of these types are large: few of them may wait.
+LARGE_TYPES = frozenset(
+    f"sensor_msgs/msg/{name}" for name in ("Image", "CompressedImage", "PointCloud2", "PointCloud")
+) | {"nav_msgs/msg/OccupancyGrid", "visualization_msgs/msg/MarkerArray"}
+_LARGE_DEPTH = 5
+#: A rate is that of the messages of the last seconds.
+_WINDOW_S = 3.0
+#: A topic is silent after this many times the length of the window.
+_SILENT_PERIODS = 3
+_MAX_SAMPLES = 3000
+_MAX_TAKEN = 200
+
+
+@dataclass(frozen=True, slots=True)
+class TopicFigures:
+    """What was measured of a topic; None where it is not known yet."""
+
+    rate_hz: float | None
+    bytes_per_s: float | None
+    mean_bytes: float | None
+    age_s: float | None
+    messages: int
+    lost: int
+
+
+@dataclass(slots=True)
+class _Meter:
+    sampled: SampledTopic
+    has_one_publisher: bool
+    users: int = 0
+    messages: int = 0
+    lost: int = 0
+    last_number: int = 0
+    #: Source time, size, and messages that were published since the sample before.
+    window: deque[tuple[float, int, int]] = field(
+        default_factory=lambda: deque(maxlen=_MAX_SAMPLES)
+    )
+
+
+class TopicMeters:
+    """Measures topics. Use it on the thread of feeds."""
+
+    def __init__(self, session: SharedSession) -> None:
+        self._session = session
+        self._meters: dict[str, _Meter] = {}
+
+    def acquire(self, topic: str, ends: Sequence[ObservedEndpoint]) -> bool:
+        """Measure a topic with these endpoints. Return whether that is possible.
+
+        It is not without a publisher, with several types, or if the type is not installed.
+        """
+        known = self._meters.get(topic)
+        if known is not None:
+            known.users += 1
+            return True
+        from composer.remote.values import InvalidValueError
+
+        publishers = [end for end in ends if end.kind is PortKind.PUBLISHER]
+        types = {end.type for end in ends}
+        if not publishers or len(types) != 1:
+            return False
+        (type_name,) = types
+        profile = measuring_profile(publishers, type_name)
+        try:
+            sampled = self._session.sample(topic, type_name, profile, raw=True)
+        except InvalidValueError:
+            return False
+        self._meters[topic] = _Meter(sampled, len(publishers) == 1, users=1)
+        return True
+
+    def release(self, topic: str) -> None:
+        """Stop measuring a topic once every user has released it."""
+        meter = self._meters.get(topic)
+        if meter is not None:
+            meter.users -= 1
+            if not meter.users:
+                meter.sampled.close()
+                del self._meters[topic]
+
+    def poll(self) -> None:
+        """Take the messages that have arrived."""
+        for meter in self._meters.values():
+            _take(meter)
+
+    def figures(self, topic: str) -> TopicFigures | None:
+        """Return the figures of a topic, None if it is not measured."""
+        meter = self._meters.get(topic)
+        return None if meter is None else _figures(meter, time.time())
+
+    def close(self) -> None:
+        """Stop measuring."""
+        for meter in self._meters.values():
+            meter.sampled.close()
+        self._meters.clear()
+
+
+def measuring_profile(publishers: Sequence[ObservedEndpoint], type_name: str) -> QosProfile:
+    """Return a profile for measurements: messages from before the subscription do not arrive.
+
+    Large messages are requested without reliability, so that a reader that is late never delays a
+    publisher.
+    """
+    is_large = type_name in LARGE_TYPES
+    reliable = all(
+        end.qos is not None and end.qos.reliability is Reliability.RELIABLE for end in publishers
+    )
+    return QosProfile(
+        depth=_LARGE_DEPTH if is_large else _DEPTH,
+        reliability=Reliability.RELIABLE if reliable and not is_large else Reliability.BEST_EFFORT,
+        durability=Durability.VOLATILE,
+    )
+
+
+def _take(meter: _Meter) -> None:
+    for sample in meter.sampled.take(_MAX_TAKEN):
+        published = 1
+        if meter.has_one_publisher and 0 < meter.last_number < sample.number:
+            published = sample.number - meter.last_number
+            meter.lost += published - 1
+        meter.last_number = sample.number
+        meter.messages += 1
+        meter.window.append((sample.at_s, len(sample.content), published))
+
+
+def _figures(meter: _Meter, now_s: float) -> TopicFigures:
+    window = meter.window
+    while len(window) > 2 and window[0][0] < now_s - _WINDOW_S:
+        window.popleft()
+    if not window:
+        return TopicFigures(None, None, None, None, 0, 0)
+    passed_s = window[-1][0] - window[0][0]
+    is_silent = now_s - window[-1][0] > max(_WINDOW_S, _SILENT_PERIODS * passed_s)
+    published = sum(item[2] for item in list(window)[1:])
+    sizes = sum(item[1] for item in window) / len(window)
+    rate_hz = 0.0 if is_silent else published / passed_s if passed_s > 0.0 else None
+    return TopicFigures(
+        rate_hz=rate_hz,
+        bytes_per_s=None if rate_hz is None else rate_hz * sizes,
+        mean_bytes=sizes,
+        age_s=max(0.0, now_s - window[-1][0]),
+        messages=meter.messages,
+        lost=meter.lost,
+    )

@@ -1,0 +1,197 @@
+"""What the feeds observe together: nodes and endpoints, states, reports of systems, and rates."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+from composer.dashboard.meters import TopicMeters
+from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
+from composer.model import PortKind
+from composer.names import is_hidden
+from composer.remote.lifecycle import LifecycleClient
+from composer.remote.session import Deadline
+from composer.remote.snapshot import endpoints
+from composer.remote.system_reports import SystemReport
+from composer.remote.systems import Systems
+from composer.runtime.process.instance_lock import local_systems
+
+if TYPE_CHECKING:
+    from composer.dashboard.ros_side import Work
+    from composer.remote.shared_session import SharedSession
+
+_GRAPH_PERIOD_S = 1.0
+#: At most this share of a processor goes into queries of the ROS graph.
+_GRAPH_SHARE = 0.03
+_STATES_PERIOD_S = 2.0
+_STATES_WITHIN_S = 2.0
+_GET_STATE = ("get_state", "lifecycle_msgs/srv/GetState")
+
+
+@dataclass(frozen=True, slots=True)
+class Topology:
+    """The nodes of the ROS graph with all of their endpoints. ``revision`` counts changes.
+
+    ``counts`` has the number of nodes of each name. Nodes of commands are left out.
+    """
+
+    revision: int
+    nodes: Mapping[str, tuple[ObservedEndpoint, ...]]
+    counts: Mapping[str, int]
+
+    def visible(self) -> list[str]:
+        """Return the names of nodes that are not hidden, sorted."""
+        return [name for name in self.nodes if not is_hidden(name)]
+
+    def snapshot(self, states: Mapping[str, str | None]) -> Snapshot:
+        """Return the nodes as :mod:`composer.graph` and :mod:`composer.drift` read them."""
+        return Snapshot(
+            tuple(
+                ObservedNode(
+                    full_name=name,
+                    endpoints=tuple(end for end in ends if not end.is_for_tools),
+                    state=states.get(name, ""),
+                    count=self.counts.get(name, 1),
+                )
+                for name, ends in self.nodes.items()
+            )
+        )
+
+    def of_topics(self) -> dict[str, list[tuple[str, ObservedEndpoint]]]:
+        """Return the endpoints of each topic with the names of their nodes."""
+        found: dict[str, list[tuple[str, ObservedEndpoint]]] = {}
+        for name in self.visible():
+            for end in self.nodes[name]:
+                if end.kind in (PortKind.PUBLISHER, PortKind.SUBSCRIPTION):
+                    found.setdefault(end.name, []).append((name, end))
+        return found
+
+
+class Observed:
+    """Observes the ROS graph on request. Use it on the thread of feeds, in a ``with`` block."""
+
+    def __init__(self, session: SharedSession, work: Work) -> None:
+        self._session = session
+        self.meters = TopicMeters(session)
+        self.reports = SystemReports(session)
+        self._states = _States(session, work)
+        self._topology = Topology(0, {}, {})
+        self._graph_due_s = 0.0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.meters.close()
+        self.reports.close()
+
+    def topology(self) -> Topology:
+        """Return the nodes and endpoints, at most about a second old."""
+        now_s = time.monotonic()
+        if now_s < self._graph_due_s:
+            return self._topology
+        graph = self._session.graph
+        found = dict(endpoints(graph))
+        counts = Counter(f"{namespace.rstrip('/')}/{name}" for name, namespace in graph.others())
+        nodes = {name: found[name] for name in sorted(found) if name in counts}
+        if nodes != self._topology.nodes or counts != self._topology.counts:
+            self._topology = Topology(self._topology.revision + 1, nodes, counts)
+        took_s = time.monotonic() - now_s
+        self._graph_due_s = now_s + max(_GRAPH_PERIOD_S, took_s / _GRAPH_SHARE)
+        return self._topology
+
+    def states(self) -> dict[str, str | None]:
+        """Return the states of all lifecycle nodes: those of systems, and of others as they answer.
+
+        None for nodes that have not responded.
+        """
+        managed = {
+            node.node: node.state
+            for report in self.reports.current().values()
+            if report is not None
+            for node in report.nodes
+        }
+        others = {
+            node
+            for node, ends in self.topology().nodes.items()
+            if node not in managed
+            and any(
+                (end.name, end.type) == (f"{node}/{_GET_STATE[0]}", _GET_STATE[1]) for end in ends
+            )
+        }
+        return self._states.of(others) | managed
+
+
+class SystemReports:
+    """The reports of running systems, while anything acquires them."""
+
+    def __init__(self, session: SharedSession) -> None:
+        self._session = session
+        self._systems: Systems | None = None
+        self._users = 0
+        self._callback_users = 0
+        self._with_callbacks = False
+
+    def acquire(self, *, callbacks: bool = False) -> None:
+        """Subscribe to the reports, with timings of callbacks on request."""
+        self._users += 1
+        self._callback_users += callbacks
+
+    def release(self, *, callbacks: bool = False) -> None:
+        """Unsubscribe once every user has released them."""
+        self._users -= 1
+        self._callback_users -= callbacks
+        if not self._users:
+            self.close()
+
+    def current(self) -> dict[str, SystemReport | None]:
+        """Return the last report of each system, None for systems that do not report."""
+        if not self._users:
+            return {}
+        with_callbacks = self._callback_users > 0
+        if self._systems is None or with_callbacks is not self._with_callbacks:
+            self.close()
+            self._with_callbacks = with_callbacks
+            self._systems = Systems(self._session, Deadline(math.inf), callbacks=with_callbacks)
+        systems = self._systems
+        local = local_systems()
+        known = {*systems.discover(), *local}
+        systems.subscribe(local)
+        systems.forget([name for name in systems.current() if name not in known])
+        return systems.current()
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        if self._systems is not None:
+            self._systems.close()
+            self._systems = None
+
+
+class _States:
+    """The states of lifecycle nodes without a manager, asked every two seconds."""
+
+    def __init__(self, session: SharedSession, work: Work) -> None:
+        self._session = session
+        self._work = work
+        self._known: dict[str, str | None] = {}
+        self._due_s = 0.0
+        self._is_asking = False
+
+    def of(self, nodes: set[str]) -> dict[str, str | None]:
+        """Return the states that are known, and ask for new ones if it is time."""
+        now_s = time.monotonic()
+        if nodes and now_s >= self._due_s and not self._is_asking:
+            self._is_asking = self._work(lambda: self._ask(sorted(nodes)))
+        return {node: self._known.get(node) for node in nodes}
+
+    def _ask(self, nodes: list[str]) -> None:
+        try:
+            client = LifecycleClient(self._session, Deadline(_STATES_WITHIN_S))
+            self._known = client.states(nodes)
+        finally:
+            self._due_s = time.monotonic() + _STATES_PERIOD_S
+            self._is_asking = False

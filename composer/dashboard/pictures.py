@@ -1,0 +1,90 @@
+"""Diagrams as the page shows them: those of ``compose graph``, with room for states and rates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+from composer.dashboard.declared import Declared
+from composer.drift import Snapshot
+from composer.graph import View, build_graph, live_scene_of, scene_of
+from composer.graph.diagram import Cluster, Edge, Graph, Vertex
+from composer.graph.engines import Engine, lay_out
+from composer.graph.formats.svg import contents
+from composer.graph.formats.svg_elements import markers
+from composer.graph.scenes.scene import Scene
+from composer.model import PortKind
+
+#: Stand where the page writes the state of a node and the rate of a topic, as the longest usual
+#: ones: what is measured must not change the layout.
+STATE_PLACEHOLDER = "unconfigured"
+RATE_PLACEHOLDER_HZ = 1111.0
+_NODE = "node:"
+
+
+def live_scene(snapshot: Snapshot) -> Scene:
+    """Return the scene of a ROS graph; positions do not depend on states and rates."""
+    nodes = tuple(
+        replace(node, state=STATE_PLACEHOLDER if node.state != "" else "")
+        for node in snapshot.nodes
+    )
+    rates_hz = {
+        endpoint.name: RATE_PLACEHOLDER_HZ
+        for node in snapshot.nodes
+        for endpoint in node.endpoints
+        if endpoint.kind is PortKind.PUBLISHER
+    }
+    return live_scene_of(replace(snapshot, nodes=nodes), rates_hz)
+
+
+def declared_scene(declared: Declared) -> Scene:
+    """Return the scene of a system as declared, with its diagnostics."""
+    return scene_of([declared.system], declared.diagnostics)
+
+
+def picture(scene: Scene, view: View) -> dict[str, Any]:
+    """Return a diagram as an SVG fragment, and what is known about everything in it, by key.
+
+    All texts in the fragment are escaped.
+    """
+    graph = build_graph(scene, view)
+    layout = lay_out(graph, Engine.BUNDLED)
+    return {
+        "title": graph.title,
+        "view": graph.view,
+        "width": layout.size.width,
+        "height": layout.size.height,
+        "svg": "\n".join((markers(), *contents(graph, layout))),
+        "things": {thing.key: _facts(thing) for thing in _things(graph)},
+    }
+
+
+def _things(graph: Graph) -> Iterable[Cluster | Vertex | Edge]:
+    yield from (cluster for cluster in graph.clusters if cluster.block)
+    yield from graph.vertices
+    yield from graph.edges
+
+
+def _facts(thing: Cluster | Vertex | Edge) -> dict[str, Any]:
+    details = _declared(dict(thing.details))
+    ends = (thing.source, thing.target) if isinstance(thing, Edge) else (thing.key,)
+    nodes = [end.removeprefix(_NODE) for end in ends if end.startswith(_NODE)]
+    return {
+        "details": details,
+        "wrong": thing.wrong or None,
+        "node": nodes[0] if nodes else None,
+        "channel": details.get("name"),
+    }
+
+
+def _declared(details: dict[str, Any]) -> dict[str, Any]:
+    """Return the details without what the page updates."""
+    found = {
+        name: value
+        for name, value in details.items()
+        if (name, value) not in (("state", STATE_PLACEHOLDER), ("rate_hz", RATE_PLACEHOLDER_HZ))
+    }
+    if isinstance(ports := found.get("ports"), list):
+        found["ports"] = [_declared(port) for port in ports]
+    return found

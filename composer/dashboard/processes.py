@@ -1,0 +1,69 @@
+"""CPU time and memory of processes on this computer, from /proc."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+_MB = 1e6
+#: Fields of /proc/PID/stat after the name of the command; see proc(5).
+_UTIME, _STIME, _THREADS, _STARTED, _RSS = 11, 12, 17, 19, 21
+
+
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    at_s: float
+    cpu_s: float
+    memory_mb: float
+    threads: int
+    up_s: float
+
+
+class ProcessMonitor:
+    """The use of the processors by processes, between two calls."""
+
+    def __init__(self) -> None:
+        self._before: dict[str, _Reading] = {}
+
+    def usage(self, pid: str) -> dict[str, Any] | None:
+        """Return the usage of a process; None if there is no such process.
+
+        ``cpu_percent`` is the share of one processor since the last call, None at the first.
+        """
+        reading = _read(pid)
+        if reading is None:
+            self._before.pop(pid, None)
+            return None
+        before, self._before[pid] = self._before.get(pid), reading
+        percent = None
+        if before is not None and reading.at_s > before.at_s:
+            used_s = max(0.0, reading.cpu_s - before.cpu_s)
+            percent = round(100.0 * used_s / (reading.at_s - before.at_s), 1)
+        return {
+            "cpu_percent": percent,
+            "memory_mb": round(reading.memory_mb, 1),
+            "threads": reading.threads,
+            "up_s": round(reading.up_s, 1),
+        }
+
+
+def _read(pid: str) -> _Reading | None:
+    if not pid.isascii() or not pid.isdigit():
+        return None
+    try:
+        text = Path("/proc", pid, "stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return None
+    values = text.rpartition(")")[2].split()
+    return _Reading(
+        at_s=time.monotonic(),
+        cpu_s=(int(values[_UTIME]) + int(values[_STIME])) / _TICKS_PER_S,
+        memory_mb=int(values[_RSS]) * _PAGE_BYTES / _MB,
+        threads=int(values[_THREADS]),
+        up_s=time.clock_gettime(time.CLOCK_BOOTTIME) - int(values[_STARTED]) / _TICKS_PER_S,
+    )

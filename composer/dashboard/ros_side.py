@@ -1,0 +1,175 @@
+"""The part of the dashboard that is in the ROS graph, only while a browser is connected."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from composer.dashboard.errors import RequestError
+from composer.dashboard.feeds import Feeds
+
+if TYPE_CHECKING:
+    from composer.dashboard.observed import Observed
+    from composer.remote.session import Deadline
+    from composer.remote.shared_session import SharedSession
+
+T = TypeVar("T")
+
+#: After the last browser has left, as one that loads the page again comes back at once.
+LINGER_S = 5.0
+_THREADS = 8
+#: Requests that run or wait for a thread; more are refused.
+_MAX_REQUESTS = 32
+_JOINED_WITHIN_S = 20.0
+
+
+class RosGraphSide:
+    """What feeds and operations use while the dashboard is in the ROS graph."""
+
+    def __init__(self, session: SharedSession, observed: Observed, work: Work) -> None:
+        self.session = session
+        self.observed = observed
+        self.work = work
+
+
+#: Runs a function on a worker thread; what it returns or raises is lost unless it says so itself.
+Work = Callable[[Callable[[], None]], bool]
+
+
+class RosSide:
+    """Joins the ROS graph for the first browser and leaves it after the last one."""
+
+    def __init__(self, feeds: Feeds, domain_id: int) -> None:
+        self._feeds = feeds
+        self.domain_id = domain_id
+        self._lock = threading.Lock()
+        self._browsers = 0
+        self._left_s = 0.0
+        self._thread: threading.Thread | None = None
+        self._side: RosGraphSide | None = None
+        self._joined = threading.Event()
+        self._pool = ThreadPoolExecutor(_THREADS, thread_name_prefix="request")
+        self._requests = 0
+        self._is_open = True
+        self.state, self.message = "left", ""
+
+    def enter(self) -> None:
+        """Count one more browser; the first one makes the dashboard join the ROS graph."""
+        with self._lock:
+            self._browsers += 1
+            if self._thread is None and self._is_open:
+                self._joined.clear()
+                self._thread = threading.Thread(target=self._run, name="feeds", daemon=True)
+                self._thread.start()
+
+    def leave(self) -> None:
+        """Count one browser less."""
+        with self._lock:
+            self._browsers -= 1
+            self._left_s = time.monotonic()
+
+    def close(self, within_s: float) -> None:
+        """Leave the ROS graph, and wait for that."""
+        with self._lock:
+            self._is_open = False
+            thread = self._thread
+        self._feeds.stop()
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        if thread is not None:
+            thread.join(within_s)
+
+    async def call(self, operation: Callable[[RosGraphSide, Deadline], T], timeout_s: float) -> T:
+        """Return the result of an operation, which runs on a worker thread.
+
+        Raises what it raises; RequestError if the ROS graph cannot be joined or too many requests
+        run.
+        """
+        if self._requests >= _MAX_REQUESTS:
+            raise RequestError("busy", f"{_MAX_REQUESTS} requests are running: try again later")
+        self._requests += 1
+        try:
+            loop = asyncio.get_running_loop()
+            return await loop.run_in_executor(self._pool, self._call, operation, timeout_s)
+        finally:
+            self._requests -= 1
+
+    def _call(self, operation: Callable[[RosGraphSide, Deadline], T], timeout_s: float) -> T:
+        from composer.remote.session import Deadline, NoResponseError, RosError
+
+        if not self._joined.wait(_JOINED_WITHIN_S) or self._side is None:
+            raise RequestError("failed", self.message or "the ROS graph cannot be joined")
+        try:
+            return operation(self._side, Deadline(timeout_s))
+        except NoResponseError as error:
+            raise RequestError("no_response", str(error), error.hint) from error
+        except RosError as error:
+            raise RequestError(_code(error), str(error), error.hint) from error
+
+    def _work(self, function: Callable[[], None]) -> bool:
+        try:
+            self._pool.submit(_logged, function)
+        except RuntimeError:  # the dashboard ends
+            return False
+        return True
+
+    def _is_needed(self) -> bool:
+        """Return whether to stay in the ROS graph; if not, the next browser makes it join again."""
+        with self._lock:
+            if self._is_open and (self._browsers or time.monotonic() < self._left_s + LINGER_S):
+                return True
+            self._thread = None
+            self._side = None
+            return False
+
+    def _run(self) -> None:
+        self.state, self.message = "joining", ""
+        try:
+            with ExitStack() as stack:
+                side = self._join(stack)
+                with self._lock:
+                    self._side = side
+                self.state = "ready"
+                self._joined.set()
+                self._feeds.run(side, self._is_needed)
+            self.state = "left"
+        except Exception as error:  # say why in the browser
+            logging.getLogger(__name__).exception("the dashboard is not in the ROS graph")
+            self.state, self.message = "failed", str(error)
+            with self._lock:
+                self._thread, self._side = None, None
+            self._joined.set()
+
+    def _join(self, stack: ExitStack) -> RosGraphSide:
+        from composer.dashboard.observed import Observed
+        from composer.remote.shared_session import SharedSession
+        from composer.runtime.process.environment import prepare_environment
+
+        prepare_environment()
+        session = stack.enter_context(SharedSession())
+        observed = stack.enter_context(Observed(session, self._work))
+        return RosGraphSide(session, observed, self._work)
+
+
+def _code(error: Any) -> str:
+    """Return the code of an error of :mod:`composer.remote`."""
+    names = {kind.__name__ for kind in type(error).__mro__}
+    if names & {"NotFoundError", "UnknownParameterError"}:
+        return "not_found"
+    if names & {"InvalidValueError", "InvalidNameError"}:
+        return "bad_request"
+    if names & {"ParameterRejectedError", "GoalRejectedError", "TransitionError"}:
+        return "rejected"
+    return "failed"
+
+
+def _logged(function: Callable[[], None]) -> None:
+    try:
+        function()
+    except Exception:
+        logging.getLogger(__name__).exception("a background request failed")

@@ -1,0 +1,146 @@
+"""The web server: sockets, limits for connections, and the end on a signal.
+
+uvicorn speaks HTTP and WebSocket. This adds what it lacks: a time limit for connections that send
+nothing, a limit for their number, and a main loop that sleeps until a signal arrives.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import signal
+import socket
+from collections.abc import Callable
+from typing import Any
+
+import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from composer.dashboard.app import AccessCheck
+
+DEFAULT_PORT = 8800
+#: Ports that are tried if the default one is in use.
+_PORTS = 100
+#: Largest message of a browser, in bytes.
+MAX_MESSAGE = 1024 * 1024
+#: Connections, most of which are free again after the time that each has for a request.
+MAX_OPEN = 160
+REQUEST_WITHIN_S = 5.0
+_BACKLOG = 128
+_MAX_HEADERS = 16 * 1024
+#: A browser that has not answered a ping after this time is disconnected.
+_PING_S = 20.0
+_END_S = 1
+
+
+class PortInUseError(Exception):
+    """The address cannot be listened on."""
+
+
+def listen(host: str, port: int | None) -> socket.socket:
+    """Return a listening socket. Without a port, the default one or the next that is free.
+
+    Raises PortInUseError.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    ports = [port] if port is not None else [*range(DEFAULT_PORT, DEFAULT_PORT + _PORTS), 0]
+    for candidate in ports:
+        listening = socket.socket(family, socket.SOCK_STREAM)
+        # Of an earlier dashboard, connections may linger; two servers never share a port.
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listening.bind((host, candidate))
+            listening.listen(_BACKLOG)
+        except OSError as error:
+            listening.close()
+            if port is None and error.errno == errno.EADDRINUSE:
+                continue
+            raise PortInUseError(
+                f"cannot listen on {host}:{candidate}: {error.strerror}"
+            ) from error
+        listening.setblocking(False)
+        return listening
+    raise PortInUseError(f"no port of {host} is free")
+
+
+def serve(app: AccessCheck, listening: socket.socket, on_ready: Callable[[], None]) -> None:
+    """Serve until SIGINT, SIGTERM or SIGHUP."""
+    config = uvicorn.Config(
+        app,
+        http=_GuardedProtocol,
+        ws="websockets-sansio",
+        loop="asyncio",
+        lifespan="off",
+        interface="asgi3",
+        ws_max_size=MAX_MESSAGE,
+        ws_per_message_deflate=False,  # compression takes time and memory for each browser
+        ws_ping_interval=_PING_S,
+        ws_ping_timeout=_PING_S,
+        h11_max_incomplete_event_size=_MAX_HEADERS,
+        timeout_graceful_shutdown=_END_S,
+        proxy_headers=False,
+        server_header=False,
+        date_header=False,
+        access_log=False,
+        log_config=None,
+        log_level="error",
+    )
+    server = _Server(config, app, on_ready)
+    asyncio.run(server.serve(sockets=[listening]))
+
+
+class _Server(uvicorn.Server):
+    """A server that wakes up only for requests and signals."""
+
+    def __init__(
+        self, config: uvicorn.Config, app: AccessCheck, on_ready: Callable[[], None]
+    ) -> None:
+        super().__init__(config)
+        self._app = app
+        self._on_ready = on_ready
+
+    async def main_loop(self) -> None:
+        """Wait for a signal, then close all connections."""
+        ended = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            loop.add_signal_handler(number, ended.set)
+        self._on_ready()
+        await ended.wait()
+        self.should_exit = True
+        await self._app.close()
+
+
+class _GuardedProtocol(H11Protocol):
+    """Ends connections that do not send a complete request in time, or that are too many."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._check: asyncio.TimerHandle | None = None
+        self._last_cycle: Any = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Accept a connection, or end it at once."""
+        super().connection_made(transport)
+        if len(self.connections) > MAX_OPEN:
+            transport.abort()
+            return
+        self._check = self.loop.call_later(REQUEST_WITHIN_S, self._end_if_idle)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Stop the checks."""
+        if self._check is not None:
+            self._check.cancel()
+        super().connection_lost(exc)
+
+    def _end_if_idle(self) -> None:
+        """End the connection if it has sent nothing, or only a part of a request."""
+        self._check = None
+        if self.transport.get_protocol() is not self:
+            return  # it is a WebSocket now
+        is_busy = self.cycle is not None and not self.cycle.response_complete
+        if not is_busy and self.cycle is self._last_cycle:
+            self.transport.abort()
+            return
+        self._last_cycle = self.cycle
+        self._check = self.loop.call_later(REQUEST_WITHIN_S, self._end_if_idle)

@@ -1,0 +1,89 @@
+"""Starts one dashboard: the token, the socket, the server, and the end of the process."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from composer.dashboard.access import Access, is_loopback, new_token, read_token
+from composer.dashboard.app import make_app
+from composer.dashboard.context import Dashboard, Options
+from composer.dashboard.declared import Declared
+from composer.dashboard.feeds import Feeds
+from composer.dashboard.ros_side import RosSide
+from composer.dashboard.server import listen, serve
+from composer.report.tool import tool_version
+
+PROTOCOL_VERSION = 1
+_LEAVES_WITHIN_S = 1.0
+
+
+class NotPrivateError(Exception):
+    """Other computers could use the dashboard, but the token is not of the user's choice."""
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """Where to listen: ``port`` None is the default port or the next that is free."""
+
+    host: str = "127.0.0.1"
+    port: int | None = None
+    token_file: Path | None = None
+
+
+def run_dashboard(
+    address: Address,
+    options: Options,
+    declared: Declared | None,
+    domain_id: int,
+    on_ready: Callable[[str], None],
+) -> None:
+    """Serve until a signal; ``on_ready`` gets the URL with the token.
+
+    Raises NotPrivateError, InvalidTokenFileError, PortInUseError.
+    """
+    if not is_loopback(address.host) and address.token_file is None:
+        raise NotPrivateError(f"--host {address.host} needs --token-file")
+    token = new_token() if address.token_file is None else read_token(address.token_file)
+    listening = listen(address.host, address.port)
+    port = int(listening.getsockname()[1])
+    feeds = Feeds()
+    ros = RosSide(feeds, domain_id)
+    dashboard = Dashboard(
+        options=options,
+        access=Access(token, address.host, port),
+        declared=declared,
+        ros=ros,
+        feeds=feeds,
+        hello={
+            "protocol": PROTOCOL_VERSION,
+            "version": tool_version(),
+            "read_only": options.read_only,
+            "foxglove": options.foxglove,
+            "title": _title(options, declared),
+            "system": None if declared is None else declared.system.name.value,
+            "file": None if declared is None else declared.file,
+            "domain_id": domain_id,
+            "host": socket.gethostname(),
+        },
+    )
+    url = f"http://{_in_url(address.host)}:{port}/?token={token}"
+    try:
+        serve(make_app(dashboard), listening, lambda: on_ready(url))
+    finally:
+        ros.close(_LEAVES_WITHIN_S)
+
+
+def _title(options: Options, declared: Declared | None) -> str:
+    if declared is not None:
+        return declared.system.name.value
+    return options.system or "ROS graph"
+
+
+def _in_url(host: str) -> str:
+    """Return a host as a browser on this computer can open it."""
+    if host in ("0.0.0.0", "::"):  # noqa: S104 - compared, not bound
+        return socket.gethostname()
+    return f"[{host}]" if ":" in host else host

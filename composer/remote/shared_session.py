@@ -1,0 +1,126 @@
+"""A long-lived session for several threads, and messages taken at a pace of the caller's own."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.subscription import Subscription
+
+from composer.qos import QosProfile
+from composer.remote.session import Deadline, Session
+from composer.remote.values import class_of
+from composer.runtime.ros.qos_profiles import rclpy_profile
+
+_WAIT_S = 0.02
+_SPIN_S = 1.0
+_JOIN_S = 2.0
+
+
+class SharedSession(Session):
+    """A session that a thread of its own spins: any number of threads may wait at the same time.
+
+    Subscriptions of :meth:`sample` are not in its executor: their messages are taken by the caller,
+    and what arrives in between costs no Python at all.
+    """
+
+    def __init__(self) -> None:
+        """Join the ROS graph. Raises RosError."""
+        super().__init__()
+        self._handled = threading.Condition()
+        self._is_open = True
+        self._sampling = Node(
+            f"{self.node.get_name()}_messages",
+            context=self._context,
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+            parameter_overrides=[Parameter("start_type_description_service", value=False)],
+        )
+        self._thread = threading.Thread(target=self._spin, name="ros session", daemon=True)
+        self._thread.start()
+
+    def __exit__(self, *exception: object) -> None:
+        self._is_open = False
+        self._executor.wake()
+        self._thread.join(_JOIN_S)
+        self._sampling.destroy_node()
+        super().__exit__(*exception)
+
+    def spin_once(self, deadline: Deadline) -> None:
+        """Wait briefly for an event, not beyond the deadline."""
+        with self._handled:
+            self._handled.wait(min(_WAIT_S, deadline.left_s))
+
+    def sample(
+        self, topic: str, type_name: str, qos: QosProfile, *, raw: bool = False
+    ) -> SampledTopic:
+        """Subscribe to a topic. Raises InvalidValueError if the type is not installed."""
+        subscription = self._sampling.create_subscription(
+            class_of(type_name), topic, _ignore, rclpy_profile(qos), raw=raw
+        )
+        return SampledTopic(self._sampling, subscription, raw=raw)
+
+    def _spin(self) -> None:
+        while self._is_open:
+            try:
+                self._executor.spin_once(timeout_sec=_SPIN_S)
+            except Exception:  # a callback has failed, or another thread has destroyed its entity
+                if not self._is_open:
+                    return
+                logging.getLogger(__name__).exception("a callback of the session failed")
+            with self._handled:
+                self._handled.notify_all()
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """A message, or its serialized bytes, with its source timestamp in seconds since 1970.
+
+    ``number`` is the sequence number that its publisher gave it, 0 if unknown.
+    """
+
+    content: Any
+    at_s: float
+    number: int
+
+
+class SampledTopic:
+    """A subscription whose messages are taken on request; QoS limits what waits meanwhile."""
+
+    def __init__(self, node: Node, subscription: Subscription, *, raw: bool) -> None:
+        self._node = node
+        self._subscription = subscription
+        self._raw = raw
+
+    def take(self, limit: int) -> list[Sample]:
+        """Return the oldest messages that have arrived, at most ``limit``."""
+        samples: list[Sample] = []
+        handle, message_type = self._subscription.handle, self._subscription.msg_type
+        with handle:
+            while len(samples) < limit:
+                found = handle.take_message(message_type, self._raw)
+                if found is None:
+                    break
+                content, info = found
+                samples.append(
+                    Sample(
+                        content,
+                        (info["source_timestamp"] or time.time_ns()) * 1e-9,
+                        int(info["publication_sequence_number"] or 0),
+                    )
+                )
+        return samples
+
+    def close(self) -> None:
+        """Destroy the subscription."""
+        self._node.destroy_subscription(self._subscription)
+
+
+def _ignore(_: Any) -> None:
+    """Serve as a callback that is never called."""
