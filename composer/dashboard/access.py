@@ -1,4 +1,4 @@
-"""Who may use the dashboard: the token, and the Host and Origin of requests.
+"""Which requests are allowed: the token, and the Host and Origin of requests.
 
 A page of another site can send requests to this server through the browser of its visitor. It does
 not know the token, the cookie is not sent with its requests (SameSite=Strict), and its requests are

@@ -32,8 +32,8 @@ _METHODS = ("GET", "HEAD")
 #: The addresses of the views; the page reads the rest of the path.
 _VIEWS = ("graph", "nodes", "topics", "services", "actions", "parameters", "log", "timing")
 _PAGE = files("composer.dashboard") / "page"
-#: Scripts that the page shares with the pages of ``compose graph``.
-_GRAPH_SCRIPTS = files("composer.graph.formats.html")
+#: Scripts and styles that the page shares with the pages of ``compose graph``.
+_GRAPH_FILES = files("composer.graph.formats.html")
 _MAX_PATH = 200
 
 
@@ -58,7 +58,7 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
         Route("/", _index),
         *(Route(f"/{view}", _index) for view in _VIEWS),
         *(Route(f"/{view}/{{rest:path}}", _index) for view in _VIEWS),
-        Route("/page/graph/{name}", _graph_script),
+        Route("/page/graph/{name}", _graph_file),
         Route("/page/{path:path}", _file),
         Route("/theme.css", _theme),
         WebSocketRoute("/ws", websocket),
@@ -132,11 +132,11 @@ async def _file(request: HttpRequest) -> Response:
     return _content(request.path_params["path"])
 
 
-async def _graph_script(request: HttpRequest) -> Response:
+async def _graph_file(request: HttpRequest) -> Response:
     name = request.path_params["name"]
-    if not name.endswith(".js"):
+    if not name.endswith((".js", ".css")):
         return _not_found(name)
-    return _content(name, _GRAPH_SCRIPTS)
+    return _content(name, _GRAPH_FILES)
 
 
 async def _theme(_: HttpRequest) -> Response:

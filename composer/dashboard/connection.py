@@ -172,7 +172,7 @@ class Connection:
         values.end()
         before = self._subscriptions[number]
         feed = self._feed(before.channel, parameters)
-        # The new feed is attached first, so that what both need is not subscribed anew.
+        # The new feed is attached first, so that shared subscriptions continue.
         self._subscriptions[number] = self._attach(number, before.channel, parameters, feed)
         self._dashboard.feeds.remove(before.key, before.receiver)
         return {}

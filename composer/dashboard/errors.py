@@ -2,7 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from composer.remote.session import RosError
+
+#: The codes of errors of :mod:`composer.remote`, by the names of their classes: importing these
+#: imports ROS.
+_CODES = {
+    "NoResponseError": "no_response",
+    "NotFoundError": "not_found",
+    "UnknownParameterError": "not_found",
+    "InvalidValueError": "bad_request",
+    "InvalidNameError": "bad_request",
+    "ParameterRejectedError": "rejected",
+    "GoalRejectedError": "rejected",
+    "TransitionError": "rejected",
+}
 
 
 class RequestError(Exception):
@@ -16,6 +32,13 @@ class RequestError(Exception):
     def as_data(self) -> dict[str, Any]:
         """Return the error as it is sent."""
         return {"code": self.code, "message": str(self), "hint": self.hint}
+
+
+def from_ros(error: RosError) -> RequestError:
+    """Return the same error for a browser."""
+    names = {kind.__name__ for kind in type(error).__mro__}
+    code = next((code for kind, code in _CODES.items() if kind in names), "failed")
+    return RequestError(code, str(error), error.hint)
 
 
 class BadRequestError(RequestError):

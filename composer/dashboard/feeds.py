@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
-from composer.dashboard.errors import RequestError
+from composer.dashboard.errors import RequestError, from_ros
 from composer.dashboard.messages import to_json
 from composer.dashboard.outbox import Delivery, Update
 
@@ -131,6 +131,8 @@ class Feeds:
             return closing, [item for item in self._running.values() if item.due_s <= now_s]
 
     def _poll(self, running: RunningFeed, ros: RosGraphSide) -> None:
+        from composer.remote.session import RosError
+
         running.due_s = max(running.due_s + running.feed.period_s, time.monotonic())
         try:
             if not running.is_started:
@@ -142,6 +144,8 @@ class Feeds:
                 self._send(running, update)
         except RequestError as error:
             self._fail(running, error)
+        except RosError as error:
+            self._fail(running, from_ros(error))
         except Exception as error:  # an unexpected message must not end the other feeds
             _LOG.exception("the channel %s failed", running.key)
             self._fail(running, RequestError("internal", f"{_INTERNAL}: {error!r:.200}"))

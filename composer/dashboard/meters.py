@@ -1,6 +1,6 @@
 """Rates and sizes of topics, measured while anything shows them.
 
-Messages are taken as bytes and not deserialized. Sequence numbers tell how many were published in
+Messages are taken as bytes and not deserialized. Sequence numbers show how many were published in
 between, so the rate is right although a fast topic is not read completely.
 """
 

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
+from composer.dashboard.log_lines import LogLines
 from composer.dashboard.meters import TopicMeters
 from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.model import PortKind
@@ -25,6 +26,11 @@ if TYPE_CHECKING:
     from composer.remote.shared_session import SharedSession
 
 _GRAPH_PERIOD_S = 1.0
+#: Nodes are discovered one after the other at first; the first view waits a moment for one.
+_NEW_PERIOD_S = 0.2
+_NEW_S = 4.0
+_FIRST_NODE_S = 0.5
+_FIRST_POLL_S = 0.02
 #: At most this share of a processor goes into queries of the ROS graph.
 _GRAPH_SHARE = 0.03
 _STATES_PERIOD_S = 2.0
@@ -78,15 +84,18 @@ class Observed:
         self._session = session
         self.meters = TopicMeters(session)
         self.reports = SystemReports(session)
+        self.log = LogLines(session)
         self._states = _States(session, work)
         self._topology = Topology(0, {}, {})
         self._graph_due_s = 0.0
+        self._joined_s = time.monotonic()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.meters.close()
+        self.log.close()
         self.reports.close()
 
     def topology(self) -> Topology:
@@ -94,15 +103,32 @@ class Observed:
         now_s = time.monotonic()
         if now_s < self._graph_due_s:
             return self._topology
+        is_first, used_s = not self._graph_due_s, time.thread_time()
+        nodes, counts = self._query()
+        while is_first and not nodes and time.monotonic() < now_s + _FIRST_NODE_S:
+            time.sleep(_FIRST_POLL_S)
+            nodes, counts = self._query()
+        if nodes != self._topology.nodes or counts != self._topology.counts:
+            self._topology = Topology(self._topology.revision + 1, nodes, counts)
+        used_s = time.thread_time() - used_s
+        is_new = now_s < self._joined_s + _NEW_S
+        period_s = _NEW_PERIOD_S if is_new else _GRAPH_PERIOD_S
+        self._graph_due_s = time.monotonic() + max(period_s, used_s / _GRAPH_SHARE)
+        return self._topology
+
+    def known(self) -> Topology:
+        """Return the nodes and endpoints, on any thread."""
+        known = self._topology
+        if known.revision and time.monotonic() < self._graph_due_s + _GRAPH_PERIOD_S:
+            return known
+        return Topology(known.revision, *self._query())
+
+    def _query(self) -> tuple[dict[str, tuple[ObservedEndpoint, ...]], Counter[str]]:
+        """Return the endpoints by node, and the number of nodes of each name."""
         graph = self._session.graph
         found = dict(endpoints(graph))
         counts = Counter(f"{namespace.rstrip('/')}/{name}" for name, namespace in graph.others())
-        nodes = {name: found[name] for name in sorted(found) if name in counts}
-        if nodes != self._topology.nodes or counts != self._topology.counts:
-            self._topology = Topology(self._topology.revision + 1, nodes, counts)
-        took_s = time.monotonic() - now_s
-        self._graph_due_s = now_s + max(_GRAPH_PERIOD_S, took_s / _GRAPH_SHARE)
-        return self._topology
+        return {name: found[name] for name in sorted(found) if name in counts}, counts
 
     def states(self) -> dict[str, str | None]:
         """Return the states of all lifecycle nodes: those of systems, and of others as they answer.

@@ -9,12 +9,13 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from composer.dashboard.errors import RequestError
+from composer.dashboard.errors import RequestError, from_ros
 from composer.dashboard.feeds import Feeds
 
 if TYPE_CHECKING:
+    from composer.dashboard.forms import Forms
     from composer.dashboard.observed import Observed
     from composer.remote.session import Deadline
     from composer.remote.shared_session import SharedSession
@@ -32,9 +33,12 @@ _JOINED_WITHIN_S = 20.0
 class RosGraphSide:
     """What feeds and operations use while the dashboard is in the ROS graph."""
 
-    def __init__(self, session: SharedSession, observed: Observed, work: Work) -> None:
+    def __init__(
+        self, session: SharedSession, observed: Observed, forms: Forms, work: Work
+    ) -> None:
         self.session = session
         self.observed = observed
+        self.forms = forms
         self.work = work
 
 
@@ -45,9 +49,9 @@ Work = Callable[[Callable[[], None]], bool]
 class RosSide:
     """Joins the ROS graph for the first browser and leaves it after the last one."""
 
-    def __init__(self, feeds: Feeds, domain_id: int) -> None:
+    def __init__(self, feeds: Feeds, forms: Forms) -> None:
         self._feeds = feeds
-        self.domain_id = domain_id
+        self._forms = forms
         self._lock = threading.Lock()
         self._browsers = 0
         self._left_s = 0.0
@@ -100,16 +104,14 @@ class RosSide:
             self._requests -= 1
 
     def _call(self, operation: Callable[[RosGraphSide, Deadline], T], timeout_s: float) -> T:
-        from composer.remote.session import Deadline, NoResponseError, RosError
+        from composer.remote.session import Deadline, RosError
 
         if not self._joined.wait(_JOINED_WITHIN_S) or self._side is None:
             raise RequestError("failed", self.message or "the ROS graph cannot be joined")
         try:
             return operation(self._side, Deadline(timeout_s))
-        except NoResponseError as error:
-            raise RequestError("no_response", str(error), error.hint) from error
         except RosError as error:
-            raise RequestError(_code(error), str(error), error.hint) from error
+            raise from_ros(error) from error
 
     def _work(self, function: Callable[[], None]) -> bool:
         try:
@@ -153,19 +155,7 @@ class RosSide:
         prepare_environment()
         session = stack.enter_context(SharedSession())
         observed = stack.enter_context(Observed(session, self._work))
-        return RosGraphSide(session, observed, self._work)
-
-
-def _code(error: Any) -> str:
-    """Return the code of an error of :mod:`composer.remote`."""
-    names = {kind.__name__ for kind in type(error).__mro__}
-    if names & {"NotFoundError", "UnknownParameterError"}:
-        return "not_found"
-    if names & {"InvalidValueError", "InvalidNameError"}:
-        return "bad_request"
-    if names & {"ParameterRejectedError", "GoalRejectedError", "TransitionError"}:
-        return "rejected"
-    return "failed"
+        return RosGraphSide(session, observed, self._forms, self._work)
 
 
 def _logged(function: Callable[[], None]) -> None:

@@ -12,8 +12,12 @@ from composer.dashboard.app import make_app
 from composer.dashboard.context import Dashboard, Options
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feeds
+from composer.dashboard.forms import Forms
 from composer.dashboard.ros_side import RosSide
 from composer.dashboard.server import listen, serve
+from composer.interfaces import Interfaces
+from composer.node_types import interface_folders
+from composer.project import Project
 from composer.report.tool import tool_version
 
 PROTOCOL_VERSION = 1
@@ -50,7 +54,7 @@ def run_dashboard(
     listening = listen(address.host, address.port)
     port = int(listening.getsockname()[1])
     feeds = Feeds()
-    ros = RosSide(feeds, domain_id)
+    ros = RosSide(feeds, Forms(Interfaces.load(interface_folders(Project.at(Path.cwd())))))
     dashboard = Dashboard(
         options=options,
         access=Access(token, address.host, port),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from typing import Any
 
@@ -16,7 +16,7 @@ from composer.fast_dataclass import dataclass
 from composer.remote.graph_names import type_mismatch_hint
 from composer.remote.requests import ServiceCaller
 from composer.remote.session import Deadline, NoResponseError, RosError, Session
-from composer.remote.values import class_of, compile_content
+from composer.remote.values import build_message, class_of
 
 _STATUS = {
     GoalStatus.STATUS_SUCCEEDED: "succeeded",
@@ -45,11 +45,14 @@ class FinishedGoal:
 
 @dataclass(frozen=True, slots=True)
 class ServiceRequest:
-    """A request, as YAML, for a service. With ``rate_hz`` it is sent again and again."""
+    """A request, as YAML or plain values, for a service.
+
+    With ``rate_hz`` it is sent again and again.
+    """
 
     name: str
     type_name: str
-    request: str
+    request: str | Mapping[str, Any]
     rate_hz: float | None = None
 
 
@@ -60,7 +63,7 @@ def call_service(session: Session, deadline: Deadline, request: ServiceRequest) 
     InvalidValueError, NoResponseError.
     """
     service = class_of(request.type_name, "service")
-    message = compile_content(request.request, service.Request, "the request")({})
+    message = build_message(request.request, service.Request, "the request")
     with closing(ServiceCaller(session, retry_after_s=math.inf)) as caller:
         next_s = time.monotonic()
         while True:
@@ -131,11 +134,11 @@ class AcceptedGoal:
 
 @dataclass(frozen=True, slots=True)
 class GoalRequest:
-    """A goal, as YAML, for an action, with the handler of its feedback."""
+    """A goal, as YAML or plain values, for an action, with the handler of its feedback."""
 
     name: str
     type_name: str
-    goal: str
+    goal: str | Mapping[str, Any]
     on_feedback: Callable[[Any], None]
     should_stop: ShouldStop
 
@@ -150,7 +153,7 @@ def send_goal(session: Session, deadline: Deadline, request: GoalRequest) -> Ite
     """
     name = request.name
     action = class_of(request.type_name, "action")
-    message = compile_content(request.goal, action.Goal, "the goal")({})
+    message = build_message(request.goal, action.Goal, "the goal")
     client = _ActionClient(session.node, action, name)
     try:
         is_ready = session.wait_for(

@@ -10,6 +10,7 @@ from typing import Any
 
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from composer.qos import QosProfile
@@ -116,6 +117,10 @@ class SampledTopic:
                     )
                 )
         return samples
+
+    def message(self, sample: Sample) -> Any:
+        """Return the message of a sample of serialized bytes."""
+        return deserialize_message(sample.content, self._subscription.msg_type)
 
     def close(self) -> None:
         """Destroy the subscription."""

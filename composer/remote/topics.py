@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any, Self
 
 from rclpy.duration import Duration
+from rclpy.publisher import Publisher
 
 from composer.fast_dataclass import dataclass
 from composer.qos import Durability, QosProfile, Reliability
@@ -167,10 +168,15 @@ def publish(session: Session, deadline: Deadline, publication: Publication) -> I
             next_s += 1.0 / publication.rate_hz
             if publication.times is None or count < publication.times:
                 session.spin_until(next_s)
-        if not publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGED_WITHIN_S)):
+        if not wait_until_acknowledged(publisher):
             raise _not_acknowledged_error(publication.topic)
     finally:
         session.node.destroy_publisher(publisher)
+
+
+def wait_until_acknowledged(publisher: Publisher) -> bool:
+    """Wait a second at most; return whether all reliable subscriptions have all messages."""
+    return publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGED_WITHIN_S))
 
 
 def _wait_for_subscriptions(

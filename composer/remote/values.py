@@ -14,7 +14,12 @@ from composer.interfaces import Interfaces
 from composer.interfaces.index import similar_interface
 from composer.remote.field_paths import path_steps
 from composer.remote.session import RosError
-from composer.runtime.ros.messages import MessageError, compile_message, interface_class
+from composer.runtime.ros.messages import (
+    MessageError,
+    compile_message,
+    convert_message,
+    interface_class,
+)
 from composer.source import SourceFile
 from composer.templates import compile_template
 
@@ -95,6 +100,19 @@ def compile_content(text: str, message_type: Any, what: str) -> Build:
     return build_checked
 
 
+def build_message(content: str | Mapping[str, Any], message_type: Any, what: str) -> Any:
+    """Return a message from YAML text, as :func:`compile_content`, or from plain values.
+
+    Raises InvalidValueError.
+    """
+    if isinstance(content, str):
+        return compile_content(content, message_type, what)({})
+    try:
+        return convert_message(content, message_type, what)
+    except MessageError as error:
+        raise InvalidValueError(str(error), error.hint) from error
+
+
 def to_plain(value: Any) -> Any:
     """Return a message, or a part of one, as dicts, lists and scalars."""
     if hasattr(value, "get_fields_and_field_types"):
@@ -106,6 +124,27 @@ def to_plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [to_plain(item) for item in value]
     return value
+
+
+def to_short_plain(value: Any, max_items: int) -> Any:
+    """Return the same as :func:`to_plain`, with arrays cut after ``max_items``.
+
+    A cut array ends with a text that says how many items are left out.
+    """
+    if hasattr(value, "get_fields_and_field_types"):
+        names = value.get_fields_and_field_types()
+        return {name: to_short_plain(getattr(value, name), max_items) for name in names}
+    is_list = isinstance(value, list | tuple | array) or hasattr(value, "tolist")
+    if not is_list and not (isinstance(value, bytes) and len(value) > 1):
+        return to_plain(value)
+    shown = [to_short_plain(item, max_items) for item in _items(value[:max_items])]
+    left = len(value) - len(shown)
+    return [*shown, f"... {left} more of {len(value)}"] if left else shown
+
+
+def _items(value: Any) -> list[Any]:
+    """Return the items of an array of any kind."""
+    return list(value) if isinstance(value, bytes | list | tuple) else value.tolist()
 
 
 def part(value: Any, path: str) -> Any:

@@ -1,11 +1,25 @@
-"""What a browser can request: one operation per entry, prepared on the event loop, run on a thread.
+"""What a browser can request: each operation reads its request and returns what a thread runs.
 
-To add an operation, add a function that reads the request and returns what to run, and its line in
-``OPERATIONS``.
+To add an operation, add a function to one of the modules, and its line in ``OPERATIONS``.
 """
 
 from __future__ import annotations
 
+from composer.dashboard.operations import calls, nodes, types
 from composer.dashboard.operations.operation import Operation
 
-OPERATIONS: dict[str, Operation] = {}
+OPERATIONS: dict[str, Operation] = {
+    "node": Operation(nodes.node),
+    "plan": Operation(nodes.plan),
+    "drift": Operation(nodes.drift),
+    "transition": Operation(nodes.transition, changes=True),
+    "restart": Operation(nodes.restart, changes=True),
+    "command": Operation(nodes.command, changes=True),
+    "form": Operation(types.form),
+    "types": Operation(types.types),
+    "fields": Operation(types.fields),
+    "type_of": Operation(types.type_of),
+    "call": Operation(calls.call, changes=True),
+    "publish": Operation(calls.publish, changes=True),
+    "set_parameter": Operation(calls.set_parameter, changes=True),
+}

@@ -117,6 +117,14 @@ def compile_message(template: Template, message_type: Any, what: str) -> Build:
     return _message(template, message_type, what)
 
 
+def convert_message(values: Mapping[str, Any], message_type: Any, what: str) -> Any:
+    """Return a message with these values; other fields keep their defaults. Raises MessageError.
+
+    Nothing is evaluated: a string is a string.
+    """
+    return _from_mapping(values, message_type, what)
+
+
 def _message(template: Template, message_type: Any, where: str) -> Build:
     match template:
         case Record():

@@ -1,0 +1,81 @@
+"""Operations that call services, publish messages and set parameters."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+from composer.dashboard.context import Dashboard
+from composer.dashboard.messages import Values, json_safe
+from composer.dashboard.operations.operation import Prepared
+from composer.dashboard.publishing import read_outgoing
+
+if TYPE_CHECKING:
+    from composer.dashboard.ros_side import RosGraphSide
+    from composer.remote.session import Deadline
+
+_CHANGE_S = 5.0
+_MAX_TIMEOUT_S = 120.0
+#: How long to wait for known subscriptions to match a new publisher.
+_MATCHED_WITHIN_S = 2.0
+_MAX_ITEMS = 1000
+
+
+def call(values: Values, dashboard: Dashboard) -> Prepared:
+    """Call a service."""
+    del dashboard
+    name, given_type = values.text("service"), values.optional_text("type")
+    request = values.mapping("request")
+    timeout_s = values.number("timeout_s", 5.0, 0.1, _MAX_TIMEOUT_S)
+
+    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+        from composer.remote.calls import ServiceRequest, call_service
+        from composer.remote.graph_names import GraphNames
+        from composer.remote.values import to_short_plain
+
+        names = GraphNames(ros.session, deadline)
+        type_name = given_type or names.only_type("service", name)
+        content = ros.forms.from_json(request, type_name, "request")
+        started_s = time.monotonic()
+        responses = call_service(ros.session, deadline, ServiceRequest(name, type_name, content))
+        response = next(responses)
+        took_s = time.monotonic() - started_s
+        return {"response": json_safe(to_short_plain(response, _MAX_ITEMS)), "took_s": took_s}
+
+    return run, timeout_s
+
+
+def publish(values: Values, dashboard: Dashboard) -> Prepared:
+    """Publish one message, and wait until reliable subscriptions have it."""
+    del dashboard
+    outgoing = read_outgoing(values)
+
+    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+        from composer.remote.session import Deadline as Limit
+
+        outgoing.open(ros)
+        try:
+            limit = Limit(min(_MATCHED_WITHIN_S, deadline.left_s))
+            expected = outgoing.expected()
+            ros.session.wait_for(lambda: outgoing.subscriptions >= expected or None, limit)
+            outgoing.publish()
+            outgoing.wait_until_acknowledged()
+            return {"subscriptions": outgoing.subscriptions}
+        finally:
+            outgoing.close()
+
+    return run, _CHANGE_S
+
+
+def set_parameter(values: Values, dashboard: Dashboard) -> Prepared:
+    """Set a parameter of a node."""
+    del dashboard
+    node, name, value = values.text("node"), values.text("name"), values.any("value")
+
+    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+        from composer.remote.parameters import ParameterClient
+
+        client = ParameterClient(ros.session, deadline, node)
+        return {"value": json_safe(client.set({name: value})[name])}
+
+    return run, _CHANGE_S

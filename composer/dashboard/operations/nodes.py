@@ -1,0 +1,186 @@
+"""Operations on nodes and systems: details, plan, drift, transitions and commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from composer.dashboard.channels.nodes import COMMANDS
+from composer.dashboard.channels.topics import shown_qos
+from composer.dashboard.context import Dashboard
+from composer.dashboard.declared import required
+from composer.dashboard.errors import RequestError, from_ros
+from composer.dashboard.messages import Values, json_safe
+from composer.dashboard.operations.operation import Prepared
+
+if TYPE_CHECKING:
+    from composer.dashboard.ros_side import RosGraphSide
+    from composer.remote.lifecycle_batch import NodeOutcome
+    from composer.remote.session import Deadline
+
+_TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
+_READ_S = 5.0
+_CHANGE_S = 20.0
+
+
+def node(values: Values, dashboard: Dashboard) -> Prepared:
+    """Return everything that is known about a node."""
+    name = values.text("node")
+    declared = dashboard.declared
+
+    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+        del deadline
+        topology = ros.observed.known()
+        facts = None if declared is None else declared.facts(name)
+        if name not in topology.nodes and facts is None:
+            raise RequestError("not_found", f"there is no node '{name:.200}'")
+        return {
+            "name": name,
+            "is_running": name in topology.nodes,
+            "count": topology.counts.get(name, 0),
+            "endpoints": [
+                {
+                    "kind": end.kind.value,
+                    "name": end.name,
+                    "type": end.type,
+                    "qos": shown_qos(end),
+                    "for_tools": end.is_for_tools,
+                }
+                for end in topology.nodes.get(name, ())
+            ],
+            "declared": json_safe(facts),
+            "source": None if declared is None else declared.source(name),
+        }
+
+    return run, _READ_S
+
+
+def plan(values: Values, dashboard: Dashboard) -> Prepared:
+    """Return the steps of the bring-up with their causes."""
+    declared = required(dashboard.declared, "the plan")
+    del values
+
+    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+        from composer.plan import bring_up
+
+        del ros, deadline
+        steps = bring_up(declared.system, declared.autostart).steps
+        return {
+            "system": declared.system.name.value,
+            "steps": [
+                {
+                    "number": step.number,
+                    "node": step.full_name,
+                    "transition": step.transition,
+                    "cause": step.cause,
+                    "after": list(step.after),
+                    "declared_at": declared.declared_at(step.full_name),
+                }
+                for step in steps
+            ],
+        }
+
+    return run, _READ_S
+
+
+def drift(values: Values, dashboard: Dashboard) -> Prepared:
+    """Return the differences between the declared system and the ROS graph."""
+    declared = required(dashboard.declared, "the comparison")
+    del values
+
+    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+        from composer.drift import compare
+        from composer.remote.snapshot import GraphObserver
+
+        with GraphObserver(ros.session) as observer:
+            found = compare(
+                declared.system, observer.snapshot(deadline), autostart=declared.autostart
+            )
+        return {
+            "system": declared.system.name.value,
+            "differences": [
+                {
+                    "kind": item.kind.value,
+                    "node": item.node,
+                    "subject": item.subject,
+                    "declared": item.declared,
+                    "live": item.live,
+                    "message": item.message,
+                    "hint": item.hint,
+                    "declared_at": None if item.span is None else str(item.span),
+                }
+                for item in found
+            ],
+        }
+
+    return run, _CHANGE_S
+
+
+def transition(values: Values, dashboard: Dashboard) -> Prepared:
+    """Request a transition of a node, on request together with its dependents."""
+    del dashboard
+    name, label = values.text("node"), values.choice("transition", _TRANSITIONS)
+    dependents = values.flag("dependents")
+
+    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+        from composer.remote.lifecycle_batch import LifecycleBatch, LifecycleRequest
+
+        batch = LifecycleBatch(ros.session, deadline, [name], LifecycleRequest(label, None))
+        outcomes = batch.run(dependents=dependents)
+        return {
+            "outcomes": _completed(outcomes),
+            "active_dependents": [] if dependents else list(batch.active_dependents),
+        }
+
+    return run, _CHANGE_S
+
+
+def restart(values: Values, dashboard: Dashboard) -> Prepared:
+    """Take a node down to unconfigured and back to active; dependents follow."""
+    del dashboard
+    name = values.text("node")
+
+    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+        from composer.remote.lifecycle_batch import LifecycleBatch, LifecycleRequest
+
+        outcomes: list[dict[str, Any]] = []
+        for state in ("unconfigured", "active"):
+            request = LifecycleRequest(None, state)
+            batch = LifecycleBatch(ros.session, deadline, [name], request)
+            outcomes += _completed(batch.run(dependents=True))
+        return {"outcomes": outcomes}
+
+    return run, _CHANGE_S
+
+
+def command(values: Values, dashboard: Dashboard) -> Prepared:
+    """Send a command to the manager of a system."""
+    del dashboard
+    system, name = values.text("system"), values.choice("command", COMMANDS)
+
+    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+        from composer.remote.systems import Systems
+
+        systems = Systems(ros.session, deadline)
+        try:
+            full_name = systems.find(system)
+            if name == "shutdown":
+                return {"message": systems.shut_down(full_name)}
+            success, message = systems.command(full_name, name)
+        finally:
+            systems.close()
+        if not success:
+            raise RequestError("rejected", f"{full_name}: {message}")
+        return {"message": message}
+
+    return run, _CHANGE_S
+
+
+def _completed(outcomes: Iterable[NodeOutcome]) -> list[dict[str, Any]]:
+    """Return all changes. Raises RequestError for the first that failed, after the others."""
+    found = list(outcomes)
+    for outcome in found:
+        if outcome.error is not None:
+            raise from_ros(outcome.error)
+    return [asdict(outcome.result) for outcome in found if outcome.result is not None]
