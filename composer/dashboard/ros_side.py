@@ -16,7 +16,7 @@ from composer.dashboard.feeds import Feeds
 
 if TYPE_CHECKING:
     from composer.dashboard.forms import Forms
-    from composer.dashboard.observed import Observed
+    from composer.dashboard.observing.observed import Observed
     from composer.remote.session import Deadline
     from composer.remote.shared_session import SharedSession
 
@@ -148,7 +148,7 @@ class RosSide:
             self._joined.set()
 
     def _join(self, stack: ExitStack) -> RosGraphSide:
-        from composer.dashboard.observed import Observed
+        from composer.dashboard.observing.observed import Observed
         from composer.remote.shared_session import SharedSession
         from composer.runtime.process.environment import prepare_environment
 

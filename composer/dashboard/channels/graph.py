@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 from composer.dashboard.declared import Declared, required
 from composer.dashboard.feeds import Feed
 from composer.dashboard.messages import Values, to_json
+from composer.dashboard.observing.report_pairs import ReportPairs
 from composer.dashboard.outbox import Update
-from composer.dashboard.report_pairs import ReportPairs
 
 if TYPE_CHECKING:
-    from composer.dashboard.observed import Topology
+    from composer.dashboard.observing.observed import Topology
     from composer.dashboard.ros_side import RosGraphSide
     from composer.drift import ObservedEndpoint
     from composer.remote.system_reports import NodeReport

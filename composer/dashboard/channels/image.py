@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from composer.dashboard.channels.sampled import TopicReader
 from composer.dashboard.declared import Declared
 from composer.dashboard.errors import BadRequestError, RequestError
 from composer.dashboard.feeds import Feed
 from composer.dashboard.messages import Values, to_json
+from composer.dashboard.observing.topic_reader import TopicReader
 from composer.dashboard.outbox import Update
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class ImageFeed(Feed):
         yield Update(data, header=to_json(header), dropped=lost + len(samples) - 1)
 
     def _picture(self, message: Any) -> tuple[dict[str, Any], bytes]:
-        from composer.dashboard.pixels import UnsupportedImageError, to_rgba
+        from composer.dashboard.observing.pixels import UnsupportedImageError, to_rgba
 
         match self._reader.type_name:
             case "sensor_msgs/msg/Image":

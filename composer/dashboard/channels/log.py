@@ -11,7 +11,7 @@ from composer.dashboard.messages import Values, to_json
 from composer.dashboard.outbox import Delivery, Update
 
 if TYPE_CHECKING:
-    from composer.dashboard.log_lines import LogLine
+    from composer.dashboard.observing.log_lines import LogLine
     from composer.dashboard.ros_side import RosGraphSide
 
 _SEVERITIES = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from composer.dashboard.channels.sampled import TopicReader
 from composer.dashboard.declared import Declared
 from composer.dashboard.errors import BadRequestError
 from composer.dashboard.feeds import Feed
 from composer.dashboard.messages import Values, json_safe, to_json
+from composer.dashboard.observing.topic_reader import TopicReader
 from composer.dashboard.outbox import Delivery, Update
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from composer.dashboard.outbox import Update
 from composer.model import PortKind
 
 if TYPE_CHECKING:
-    from composer.dashboard.observed import Topology
+    from composer.dashboard.observing.observed import Topology
     from composer.dashboard.ros_side import RosGraphSide
 
 

@@ -16,7 +16,7 @@ from composer.model import PortKind
 from composer.names import is_hidden
 
 if TYPE_CHECKING:
-    from composer.dashboard.observed import Topology
+    from composer.dashboard.observing.observed import Topology
     from composer.dashboard.ros_side import RosGraphSide
     from composer.drift import ObservedEndpoint
 

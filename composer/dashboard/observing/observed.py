@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
-from composer.dashboard.log_lines import LogLines
-from composer.dashboard.meters import TopicMeters
+from composer.dashboard.observing.log_lines import LogLines
+from composer.dashboard.observing.meters import TopicMeters
 from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.model import PortKind
 from composer.names import is_hidden

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from composer.dashboard.errors import RequestError
-from composer.dashboard.meters import LARGE_TYPES
+from composer.dashboard.observing.meters import LARGE_TYPES
 from composer.model import PortKind
 from composer.qos import Reliability
 
