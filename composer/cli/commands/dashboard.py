@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import os
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.cli.commands.run import Autostart
+from composer.cli.support.dashboard_process import (
+    follow_parent,
+    report_address,
+    require_dashboard,
+)
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import Namespace, examples
 from composer.cli.support.process import end_now
@@ -36,7 +41,6 @@ EPILOGS = {
         "compose run pipeline --dashboard             start it with a system",
     )
 }
-_NEEDED = ("starlette", "uvicorn", "websockets")
 _HIGHEST_PORT = 65535
 
 
@@ -91,6 +95,13 @@ def dashboard(
         ),
     ] = None,
     namespace: Namespace = None,
+    autostart: Annotated[
+        Autostart | None,
+        typer.Option(
+            help="The state up to which nodes were brought up, as given to 'compose run'.",
+            show_default="as declared in the system",
+        ),
+    ] = None,
 ) -> None:
     """Show and control running systems in the browser.
 
@@ -101,12 +112,8 @@ def dashboard(
     It joins the ROS graph only while a browser is connected, and subscribes to what is on the
     screen.
     """
-    missing = [name for name in _NEEDED if find_spec(name) is None]
-    if missing:
-        raise CommandError(
-            f"'compose dashboard' needs {', '.join(missing)}, which this Python does not have",
-            hint='pip install "ros2-composer[dashboard]"',
-        )
+    descriptor = follow_parent()
+    require_dashboard("compose dashboard")
     require_ros("compose dashboard")
     from composer.dashboard.access import InvalidTokenFileError
     from composer.dashboard.context import Options
@@ -114,6 +121,9 @@ def dashboard(
     from composer.dashboard.start import Address, NotPrivateError, run_dashboard
 
     def on_ready(url: str) -> None:
+        if descriptor is not None:
+            report_address(descriptor, url)
+            return
         write(url)
         if open_browser:
             import webbrowser
@@ -124,7 +134,7 @@ def dashboard(
         run_dashboard(
             Address(host, port, token_file),
             Options(system or "", read_only, foxglove),
-            None if system is None else _declared(system, settings or [], namespace),
+            None if system is None else _declared(system, settings or [], namespace, autostart),
             int(os.environ.get("ROS_DOMAIN_ID") or 0),
             on_ready,
         )
@@ -136,9 +146,12 @@ def dashboard(
     end_now(0)  # threads of ROS may hang
 
 
-def _declared(text: str, settings: list[str], namespace: str | None) -> Declared | None:
+def _declared(
+    text: str, settings: list[str], namespace: str | None, autostart: Autostart | None
+) -> Declared | None:
     """Return the system of a file; None for the name of a running system without a known file."""
     from composer.dashboard.declared import Declared
+    from composer.model import PrimaryState
 
     is_file = path_exists(Path(text)) or text.endswith((".yaml", ".yml"))
     if not is_file and text.rpartition("/")[2] not in {**project_systems(), **example_systems()}:
@@ -149,4 +162,5 @@ def _declared(text: str, settings: list[str], namespace: str | None) -> Declared
         raise CommandError(f"'{text}' cannot be shown because of its errors")
     if result.system.node_type:
         raise CommandError(f"'{text}' is a node type, not a system")
-    return Declared(result.system, str(path), tuple(result.diagnostics))
+    goal = PrimaryState(autostart.value) if autostart is not None else None
+    return Declared(result.system, str(path), tuple(result.diagnostics), goal)

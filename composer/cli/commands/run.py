@@ -6,12 +6,14 @@ import math
 import os
 import signal
 import sys
+from contextlib import ExitStack
 from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.cli.support.dashboard_process import require_dashboard
 from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.options import Namespace, examples, finite
 from composer.cli.support.ros import require_interfaces, require_ros
@@ -36,6 +38,7 @@ EPILOGS = {
         "compose run pipeline --autostart inactive             configure nodes, do not activate",
         "compose run pipeline --wait --timeout 10              run in the background",
         "compose run robot.yaml --process perception           run one of its processes alone",
+        "compose run pipeline --dashboard                      watch and control it in the browser",
     )
 }
 
@@ -127,6 +130,13 @@ def run(
             help="Exit with code 1 if a handler has raised an error or a call has failed.",
         ),
     ] = False,
+    dashboard: Annotated[
+        bool,
+        typer.Option(
+            "--dashboard",
+            help="Start 'compose dashboard' as well, and print the address of its page.",
+        ),
+    ] = False,
     wait: Annotated[
         bool,
         typer.Option("--wait", help="Run in the background; return once the system is up."),
@@ -201,6 +211,8 @@ def run(
     switches = ["--use-sim-time"] if use_sim_time else []
     switches += [] if tracing else ["--no-tracing"]
     switches += ["--check-mutation"] if check_mutation else []
+    if dashboard:
+        require_dashboard("compose run --dashboard")
     if wait:
         from composer.cli.support.process import run_in_background
 
@@ -209,6 +221,7 @@ def run(
         given += switches
         given += ["--fail-on-error"] if fail_on_error else []
         given += [] if process is None else ["--process", process]
+        given += ["--dashboard"] if dashboard else []
         limits = _numbers({"--for": run_for, "--timeout": up_s, "--grace": grace})
         limit_s = up_s + grace + _START_S
         write(run_in_background(declared.name.value, [*given, *limits], limit_s))
@@ -225,7 +238,8 @@ def run(
         process=member,
         member_command=(*compose_command(), "run", *given, *switches),
     )
-    outcome = _run(declared, plan, options)
+    shown = _dashboard_arguments(system, settings or [], namespace, autostart)
+    outcome = _run(declared, plan, options, shown if dashboard else None)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
 
@@ -286,13 +300,25 @@ def _arguments(
     return arguments
 
 
+def _dashboard_arguments(
+    system: str, settings: list[str], namespace: str | None, autostart: Autostart | None
+) -> list[str]:
+    """Return the arguments of the dashboard that shows this system."""
+    arguments = [argument for text in settings for argument in ("--set", text)]
+    arguments += [] if namespace is None else ["--namespace", namespace]
+    arguments += [] if autostart is None else ["--autostart", autostart.value]
+    return [*arguments, "--", system]
+
+
 def _numbers(options: dict[str, float | None]) -> list[str]:
     given = {name: value for name, value in options.items() if value is not None}
     return [text for name, value in given.items() for text in (name, repr(value))]
 
 
-def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
+def _run(system: System, plan: Plan, options: HostOptions, dashboard: list[str] | None) -> Outcome:
+    """Run the system, with a dashboard if its arguments are given."""
     from composer.cli.support.console import queued_output
+    from composer.cli.support.dashboard_process import shown_address
     from composer.cli.support.line_format import console_format
     from composer.cli.support.process import end_now
     from composer.cli.support.progress import Progress, summary
@@ -303,8 +329,11 @@ def _run(system: System, plan: Plan, options: HostOptions) -> Outcome:
     from composer.runtime.process import StartRefused
     from composer.runtime.supervision.events import Event
 
-    with queued_output(), run_log(join(system.namespace, system.name.value)) as log:
-        progress = Progress(sys.stderr, console_format())
+    with ExitStack() as stack:
+        stack.enter_context(queued_output())
+        log = stack.enter_context(run_log(join(system.namespace, system.name.value)))
+        address = None if dashboard is None else stack.enter_context(shown_address(dashboard))
+        progress = Progress(sys.stderr, console_format(), address)
 
         def report(event: Event) -> None:
             progress.show(event)

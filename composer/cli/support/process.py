@@ -73,6 +73,11 @@ def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> 
     return f"{report} (process {process.pid}, log {log})"
 
 
+def is_in_background() -> bool:
+    """Return whether another command waits for the report of this process that it is up."""
+    return READY_VARIABLE in os.environ
+
+
 def take_ready_descriptor() -> str | None:
     """Return where to report that the system is up, if a command waits for that.
 

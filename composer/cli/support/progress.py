@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TextIO
 
 from composer.characters import escape_lines
@@ -37,21 +37,31 @@ _MAX_NODES_WITH_ERRORS = 5
 class Progress:
     """Print one line per event, except for faults, which the nodes have logged.
 
-    By default, lines begin with the time since the start.
+    By default, lines begin with the time since the start. ``address`` returns the address of the
+    dashboard, for the command that started this process in the background; it may wait briefly.
     """
 
-    def __init__(self, stream: TextIO, line_format: LineFormat | None = None) -> None:
+    def __init__(
+        self,
+        stream: TextIO,
+        line_format: LineFormat | None = None,
+        address: Callable[[], str | None] | None = None,
+    ) -> None:
         self._stream = stream
         self._color = use_color(stream)
         self._format = line_format
         self._ready = take_ready_descriptor()
+        self._address = address
 
     def show(self, event: Event) -> None:
         """Print the event."""
         if isinstance(event, CallbackFailed):
             return
         if isinstance(event, BroughtUp):
-            report_ready(self._ready, str(event))
+            address = None if self._address is None or self._ready is None else self._address()
+            report_ready(
+                self._ready, str(event) if address is None else f"dashboard: {address}\n{event}"
+            )
             self._ready = None
         line = self._line(event)
         code = _code(event)

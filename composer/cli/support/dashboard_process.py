@@ -1,0 +1,127 @@
+"""The dashboard of ``compose run --dashboard``: a child process that ends with the system."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import select
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from importlib.util import find_spec
+
+from composer.cli.support.errors import CommandError
+from composer.cli.support.process import is_in_background
+from composer.cli.support.terminal import say
+
+#: Holds the file descriptor on which a dashboard reports its address to ``compose run``.
+_VARIABLE = "COMPOSE_DASHBOARD_FD"
+_NEEDED = ("starlette", "uvicorn", "websockets")
+_READY_WITHIN_S = 20.0
+#: The report that a system is up waits this long for the address.
+_ADDRESS_WITHIN_S = 5.0
+_ENDS_WITHIN_S = 1.0
+_PR_SET_PDEATHSIG = 1  # of <sys/prctl.h>
+
+
+def require_dashboard(command: str) -> None:
+    """Raise CommandError if the packages of the extra ``dashboard`` are not installed."""
+    missing = [name for name in _NEEDED if find_spec(name) is None]
+    if missing:
+        raise CommandError(
+            f"'{command}' needs {', '.join(missing)}, which this Python does not have",
+            hint='pip install "ros2-composer[dashboard]"',
+        )
+
+
+class DashboardProcess:
+    """A dashboard in a process of its own. Start it on the main thread."""
+
+    def __init__(self, arguments: Sequence[str]) -> None:
+        """Start ``compose dashboard`` with ``arguments``."""
+        self._reading, writing = os.pipe()
+        try:
+            self._process = subprocess.Popen(  # noqa: S603 - this very program
+                # -P: do not import modules from the current folder
+                [sys.executable, "-P", "-m", "composer", "dashboard", *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                env={**os.environ, _VARIABLE: str(writing)},
+                pass_fds=(writing,),
+                start_new_session=True,  # Ctrl-C ends the system first, and that the dashboard
+            )
+        finally:
+            os.close(writing)
+
+    def url(self, within_s: float) -> str | None:
+        """Return the address with the token; None if the dashboard has not started in time."""
+        ready, _, _ = select.select([self._reading], [], [], within_s)
+        if not ready:
+            return None
+        return os.read(self._reading, 4096).decode("ascii", "replace").strip() or None
+
+    def stop(self) -> None:
+        """End the dashboard."""
+        self._process.terminate()
+        try:
+            self._process.wait(_ENDS_WITHIN_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        os.close(self._reading)
+
+
+@contextmanager
+def shown_address(arguments: Sequence[str]) -> Iterator[Callable[[], str | None]]:
+    """Run a dashboard for the length of a ``with`` block, and print its address when it is ready.
+
+    Yield a function that returns the address, for a process in the background: its output is a
+    file that others may read, so the address is not printed there.
+    """
+    process = DashboardProcess(arguments)
+    found: list[str] = []
+
+    def announce() -> None:
+        url = process.url(_READY_WITHIN_S)
+        if url is not None:
+            found.append(url)
+        if not in_background:
+            say(f"dashboard: {url or 'it has not started, see above'}")
+
+    in_background = is_in_background()
+    thread = threading.Thread(target=announce, name="dashboard", daemon=True)
+    thread.start()
+
+    def address() -> str | None:
+        thread.join(_ADDRESS_WITHIN_S)
+        return found[0] if found else None
+
+    try:
+        yield address
+    finally:
+        process.stop()
+
+
+def follow_parent() -> int | None:
+    """In a dashboard of ``compose run``: end with that process, however it ends.
+
+    Return the file descriptor to report the address on; None if a user has started the dashboard.
+    """
+    descriptor = os.environ.pop(_VARIABLE, None)
+    if descriptor is None:
+        return None
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, ctypes.c_ulong(signal.SIGKILL))
+    return int(descriptor)
+
+
+def report_address(descriptor: int, url: str) -> None:
+    """Report the address to ``compose run``; end this process if that has ended already."""
+    try:
+        os.write(descriptor, f"{url}\n".encode())
+    except BrokenPipeError:
+        os._exit(0)
+    with suppress(OSError):
+        os.close(descriptor)
