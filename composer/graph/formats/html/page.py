@@ -189,7 +189,7 @@ def _script() -> str:
 
 
 def _style() -> str:
-    return f"{page_style()}\n{_asset('page.css')}"
+    return f"{page_style()}\n{_asset('page.css')}\n{_asset('picture.css')}"
 
 
 def _asset(name: str) -> str:

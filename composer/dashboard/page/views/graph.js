@@ -1,0 +1,185 @@
+/** The graph: the diagram of `compose graph`, with the states and rates of the running system. */
+import { applyTo } from "../graph/filter.js";
+import { readPicture } from "../graph/picture.js";
+import { createSearch } from "../graph/search.js";
+import { createSelection, listenToItems } from "../graph/selection.js";
+import { createViewport } from "../graph/viewport.js";
+import { button, empty, h, s } from "../dom.js";
+import { icon } from "../icons.js";
+import { pathOf } from "../router.js";
+import { dropNote, searchField, tabs } from "../widgets/parts.js";
+import { articleOf } from "./graph_details.js";
+import { createFilterMenu } from "./graph_filter.js";
+import { createOverlay } from "./graph_overlay.js";
+
+const ZOOM_STEP = 1.25;
+/** Until then, an empty graph may be one that is not discovered yet. */
+const DISCOVERY_MS = 4000;
+const VIEWS = [
+  ["nodes", "Nodes"],
+  ["connections", "Ports"],
+  ["lifecycle", "Bring-up"],
+  ["deployment", "Executors"],
+];
+
+export function createGraphView(app) {
+  const links = h("div");
+  const input = searchField("Search ( / )", () => {});
+  const output = h("output", { class: "matches", "aria-live": "polite" });
+  const filter = createFilterMenu(() => picture && applyTo(picture, filter.hidden()));
+  const note = dropNote();
+  const canvas = h("section", { class: "canvas", role: "group", "aria-label": "Diagram" }, empty("Loading the graph …"));
+  const about = h("div", { class: "about" });
+  const neighbors = h("nav", { class: "neighbors", "aria-label": "Connected to" });
+  const close = button(icon("close"), () => {}, { class: "quiet close", "aria-label": "Close details" });
+  const panel = h("aside", { class: "detail floating", "aria-label": "Details", tabindex: "-1", hidden: true }, close, about, neighbors);
+  const zoom = (label, title, action) => button(label, action, { title, "aria-label": title });
+  const element = h(
+    "div",
+    { class: "view graph" },
+    h(
+      "div",
+      { class: "view-head" },
+      h("h2", { class: "view-title" }, "Graph"),
+      links,
+      h("div", { class: "search", role: "search" }, input, output),
+      filter.element,
+      h("div", { class: "buttons", role: "group", "aria-label": "Zoom" },
+        zoom("−", "Zoom out ( - )", () => viewport?.zoom(1 / ZOOM_STEP)),
+        zoom("+", "Zoom in ( + )", () => viewport?.zoom(ZOOM_STEP)),
+        zoom("Fit", "Show everything ( 0 )", () => viewport?.fit())),
+      note.element,
+    ),
+    h("div", { class: "stage" }, canvas, panel),
+  );
+
+  let picture = null;
+  let viewport = null;
+  let overlay = null;
+  let things = {};
+  let live = { nodes: {}, edges: {}, topics: {} };
+  let view = "";
+  let wanted = null;
+  let ends = [];
+  let shownAt = 0;
+
+  const current = () => picture;
+  const selection = createSelection({ panel, about, neighbors, close }, current, () => viewport, {
+    articleOf: (key) => articleOf(app, key, things[key], live),
+    changed: remember,
+  });
+  const search = createSearch({ input, output }, current, {
+    detailsOf: (key) => `${JSON.stringify(things[key]?.details ?? "")} ${live.nodes[things[key]?.node]?.state ?? ""}`.toLowerCase(),
+    goTo: selection.goTo,
+  });
+
+  function draw(data) {
+    const parsed = new DOMParser().parseFromString(`<svg xmlns="http://www.w3.org/2000/svg">${data.svg}</svg>`, "image/svg+xml");
+    if (parsed.querySelector("parsererror")) {
+      canvas.replaceChildren(empty("The diagram cannot be drawn.", "The server sent an invalid picture."));
+      return;
+    }
+    things = data.things;
+    if (Object.keys(things).length === 0) {
+      picture = null;
+      const isEarly = performance.now() - shownAt < DISCOVERY_MS;
+      canvas.replaceChildren(isEarly ? empty("Discovering nodes …") : empty("There are no nodes in the ROS graph.", "Start some with compose run or ros2 run."));
+      if (isEarly) setTimeout(() => picture || !ends.length || draw(data), DISCOVERY_MS);
+      return;
+    }
+    const world = s("g", { class: "world" });
+    world.append(...[...parsed.documentElement.childNodes].map((node) => document.importNode(node, true)));
+    const svg = s("svg", { class: "picture", viewBox: `0 0 ${data.width} ${data.height}`, role: "group", "aria-label": `${data.title}: ${data.view}` }, world);
+    canvas.replaceChildren(svg);
+    picture = readPicture(canvas);
+    overlay = createOverlay(picture, things);
+    overlay.show(live);
+    viewport = createViewport(picture);
+    viewport.fit();
+    listenToItems(picture, selection, viewport);
+    filter.update(picture);
+    applyTo(picture, filter.hidden());
+    search.update();
+    select(wanted);
+  }
+
+  function receiveLive(data, { dropped }) {
+    note.show(dropped);
+    live = data;
+    overlay?.show(live);
+    if (selection.isOpen() && wanted) about.replaceChildren(...[articleOf(app, wanted, things[wanted], live)].filter(Boolean));
+  }
+
+  function fail(error) {
+    canvas.replaceChildren(empty("The graph cannot be shown.", error.message));
+    picture = null;
+  }
+
+  function select(key) {
+    if (!picture) return;
+    const item = picture.items.get(key);
+    if (item) selection.goTo(item);
+    else if (key && things[key]) selection.choose(key);
+    else if (selection.isOpen()) selection.clear();
+  }
+
+  /** Keep the selection in the address. */
+  function remember(key) {
+    if (key === wanted) return;
+    wanted = key;
+    const name = key?.startsWith("node:") ? key.slice("node:".length) : "";
+    app.go(pathOf("graph", name, { view: view === "nodes" ? "" : view, about: name ? "" : key ?? "" }), { replace: true });
+  }
+
+  function show({ name, query }) {
+    const next = query.get("view") ?? "nodes";
+    const key = name ? `node:${name}` : query.get("about");
+    if (next === view && ends.length > 0) {
+      if (key === wanted) return;
+      wanted = key;
+      select(key);
+      return;
+    }
+    hide();
+    shownAt = performance.now();
+    view = next;
+    wanted = key;
+    links.replaceChildren(tabs("Diagram", VIEWS.filter(([id]) => id === "nodes" || id === "connections" || app.hello?.file || id === view)
+      .map(([id, label]) => [id, label, pathOf("graph", "", { view: id === "nodes" ? "" : id })]), view));
+    canvas.replaceChildren(empty("Loading the graph …"));
+    ends = [
+      app.connection.subscribe("graph", { view }, draw, { onerror: fail }),
+      app.connection.subscribe("graph.live", {}, receiveLive),
+    ];
+    document.addEventListener("keydown", onkey);
+  }
+
+  function hide() {
+    for (const subscription of ends) subscription.end();
+    ends = [];
+    document.removeEventListener("keydown", onkey);
+    if (picture && selection.isOpen()) {
+      selection.unmark();
+      panel.hidden = true;
+    }
+    picture = null;
+    viewport = null;
+    live = { nodes: {}, edges: {}, topics: {} };
+  }
+
+  function onkey(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.("input, select, dialog")) return;
+    const actions = {
+      "+": () => viewport?.zoom(ZOOM_STEP),
+      "=": () => viewport?.zoom(ZOOM_STEP),
+      "-": () => viewport?.zoom(1 / ZOOM_STEP),
+      0: () => viewport?.fit(),
+      Escape: () => picture && selection.clear(),
+    };
+    if (!actions[event.key]) return;
+    actions[event.key]();
+    event.preventDefault();
+  }
+
+  return { element, show, hide };
+}

@@ -1,0 +1,92 @@
+/**
+ * What is measured, written into the diagram: states of nodes, rates of topics, dropped messages.
+ *
+ * The diagram has room for it, so nothing moves.
+ */
+import { s, setText } from "../dom.js";
+import { hertz } from "../format.js";
+import { boxOf } from "../graph/picture.js";
+import { kindOfState, labelOfState, stateShape } from "../icons.js";
+
+/** Stand where a state and a rate are to be written: see pictures.py. */
+const STATE_PLACEHOLDER = "unconfigured";
+const RATE_PLACEHOLDER = "1110 Hz";
+const SHAPE_SIZE = 12;
+const INSET = 5;
+
+export function createOverlay(picture, things) {
+  const nodes = new Map();
+  const rates = new Map();
+  const drops = new Map();
+
+  for (const item of picture.items.values()) {
+    const texts = [...item.element.querySelectorAll("text")];
+    if (item.kind === "node") nodes.set(item.key, nodeOf(item, texts));
+    const rate = texts.find((text) => text.textContent === RATE_PLACEHOLDER);
+    if (rate) rates.set(item.key, rate);
+  }
+  for (const line of picture.lines) {
+    const texts = line.parts.flatMap((part) => [...part.querySelectorAll("text")]);
+    const rate = texts.find((text) => text.textContent === RATE_PLACEHOLDER);
+    if (rate) rates.set(line.key, rate);
+  }
+  for (const text of rates.values()) text.textContent = "";
+
+  function nodeOf(item, texts) {
+    const box = boxOf(item);
+    const at = `translate(${box.x + INSET} ${box.y + INSET}) scale(.75)`;
+    const mark = s("g", { class: "mark", transform: at });
+    item.element.append(mark);
+    return { item, mark, text: texts.find((text) => text.textContent === STATE_PLACEHOLDER), state: undefined };
+  }
+
+  function showState(entry, state) {
+    if (entry.state === state) return;
+    entry.state = state;
+    entry.item.element.dataset.state = kindOfState(state);
+    entry.mark.replaceChildren(stateShape(state));
+    if (entry.text) setText(entry.text, labelOfState(state));
+    entry.item.element.setAttribute("aria-label", `node ${entry.item.name}, ${labelOfState(state)}`);
+  }
+
+  /** Write the dropped messages beside the middle of a line; only there if there are any. */
+  function showDrops(line, total) {
+    const [path] = line.parts;
+    path.classList.toggle("lossy", total > 0);
+    if (total > 0 && !drops.has(line.key)) {
+      const middle = path.getPointAtLength(path.getTotalLength() / 2);
+      const text = s("text", { class: "edge-label drop-label", x: middle.x, y: middle.y - SHAPE_SIZE / 2 });
+      path.after(text);
+      drops.set(line.key, text);
+    }
+    const label = drops.get(line.key);
+    if (label) setText(label, total > 0 ? `${total} dropped` : "");
+  }
+
+  function rateOf(key, live) {
+    if (live.edges[key]?.rate_hz !== undefined) return live.edges[key].rate_hz;
+    const topic = things[key]?.channel;
+    if (live.topics[topic]?.rate_hz !== undefined) return live.topics[topic].rate_hz;
+    if (!key.startsWith("topic:")) return null;
+    // Several publishers: each reports its own rate.
+    const own = Object.entries(live.edges).filter(([edge]) => edge.startsWith("publisher:") && edge.endsWith(`.${topic}`));
+    return own.length > 0 ? own.reduce((sum, [, { rate_hz: rate }]) => sum + (rate ?? 0), 0) : null;
+  }
+
+  return {
+    show(live) {
+      for (const [key, entry] of nodes) {
+        const node = live.nodes[things[key]?.node];
+        if (node) showState(entry, node.state);
+      }
+      for (const [key, text] of rates) {
+        const rate = rateOf(key, live);
+        setText(text, rate === null ? "" : hertz(rate));
+      }
+      for (const line of picture.lines) {
+        const edge = live.edges[line.key];
+        if (edge?.dropped_total !== undefined) showDrops(line, edge.dropped_total);
+      }
+    },
+  };
+}

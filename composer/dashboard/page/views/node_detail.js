@@ -1,0 +1,169 @@
+/** The details of one node: what it does, what it did wrong, and what can be done with it. */
+import { button, empty, h } from "../dom.js";
+import { count, duration, hertz, milliseconds, percent } from "../format.js";
+import { pathOf } from "../router.js";
+import { attempt, confirmed, toast } from "../widgets/notices.js";
+import { detailHead, facts, section, stateBadge } from "../widgets/parts.js";
+import { qosText } from "../widgets/qos.js";
+
+const TRANSITIONS = ["configure", "activate", "deactivate", "cleanup", "shutdown"];
+const VIEWS = { publisher: "topics", subscription: "topics", service: "services", client: "services", "action server": "actions", "action client": "actions" };
+
+export function createNodeDetail(app) {
+  const element = h("aside", { class: "detail", "aria-label": "Details of the node", hidden: true });
+  const state = h("div");
+  const actions = h("div", { class: "actions" });
+  const figures = h("div");
+  const callbacks = h("div");
+  const declared = h("div");
+  let name = "";
+  let timing = null;
+  let shownActions = "";
+
+  function show(wanted) {
+    if (wanted === name) return;
+    hide();
+    name = wanted;
+    element.hidden = name === "";
+    if (name === "") return;
+    element.replaceChildren(
+      detailHead(name, "/nodes"),
+      h(
+        "p",
+        { class: "links" },
+        h("a", { href: pathOf("graph", name) }, "Graph"),
+        h("a", { href: pathOf("parameters", name) }, "Parameters"),
+        h("a", { href: pathOf("log", "", { node: name }) }, "Log"),
+      ),
+      state,
+      actions,
+      figures,
+      callbacks,
+      declared,
+    );
+    for (const part of [state, actions, figures, callbacks, declared]) part.replaceChildren();
+    timing = app.connection.subscribe("timing", {}, showTiming);
+    showDeclared(name);
+  }
+
+  function hide() {
+    timing?.end();
+    timing = null;
+    name = "";
+    shownActions = "";
+    element.hidden = true;
+  }
+
+  function update({ nodes }) {
+    if (name === "") return;
+    const node = nodes.find((one) => one.name === name);
+    if (!node) {
+      state.replaceChildren(empty(`${name} is not in the ROS graph.`));
+      actions.replaceChildren();
+      figures.replaceChildren();
+      shownActions = "";
+      return;
+    }
+    state.replaceChildren(h(
+      "p",
+      { class: "node-state" },
+      stateBadge(node.state),
+      node.since_s ? h("span", { class: "faint" }, ` for ${duration(Date.now() / 1000 - node.since_s)}`) : null,
+      node.desired && node.desired !== node.state ? h("span", { class: "desired" }, ` should be ${node.desired}`) : null,
+    ));
+    showActions(node);
+    const events = Object.entries(node.qos_events ?? {}).map(([event, times]) => `${event}: ${times}`).join(", ");
+    const waits = Object.entries(node.depends_on ?? {}).map(([other, needed]) => `${other} (${needed})`).join(", ");
+    figures.replaceChildren(
+      node.last_error ? h("p", { class: "problem" }, h("strong", {}, "Last error: "), node.last_error) : "",
+      node.held_down ? h("p", { class: "note" }, node.held_down) : "",
+      facts([
+        ["system", node.system],
+        ["depends on", waits],
+        ["sent", node.system ? hertz(node.sent_hz) : null],
+        ["received", node.system ? hertz(node.received_hz) : null],
+        ["busy", node.system ? percent(node.busy) : null],
+        ["errors", node.system ? count(node.errors) : null],
+        ["restarts", node.system ? count(node.restarts) : null],
+        ["over budget", node.overruns ? count(node.overruns) : null],
+        ["dropped", node.queue_drops ? `${count(node.queue_drops)} messages` : null],
+        ["QoS events", events],
+        ["declared at", node.declared_at],
+      ]),
+    );
+  }
+
+  function showActions(node) {
+    const wanted = `${node.system} ${node.transitions?.join()} ${app.isReadOnly()}`;
+    if (wanted === shownActions) return;
+    shownActions = wanted;
+    if (app.isReadOnly() || node.state === "") {
+      actions.replaceChildren();
+      return;
+    }
+    const legal = node.transitions ?? [];
+    const buttons = TRANSITIONS.filter((transition) => legal.includes(transition)).map((transition) =>
+      acting(transition, "transition", { transition }, transition === "shutdown"));
+    if (node.system) buttons.push(acting("restart", "restart", {}, false));
+    actions.replaceChildren(...buttons);
+  }
+
+  function acting(label, op, args, isFinal) {
+    const node = name;
+    const text = `${label[0].toUpperCase()}${label.slice(1)}`;
+    const pressed = button(text, () => attempt(pressed, async () => {
+      const question = `${text} ${node}?`;
+      if (isFinal && !(await confirmed(question, { verb: text, hint: "A node that is shut down cannot be used again." }))) return;
+      const { outcomes } = await app.connection.request(op, { node, ...args });
+      toast((outcomes ?? []).map(({ node: moved, before, after }) => `${moved}: ${before} → ${after}`).join("\n") || `${text}: done`);
+    }), { data: { transition: label } });
+    return pressed;
+  }
+
+  function showTiming({ systems }) {
+    const own = systems.flatMap((system) => system.callbacks).filter((callback) => callback.node === name);
+    if (own.length === 0) return;
+    const row = (callback) => h(
+      "tr",
+      {},
+      h("th", { scope: "row" }, `${callback.kind} ${callback.name}`),
+      [hertz(callback.calls_hz), milliseconds(callback.mean_ms), milliseconds(callback.p99_ms), milliseconds(callback.longest_ms)].map((text) => h("td", { class: "number" }, text)),
+    );
+    callbacks.replaceChildren(section("Callbacks", h(
+      "div",
+      { class: "scroll-x", tabindex: "0", role: "region", "aria-label": "Callbacks" },
+      h(
+        "table",
+        { class: "small" },
+        h("thead", {}, h("tr", {}, ["Callback", "Calls", "Mean", "p99", "Max"].map((text, index) => h("th", { scope: "col", class: index ? "number" : null }, text)))),
+        h("tbody", {}, own.map(row)),
+      ),
+    )));
+  }
+
+  async function showDeclared(node) {
+    try {
+      const found = await app.connection.request("node", { node });
+      if (node !== name) return;
+      const endpoint = ({ kind, name: channel, type, qos }) => h(
+        "li",
+        {},
+        h("span", { class: "type" }, kind),
+        " ",
+        VIEWS[kind] ? h("a", { href: pathOf(VIEWS[kind], channel) }, channel) : channel,
+        h("span", { class: "type" }, ` ${type}`),
+        qos ? h("span", { class: "qos" }, qosText(qos)) : null,
+      );
+      const { source } = found;
+      declared.replaceChildren(
+        found.endpoints?.length ? section("Ports", h("ul", { class: "endpoints" }, found.endpoints.map(endpoint))) : "",
+        source?.text ? section(`Declared at ${source.file}:${source.line}`, h("pre", { class: "source", tabindex: "0" }, source.text)) : "",
+      );
+    } catch (error) {
+      if (node === name) declared.replaceChildren(h("p", { class: "hint" }, error.message));
+    }
+  }
+
+  return { element, show, hide, update };
+}
+

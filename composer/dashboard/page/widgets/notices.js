@@ -1,0 +1,52 @@
+/** Messages over the page: of an action that failed or succeeded, and questions before it. */
+import { button, h } from "../dom.js";
+
+const SHOWN_MS = 6000;
+
+/** Show a message for some seconds; errors stay until they are closed. */
+export function toast(text, { tone = "good", hint = "" } = {}) {
+  const box = h(
+    "div",
+    { class: "toast", data: { tone }, role: tone === "bad" ? "alert" : null },
+    h("div", {}, h("p", {}, text), hint && h("p", { class: "hint" }, hint)),
+    button("Close", () => box.remove(), { class: "quiet" }),
+  );
+  document.getElementById("toasts").append(box);
+  if (tone !== "bad") setTimeout(() => box.remove(), SHOWN_MS);
+}
+
+/** Run an action of a button: it is disabled meanwhile, and an error is shown. */
+export async function attempt(pressed, action) {
+  pressed.disabled = true;
+  try {
+    await action();
+  } catch (error) {
+    toast(error.message, { tone: "bad", hint: error.hint });
+  } finally {
+    pressed.disabled = false;
+  }
+}
+
+/** Ask before an action that cannot be undone; return whether to do it. */
+export function confirmed(question, { verb, hint = "" }) {
+  return new Promise((resolve) => {
+    const dialog = h(
+      "dialog",
+      { "aria-label": question, onclose: () => finish(dialog.returnValue === "yes") },
+      h("p", {}, question),
+      hint && h("p", { class: "hint" }, hint),
+      h(
+        "div",
+        { class: "actions" },
+        button("Cancel", () => dialog.close("no")),
+        button(verb, () => dialog.close("yes"), { class: "danger" }),
+      ),
+    );
+    function finish(answer) {
+      dialog.remove();
+      resolve(answer);
+    }
+    document.body.append(dialog);
+    dialog.showModal();
+  });
+}
