@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 from composer.dashboard.declared import Declared
-from composer.drift import Snapshot
+from composer.drift import ObservedNode, Snapshot
 from composer.graph import View, build_graph, live_scene_of, scene_of
-from composer.graph.diagram import Cluster, Edge, Graph, Vertex
+from composer.graph.diagram import Cluster, Direction, Edge, Graph, Vertex
 from composer.graph.engines import Engine, lay_out
 from composer.graph.formats.svg import contents
 from composer.graph.formats.svg_elements import markers
@@ -21,21 +21,35 @@ from composer.model import PortKind
 STATE_PLACEHOLDER = "unconfigured"
 RATE_PLACEHOLDER_HZ = 1111.0
 _NODE = "node:"
+#: Views without a direction of their own.
+_TURNED = (View.NODES, View.CONNECTIONS)
+_MANAGER = "/manager"
 
 
 def live_scene(snapshot: Snapshot) -> Scene:
-    """Return the scene of a ROS graph; positions do not depend on states and rates."""
+    """Return the scene of a ROS graph; positions do not depend on states and rates.
+
+    The managers of systems are left out: the page shows what they report.
+    """
     nodes = tuple(
         replace(node, state=STATE_PLACEHOLDER if node.state != "" else "")
         for node in snapshot.nodes
+        if not _is_manager(node)
     )
     rates_hz = {
         endpoint.name: RATE_PLACEHOLDER_HZ
-        for node in snapshot.nodes
+        for node in nodes
         for endpoint in node.endpoints
         if endpoint.kind is PortKind.PUBLISHER
     }
     return live_scene_of(replace(snapshot, nodes=nodes), rates_hz)
+
+
+def _is_manager(node: ObservedNode) -> bool:
+    own_service = f"{node.full_name}/is_active"
+    return node.full_name.endswith(_MANAGER) and any(
+        endpoint.name == own_service for endpoint in node.endpoints
+    )
 
 
 def declared_scene(declared: Declared) -> Scene:
@@ -43,12 +57,14 @@ def declared_scene(declared: Declared) -> Scene:
     return scene_of([declared.system], declared.diagnostics)
 
 
-def picture(scene: Scene, view: View) -> dict[str, Any]:
+def picture(scene: Scene, view: View, direction: Direction) -> dict[str, Any]:
     """Return a diagram as an SVG fragment, and what is known about everything in it, by key.
 
     All texts in the fragment are escaped.
     """
     graph = build_graph(scene, view)
+    if view in _TURNED:
+        graph = replace(graph, direction=direction)
     layout = lay_out(graph, Engine.BUNDLED)
     return {
         "title": graph.title,

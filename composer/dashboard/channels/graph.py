@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from composer.remote.system_reports import NodeReport
 
 VIEWS = ("nodes", "connections", "lifecycle", "deployment", "states")
+#: "TB", from top to bottom, suits a narrow screen.
+DIRECTIONS = ("LR", "TB")
 _DECLARED_ONLY = ("lifecycle", "deployment")
 #: Topics without a report are measured, but no more than these.
 _MAX_MEASURED = 60
@@ -35,6 +37,7 @@ class PictureFeed(Feed):
         source = "declared" if self._view in _DECLARED_ONLY else "live"
         self._is_live = values.choice("source", ("live", "declared"), source) == "live"
         self._is_live = self._is_live and self._view not in _DECLARED_ONLY
+        self._direction = values.choice("direction", DIRECTIONS, "LR")
         values.end()
         self._declared = None if self._is_live else required(declared, f"the view {self._view}")
         self._ros: RosGraphSide
@@ -70,13 +73,14 @@ class PictureFeed(Feed):
     def _draw(self, topology: Topology, states: Mapping[str, str | None]) -> None:
         from composer.dashboard.pictures import declared_scene, live_scene, picture
         from composer.graph import View
+        from composer.graph.diagram import Direction
 
         try:
             if self._declared is not None:
                 scene = declared_scene(self._declared)
             else:
                 scene = live_scene(topology.snapshot(states))
-            data = picture(scene, View(self._view))
+            data = picture(scene, View(self._view), Direction(self._direction))
             self._finished.append(Update(to_json({"revision": topology.revision, **data})))
         finally:
             self._is_drawing = False
