@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+import time
 from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide
     from composer.remote.system_reports import NodeReport, SystemReport
 
+_PERIOD_S = 1.0
 COMMANDS = ("startup", "pause", "resume", "reset", "shutdown")
 _TRANSITIONS = {
     "unconfigured": ["configure", "shutdown"],
@@ -36,10 +39,11 @@ class NodesFeed(Feed):
         values.end()
         self._declared = declared
         self._ros: RosGraphSide
+        self._host = socket.gethostname()
         self._processes = ProcessMonitor()
         self._usage: dict[str, dict[str, Any] | None] = {}
-        self._polls = 0
-        self._last = ""
+        self._due_s = 0.0
+        self._last: Any = None
 
     def start(self, ros: RosGraphSide) -> None:
         """Subscribe to the reports of systems."""
@@ -54,13 +58,6 @@ class NodesFeed(Feed):
         """Yield all nodes and systems if anything is new."""
         observed = self._ros.observed
         reports = observed.reports.current()
-        if self._polls % 4 == 0:
-            self._usage = {
-                report.pid: self._processes.usage(report.pid)
-                for report in reports.values()
-                if report is not None and report.host == _host()
-            }
-        self._polls += 1
         nodes: dict[str, dict[str, Any]] = {}
         for name, report in reports.items():
             if report is not None:
@@ -69,11 +66,19 @@ class NodesFeed(Feed):
             nodes.setdefault(node, self._other(node, state))
         for node in observed.topology().visible():
             nodes.setdefault(node, self._other(node, ""))
+        states = [(name, node["state"], node.get("held_down")) for name, node in nodes.items()]
+        activities = [(name, report and report.activity) for name, report in reports.items()]
+        now_s = time.monotonic()
+        if (states, activities) == self._last and now_s < self._due_s:
+            return
+        self._last, self._due_s = (states, activities), now_s + _PERIOD_S
+        self._usage = {
+            report.pid: self._processes.usage(report.pid)
+            for report in reports.values()
+            if report is not None and report.host == self._host
+        }
         systems = [self._system(name, report) for name, report in sorted(reports.items())]
-        text = to_json({"systems": systems, "nodes": list(nodes.values())})
-        if text != self._last:
-            self._last = text
-            yield Update(text)
+        yield Update(to_json({"systems": systems, "nodes": list(nodes.values())}))
 
     def _system(self, name: str, report: SystemReport | None) -> dict[str, Any]:
         declared = self._declared
@@ -111,9 +116,3 @@ class NodesFeed(Feed):
 
     def _declared_at(self, node: str) -> str | None:
         return None if self._declared is None else self._declared.declared_at(node)
-
-
-def _host() -> str:
-    import socket
-
-    return socket.gethostname()

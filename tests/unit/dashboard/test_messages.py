@@ -1,0 +1,91 @@
+"""Requests of browsers, and JSON for them."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from composer.dashboard.errors import BadRequestError
+from composer.dashboard.messages import Values, parse_request, to_json
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "not valid JSON"),
+        ("{", "not valid JSON"),
+        ("[" * 100_000, "not valid JSON"),
+        ('{"id": 1, "op": "call", "request": {"x": NaN}}', "NaN is not a number in JSON"),
+        ("[]", "not a JSON object"),
+        ('{"op": "ping"}', "'id' must be"),
+        ('{"id": true, "op": "ping"}', "'id' must be"),
+        ('{"id": [1], "op": "ping"}', "'id' must be"),
+        (f'{{"id": "{"x" * 100}", "op": "ping"}}', "'id' must be"),
+        ('{"id": 1}', "'op' must be a string"),
+        ('{"id": 1, "op": 5}', "'op' must be a string"),
+    ],
+)
+def test_a_malformed_request_says_why(text: str, reason: str) -> None:
+    with pytest.raises(BadRequestError, match=reason):
+        parse_request(text)
+
+
+@given(st.text() | st.binary().map(lambda data: data.decode("latin-1")))
+def test_any_text_is_a_request_or_an_error(text: str) -> None:
+    try:
+        parse_request(text)
+    except BadRequestError as error:
+        assert error.code == "bad_request"
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ({}, "needs 'topic', a string"),
+        ({"topic": 5}, "'topic' must be a string"),
+        ({"topic": "/a", "hz": "fast"}, "'hz' must be a number"),
+        ({"topic": "/a", "hz": True}, "'hz' must be a number"),
+        ({"topic": "/a", "hz": 1e99}, "'hz' must be from 1 to 10"),
+        ({"topic": "/a", "fields": "x"}, "'fields' must be an array"),
+        ({"topic": "/a", "fields": [1]}, "'fields' must be an array of strings"),
+        ({"topic": "/a", "fields": ["x"] * 5}, "5 items, at most 3"),
+        ({"topic": "/a", "topics": []}, "has no key 'topics'"),
+    ],
+)
+def test_keys_are_checked(content: dict[str, Any], reason: str) -> None:
+    with pytest.raises(BadRequestError, match=reason):
+        _read(content)
+
+
+def test_an_unknown_key_has_a_suggestion() -> None:
+    with pytest.raises(BadRequestError) as caught:
+        _read({"topic": "/a", "field": []})
+    assert caught.value.hint == "did you mean 'fields'?"
+
+
+def _read(content: dict[str, Any]) -> None:
+    values = Values(content, "'echo'")
+    values.text("topic")
+    values.number("hz", 5.0, 1.0, 10.0)
+    values.texts("fields", 3)
+    values.end()
+
+
+def test_numbers_that_javascript_lacks_become_text() -> None:
+    value = {"a": float("nan"), "b": [float("inf"), -float("inf")], "c": 2**60, "d": 1.5}
+    assert json.loads(to_json(value | {"e": 2**53})) == {
+        "a": ".nan",
+        "b": [".inf", "-.inf"],
+        "c": str(2**60),
+        "d": 1.5,
+        "e": 2**53,
+    }
+
+
+def test_text_of_any_kind_is_valid_json() -> None:
+    text = "\udcff\u2028</script>\x00"
+    assert json.loads(to_json([text])) == [text]

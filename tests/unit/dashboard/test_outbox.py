@@ -1,0 +1,101 @@
+"""What waits for a browser stays within bounds, and drops are counted."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from composer.dashboard.outbox import MAX_BATCHES, MAX_BYTES, Delivery, Outbox, Update
+
+
+def received(outbox: Outbox) -> dict[str, Any]:
+    """Return the next message, which must be there already."""
+    message = asyncio.run(asyncio.wait_for(outbox.next(), 1.0))
+    assert isinstance(message, str)
+    content: dict[str, Any] = json.loads(message)
+    return content
+
+
+def test_a_state_is_replaced_by_a_newer_one() -> None:
+    outbox = Outbox()
+    outbox.open(1, "nodes", Delivery.LATEST)
+    for number in range(100):
+        outbox.put(1, Update(str(number)))
+    expected = {"sub": 1, "seq": 0, "dropped": 99, "channel": "nodes", "data": 99}
+    assert received(outbox) == expected
+    assert outbox.size == 0
+
+
+def test_messages_wait_in_order_and_the_oldest_are_dropped() -> None:
+    outbox = Outbox()
+    outbox.open(1, "echo", Delivery.QUEUE)
+    for number in range(MAX_BATCHES + 2):
+        outbox.put(1, Update(str(number), count=10, dropped=1))
+    found = [received(outbox) for _ in range(MAX_BATCHES)]
+    assert [message["data"] for message in found] == list(range(2, MAX_BATCHES + 2))
+    assert found[-1]["dropped"] == 2 * 10 + MAX_BATCHES + 2
+    assert [message["seq"] for message in found] == list(range(MAX_BATCHES))
+
+
+def test_replies_come_first_and_subscriptions_take_turns() -> None:
+    outbox = Outbox()
+    for number in (1, 2):
+        outbox.open(number, "echo", Delivery.QUEUE)
+        outbox.put(number, Update('"first"'))
+        outbox.put(number, Update('"second"'))
+    outbox.reply('{"id": 7}')
+    assert received(outbox) == {"id": 7}
+    order = [(message["sub"], message["data"]) for message in map(received, [outbox] * 4)]
+    assert order == [(1, "first"), (2, "first"), (1, "second"), (2, "second")]
+
+
+def test_nothing_is_kept_for_a_closed_subscription() -> None:
+    outbox = Outbox()
+    outbox.open(1, "echo", Delivery.QUEUE)
+    outbox.put(1, Update("1"))
+    outbox.close(1)
+    outbox.put(1, Update("2"))
+    outbox.reply("{}")
+    assert received(outbox) == {}
+    assert outbox.size == 0
+
+
+def test_a_picture_has_its_header_in_front() -> None:
+    outbox = Outbox()
+    outbox.open(3, "image", Delivery.LATEST)
+    outbox.put(3, Update(b"pixels", header='{"encoding":"png"}'))
+    message = asyncio.run(outbox.next())
+    assert isinstance(message, bytes)
+    length = int.from_bytes(message[:4], "big")
+    header = json.loads(message[4 : 4 + length])
+    assert header == {"sub": 3, "seq": 0, "dropped": 0, "encoding": "png"}
+    assert message[4 + length :] == b"pixels"
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(1, 5), st.integers(0, MAX_BYTES // 3), st.booleans()), max_size=60
+    )
+)
+def test_the_size_has_a_limit_and_every_message_is_counted(
+    updates: list[tuple[int, int, bool]],
+) -> None:
+    outbox = Outbox()
+    for number in range(1, 6):
+        outbox.open(number, "echo", Delivery.QUEUE if number % 2 else Delivery.LATEST)
+    content = bytes(MAX_BYTES // 3)
+    put, taken = 0, 0
+    for number, size, is_taken in updates:
+        outbox.put(number, Update(content[:size], header="{}"))
+        put += 1
+        assert outbox.size <= MAX_BYTES
+        if is_taken and outbox.size:
+            asyncio.run(outbox.next())
+            taken += 1
+    waiting = sum(len(item.updates) for item in outbox._subscriptions.values())
+    dropped = sum(item.dropped for item in outbox._subscriptions.values())
+    assert put == taken + waiting + dropped
