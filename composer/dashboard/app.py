@@ -64,6 +64,7 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
         WebSocketRoute("/ws", websocket),
     ]
     app = Starlette(routes=routes)
+    app.router.redirect_slashes = False
     return AccessCheck(app, dashboard, connections)
 
 

@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, TypeVar
 
 from composer.dashboard.errors import RequestError, from_ros
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 #: After the last browser has left, as one that loads the page again comes back at once.
-LINGER_S = 5.0
+LINGER_S = 3.0
 _THREADS = 8
 #: Requests that run or wait for a thread; more are refused.
 _MAX_REQUESTS = 32
@@ -42,8 +42,8 @@ class RosGraphSide:
         self.work = work
 
 
-#: Runs a function on a worker thread; what it returns or raises is lost unless it says so itself.
-Work = Callable[[Callable[[], None]], bool]
+#: Runs a function on a worker thread; an exception is only logged.
+Work = Callable[[Callable[[], None]], None]
 
 
 class RosSide:
@@ -113,12 +113,9 @@ class RosSide:
         except RosError as error:
             raise from_ros(error) from error
 
-    def _work(self, function: Callable[[], None]) -> bool:
-        try:
+    def _work(self, function: Callable[[], None]) -> None:
+        with suppress(RuntimeError):  # the dashboard ends
             self._pool.submit(_logged, function)
-        except RuntimeError:  # the dashboard ends
-            return False
-        return True
 
     def _is_needed(self) -> bool:
         """Return whether to stay in the ROS graph; if not, the next browser makes it join again."""

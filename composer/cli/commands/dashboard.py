@@ -158,9 +158,9 @@ def _declared(
         return None
     path = system_file(text if is_file else text.rpartition("/")[2])
     result = load_system(path, shown=text, settings=settings, namespace=namespace)
-    if result.system is None:
-        raise CommandError(f"'{text}' cannot be shown because of its errors")
-    if result.system.node_type:
+    if result.system is not None and result.system.node_type:
         raise CommandError(f"'{text}' is a node type, not a system")
+    if result.system is None or not result.is_runnable:
+        raise CommandError(f"'{text}' has errors, so it cannot be shown")
     goal = PrimaryState(autostart.value) if autostart is not None else None
     return Declared(result.system, str(path), tuple(result.diagnostics), goal)

@@ -92,13 +92,15 @@ class GoalFeed(Feed):
         """Send the goal and wait for its end; None if nothing observes it any more."""
         from composer.remote.calls import GoalRequest, send_goal
         from composer.remote.graph_names import GraphNames
+        from composer.remote.name_matching import full_name
         from composer.remote.session import Deadline
 
         deadline = Deadline(_ACCEPTED_WITHIN_S)
         session = self._ros.session
-        type_name = self._type or GraphNames(session, deadline).only_type("action", self._action)
+        action = full_name("action", self._action)
+        type_name = self._type or GraphNames(session, deadline).only_type("action", action)
         request = GoalRequest(
-            self._action,
+            action,
             type_name,
             self._ros.forms.from_json(self._goal, type_name, "goal"),
             self._on_feedback,

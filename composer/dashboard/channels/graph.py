@@ -43,7 +43,7 @@ class PictureFeed(Feed):
         self._ros: RosGraphSide
         self._drawn: tuple[int, frozenset[str]] | None = None
         self._is_drawing = False
-        self._finished: list[Update] = []
+        self._finished: list[Update | Exception] = []
 
     def start(self, ros: RosGraphSide) -> None:
         """Subscribe to the reports of systems, which have the states of nodes."""
@@ -58,7 +58,10 @@ class PictureFeed(Feed):
     def poll(self) -> Iterator[Update]:
         """Yield the diagram if it is new."""
         finished, self._finished = self._finished, []
-        yield from finished
+        for item in finished:
+            if isinstance(item, Exception):
+                raise item
+            yield item
         if self._is_drawing:
             return
         observed = self._ros.observed
@@ -68,7 +71,8 @@ class PictureFeed(Feed):
         wanted = (topology.revision if self._is_live else 0, frozenset(states))
         if wanted != self._drawn:
             self._drawn = wanted
-            self._is_drawing = self._ros.work(lambda: self._draw(topology, states))
+            self._is_drawing = True
+            self._ros.work(lambda: self._draw(topology, states))
 
     def _draw(self, topology: Topology, states: Mapping[str, str | None]) -> None:
         from composer.dashboard.pictures import declared_scene, live_scene, picture
@@ -82,6 +86,8 @@ class PictureFeed(Feed):
                 scene = live_scene(topology.snapshot(states))
             data = picture(scene, View(self._view), Direction(self._direction))
             self._finished.append(Update(to_json({"revision": topology.revision, **data})))
+        except Exception as error:  # reported by the next poll
+            self._finished.append(error)
         finally:
             self._is_drawing = False
 

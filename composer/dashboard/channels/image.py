@@ -46,6 +46,10 @@ class ImageFeed(Feed):
     def poll(self) -> Iterator[Update]:
         """Yield the latest picture, if there is a new one."""
         samples = self._reader.take(3)
+        if self._reader.type_name not in (IMAGE, COMPRESSED):
+            raise BadRequestError(
+                f"'{self._topic}' has no pictures: its type is {self._reader.type_name}"
+            )
         if not samples:
             return
         message: Any = self._reader.message(samples[-1])
@@ -57,29 +61,29 @@ class ImageFeed(Feed):
     def _picture(self, message: Any) -> tuple[dict[str, Any], bytes]:
         from composer.dashboard.observing.pixels import UnsupportedImageError, to_rgba
 
-        match self._reader.type_name:
-            case "sensor_msgs/msg/Image":
-                try:
-                    width, height, data = to_rgba(message, self._max_width)
-                except UnsupportedImageError as error:
-                    raise RequestError("failed", str(error)) from error
-                return {
-                    "encoding": "rgba8",
-                    "width": width,
-                    "height": height,
-                    "source_width": message.width,
-                    "source_height": message.height,
-                    "source_encoding": message.encoding,
-                }, data
-            case "sensor_msgs/msg/CompressedImage":
-                data = bytes(message.data)
-                encoding = _FORMATS.get(data[:2])
-                if encoding is None or len(data) > _MAX_COMPRESSED:
-                    raise RequestError(
-                        "failed",
-                        f"the picture is not a JPEG or PNG of at most {_MAX_COMPRESSED} bytes:"
-                        f" format '{message.format:.40}', {len(data)} bytes",
-                    )
-                return {"encoding": encoding, "source_encoding": message.format}, data
-            case other:
-                raise BadRequestError(f"'{self._topic}' has no pictures: its type is {other}")
+        if self._reader.type_name == COMPRESSED:
+            return self._compressed(message)
+        try:
+            width, height, data = to_rgba(message, self._max_width)
+        except UnsupportedImageError as error:
+            raise RequestError("failed", str(error)) from error
+        header = {
+            "encoding": "rgba8",
+            "width": width,
+            "height": height,
+            "source_width": message.width,
+            "source_height": message.height,
+            "source_encoding": message.encoding,
+        }
+        return header, data
+
+    def _compressed(self, message: Any) -> tuple[dict[str, Any], bytes]:
+        data = bytes(message.data)
+        encoding = _FORMATS.get(data[:2])
+        if encoding is None or len(data) > _MAX_COMPRESSED:
+            raise RequestError(
+                "failed",
+                f"the picture is not a JPEG or PNG of at most {_MAX_COMPRESSED} bytes:"
+                f" format '{message.format:.40}', {len(data)} bytes",
+            )
+        return {"encoding": encoding, "source_encoding": message.format}, data

@@ -66,7 +66,8 @@ class ParametersFeed(Feed):
             self._due_s = now_s
         if now_s >= self._due_s and not self._is_reading:
             self._due_s = now_s + _READ_PERIOD_S
-            self._is_reading = self._ros.work(self._read)
+            self._is_reading = True
+            self._ros.work(self._read)
         with self._lock:
             found, self._found = self._found, None
         if isinstance(found, RequestError):

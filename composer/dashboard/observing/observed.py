@@ -211,7 +211,8 @@ class _States:
         """Return the states that are known, and ask for new ones if it is time."""
         now_s = time.monotonic()
         if nodes and now_s >= self._due_s and not self._is_asking:
-            self._is_asking = self._work(lambda: self._ask(sorted(nodes)))
+            self._is_asking = True
+            self._work(lambda: self._ask(sorted(nodes)))
         return {node: self._known.get(node) for node in nodes}
 
     def _ask(self, nodes: list[str]) -> None:

@@ -47,7 +47,7 @@ class TopicReader:
     def take(self, limit: int) -> list[Sample]:
         """Return the messages that have arrived, at most ``limit``.
 
-        Raises RequestError if the topic has no publisher or no single, installed type.
+        Raises RosError, RequestError if the topic has no publisher or no single, installed type.
         """
         self._subscribe()
         samples = [] if self._sampled is None else self._sampled.take(limit)
@@ -70,6 +70,9 @@ class TopicReader:
 
     def _subscribe(self) -> None:
         """Subscribe, or subscribe again if the publishers have changed."""
+        from composer.remote.name_matching import full_name
+
+        full_name("topic", self.topic)  # raises if it is not a valid name
         ends = [end for _, end in self._ros.observed.topology().of_topics().get(self.topic, [])]
         publishers = [end for end in ends if end.kind is PortKind.PUBLISHER]
         type_name = self._given_type or self._only_type(publishers)

@@ -31,13 +31,15 @@ def call(values: Values, dashboard: Dashboard) -> Prepared:
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
         from composer.remote.calls import ServiceRequest, call_service
         from composer.remote.graph_names import GraphNames
+        from composer.remote.name_matching import full_name
         from composer.remote.values import to_short_plain
 
+        service = full_name("service", name)
         names = GraphNames(ros.session, deadline)
-        type_name = given_type or names.only_type("service", name)
+        type_name = given_type or names.only_type("service", service)
         content = ros.forms.from_json(request, type_name, "request")
         started_s = time.monotonic()
-        responses = call_service(ros.session, deadline, ServiceRequest(name, type_name, content))
+        responses = call_service(ros.session, deadline, ServiceRequest(service, type_name, content))
         response = next(responses)
         took_s = time.monotonic() - started_s
         return {"response": json_safe(to_short_plain(response, _MAX_ITEMS)), "took_s": took_s}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -36,10 +37,8 @@ def test_a_malformed_request_says_why(text: str, reason: str) -> None:
 
 @given(st.text() | st.binary().map(lambda data: data.decode("latin-1")))
 def test_any_text_is_a_request_or_an_error(text: str) -> None:
-    try:
-        parse_request(text)
-    except BadRequestError as error:
-        assert error.code == "bad_request"
+    with suppress(BadRequestError):
+        assert parse_request(text).op
 
 
 @pytest.mark.parametrize(

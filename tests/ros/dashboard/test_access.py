@@ -1,0 +1,276 @@
+"""Only those with the token get anything, and the dashboard does nothing while nobody looks."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from composer.runtime.process.dds_participants import count_participants
+from tests.ros.support.commands import COMPOSE, compose, start
+from tests.ros.support.dashboard import PATIENCE_S, Address, Browser, Dashboard, browser, dashboard
+from tests.ros.support.system_process import RunningSystem
+
+
+@pytest.fixture(scope="module")
+def server(shared_domain_id: int) -> Iterator[Dashboard]:
+    with dashboard("--read-only") as running:
+        yield running
+
+
+def get(
+    address: Address, path: str = "/", method: str = "GET", **headers: str
+) -> http.client.HTTPResponse:
+    """Return the response to a request with the cookie; an empty header is not sent."""
+    given = {"Host": address.host, "Cookie": address.cookie, **headers}
+    connection = http.client.HTTPConnection("127.0.0.1", address.port, timeout=10)
+    connection.putrequest(method, path, skip_host=True)
+    for name, value in given.items():
+        if value:
+            connection.putheader(name.replace("_", "-"), value)
+    connection.endheaders()
+    response = connection.getresponse()
+    response.body = response.read()  # type: ignore[attr-defined]
+    connection.close()
+    return response
+
+
+def test_the_token_becomes_a_cookie_and_leaves_the_address(server: Dashboard) -> None:
+    address = server.address
+    response = get(address, f"/topics?token={address.token}", Cookie="")
+    assert (response.status, response.getheader("Location")) == (303, "/topics")
+    cookie = response.getheader("Set-Cookie") or ""
+    assert cookie == f"{address.cookie}; HttpOnly; SameSite=Strict; Path=/"
+    away = get(address, f"//attacker.example/%0d%0aX:%20y?token={address.token}", Cookie="")
+    assert away.getheader("Location") == "/attacker.example/%0D%0AX%3A%20y"
+    assert away.getheader("X") is None
+
+
+@pytest.mark.parametrize(
+    ("headers", "status", "reason"),
+    [
+        ({}, 200, ""),
+        ({"Cookie": ""}, 401, "open the address with the token"),
+        ({"Cookie": "compose_dashboard=guess"}, 401, "open the address with the token"),
+        ({"Host": "attacker.example"}, 421, "this server is not"),
+        ({"Origin": "http://attacker.example"}, 403, "are not allowed"),
+        ({"Sec_Fetch_Site": "cross-site"}, 403, "are not allowed"),
+    ],
+)
+def test_refused_requests_say_why(
+    server: Dashboard, headers: dict[str, str], status: int, reason: str
+) -> None:
+    response = get(server.address, **headers)
+    assert response.status == status
+    assert reason in response.body.decode()  # type: ignore[attr-defined]
+
+
+def test_every_response_has_the_headers_of_a_safe_page(server: Dashboard) -> None:
+    for path, headers in (("/", {}), ("/page/nothing.js", {}), ("/", {"Cookie": ""})):
+        response = get(server.address, path, **headers)
+        policy = response.getheader("Content-Security-Policy") or ""
+        assert "default-src 'none'" in policy
+        assert "frame-ancestors 'none'" in policy
+        assert "unsafe" not in policy
+        assert response.getheader("X-Content-Type-Options") == "nosniff"
+        assert response.getheader("Referrer-Policy") == "no-referrer"
+        assert response.getheader("Cross-Origin-Resource-Policy") == "same-origin"
+        assert response.getheader("Server") is None
+
+
+def test_markup_in_a_request_stays_text(server: Dashboard) -> None:
+    response = get(server.address, "/page/%3Cscript%3Ealert(1)%3C/script%3E")
+    assert b"<script" not in response.body  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/page/../access.py",
+        "/page/%2e%2e/access.py",
+        "/page/..%2faccess.py",
+        "/page//etc/passwd",
+        "/page/%2fetc%2fpasswd",
+        "/page/.%00",
+        "/page/" + "x" * 5000,
+        "/page/graph/page.py",
+        "/page/graph/..%2fpage.py",
+        "/page",
+        "/nothing",
+    ],
+)
+def test_only_files_of_the_page_are_served(server: Dashboard, path: str) -> None:
+    response = get(server.address, path)
+    assert response.status == 404
+    assert b"import" not in response.body  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "TRACE", "ODD"])
+def test_other_methods_are_refused(server: Dashboard, method: str) -> None:
+    assert get(server.address, method=method).status == 405
+
+
+@pytest.mark.parametrize(
+    ("headers", "origin", "status"),
+    [
+        ({}, None, 403),
+        ({"Cookie": "compose_dashboard=guess"}, "own", 401),
+        ({}, "http://attacker.example", 403),
+        ({}, "http://127.0.0.1:1", 403),
+    ],
+)
+def test_websockets_of_others_are_refused(
+    server: Dashboard, headers: dict[str, str], origin: str | None, status: int
+) -> None:
+    address = server.address
+    with (
+        pytest.raises(InvalidStatus) as caught,
+        connect(
+            f"ws://{address.host}/ws",
+            origin=address.origin if origin == "own" else origin,  # type: ignore[arg-type]
+            additional_headers={"Cookie": address.cookie, **headers},
+        ),
+    ):
+        pass
+    assert caught.value.response.status_code == status
+
+
+def test_a_read_only_dashboard_changes_nothing(server: Dashboard) -> None:
+    with browser(server.address) as page:
+        assert page.hello["read_only"] is True
+        for op, values in (
+            ("transition", {"node": "/a", "transition": "activate"}),
+            ("restart", {"node": "/a"}),
+            ("command", {"system": "/a", "command": "shutdown"}),
+            ("call", {"service": "/a", "request": {}}),
+            ("publish", {"topic": "/a", "type": "std_msgs/msg/String", "message": {}}),
+            ("set_parameter", {"node": "/a", "name": "b", "value": 1}),
+            ("subscribe", {"channel": "goal", "params": {"action": "/a", "goal": {}}}),
+            (
+                "subscribe",
+                {
+                    "channel": "publishing",
+                    "params": {"topic": "/a", "type": "std_msgs/msg/String", "message": {}},
+                },
+            ),
+        ):
+            assert page.error(op, **values)["code"] == "read_only", op
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end_s
+        time.sleep(0.02)  # poll: nothing announces it
+
+
+def test_nothing_happens_while_nobody_looks(ros_domain_id: int) -> None:
+    with dashboard() as server:
+        assert get(server.address).status == 200
+        threads = Path(f"/proc/{server.process.pid}/task")
+        assert count_participants(ros_domain_id) == 0
+        before = len(list(threads.iterdir()))
+        with browser(server.address) as page:
+            until(lambda: page.ok("ping")["state"] == "ready")
+            assert count_participants(ros_domain_id) == 1
+        until(lambda: count_participants(ros_domain_id) == 0)
+        until(lambda: len(list(threads.iterdir())) <= before + 1)  # one worker thread may wait
+        used_s = cpu_s(server)
+        time.sleep(1.0)  # a measurement
+        assert cpu_s(server) - used_s <= 0.02
+        with browser(server.address) as page:  # and again
+            until(lambda: page.ok("ping")["state"] == "ready")
+
+
+def cpu_s(server: Dashboard) -> float:
+    values = Path(f"/proc/{server.process.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(values[11]) + int(values[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def test_a_dashboard_of_a_system_ends_with_it(ros_domain_id: int) -> None:
+    with RunningSystem("systems/talker_listener.yaml", "--dashboard", program=COMPOSE) as system:
+        url = system.wait_for("dashboard: http").partition(": ")[2]
+        page = Browser(Address(url))
+        page.until(page.subscribe("nodes"), lambda data: len(data["nodes"]) >= 2)
+        assert url.rpartition("=")[2] not in command_lines()
+        code, took_s = system.stop()
+        assert (code, took_s < 3.0) == (0, True)
+        until(lambda: not is_open(url))
+        page.close()
+
+
+def test_a_dashboard_of_a_killed_system_ends(ros_domain_id: int) -> None:
+    with RunningSystem("systems/talker_listener.yaml", "--dashboard", program=COMPOSE) as system:
+        url = system.wait_for("dashboard: http").partition(": ")[2]
+        system.process.send_signal(signal.SIGKILL)
+        until(lambda: not is_open(url))
+
+
+def command_lines() -> str:
+    """Return the command lines and environments of all processes, as others may see them."""
+    texts = []
+    for process in Path("/proc").glob("[0-9]*"):
+        for name in ("cmdline", "environ"):
+            try:
+                texts.append((process / name).read_bytes().decode(errors="replace"))
+            except OSError:
+                continue
+    return "\n".join(texts)
+
+
+def is_open(url: str) -> bool:
+    try:
+        get(Address(url))
+    except OSError:
+        return False
+    return True
+
+
+def test_two_dashboards_use_two_ports(ros_domain_id: int) -> None:
+    first = start("dashboard")
+    try:
+        assert first.stdout is not None
+        one = Address(first.stdout.readline())
+        second = start("dashboard")
+        try:
+            assert second.stdout is not None
+            other = Address(second.stdout.readline())
+            assert (other.port != one.port, other.token != one.token) == (True, True)
+            assert get(other, Cookie=one.cookie).status == 401
+        finally:
+            second.terminate()
+            second.wait(timeout=PATIENCE_S)
+        done = compose("dashboard", "--port", one.port)
+        assert (done.returncode, "cannot listen on" in done.stderr) == (1, True)
+    finally:
+        first.terminate()
+        first.wait(timeout=PATIENCE_S)
+
+
+def test_other_computers_need_a_token_of_the_user(tmp_path: Path) -> None:
+    done = compose("dashboard", "--host", "0.0.0.0")
+    assert done.returncode == 2
+    assert "--host 0.0.0.0 needs --token-file" in done.stderr
+    token = tmp_path / "token"
+    token.write_text("0123456789abcdef0123456789abcdef")
+    done = compose("dashboard", "--token-file", token)
+    assert done.returncode == 1
+    assert "can be read by other users" in done.stderr
+    token.chmod(0o600)
+    with dashboard("--token-file", str(token), "--host", "127.0.0.1") as server:
+        assert server.address.token == token.read_text()
+
+
+def test_a_system_with_errors_is_not_shown(tmp_path: Path) -> None:
+    path = tmp_path / "broken.yaml"
+    path.write_text("system: broken\nnodes: {a: {typ: b}}\n")
+    done = compose("dashboard", path)
+    assert done.returncode == 1
+    assert "'typ' is not a key" in done.stderr

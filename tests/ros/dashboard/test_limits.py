@@ -1,0 +1,239 @@
+"""Whatever a client sends or does not read, memory is bounded and everything else continues."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+from composer.dashboard.app import MAX_CONNECTIONS
+from composer.dashboard.server import MAX_OPEN
+from tests.ros.support.commands import hand_written
+from tests.ros.support.dashboard import PATIENCE_S, Address, Browser, Dashboard, browser, dashboard
+
+
+@pytest.fixture(scope="module")
+def server(shared_domain_id: int) -> Iterator[Dashboard]:
+    with hand_written("hand_written_camera.py"), dashboard() as running:
+        yield running
+
+
+@pytest.fixture
+def page(server: Dashboard) -> Iterator[Browser]:
+    with browser(server.address) as opened:
+        yield opened
+
+
+def raw(address: Address, text: bytes = b"") -> socket.socket:
+    opened = socket.create_connection(("127.0.0.1", address.port), timeout=PATIENCE_S)
+    opened.sendall(text)
+    return opened
+
+
+def websocket(address: Address) -> ClientConnection:
+    return connect(
+        f"ws://{address.host}/ws",
+        origin=address.origin,  # type: ignore[arg-type]
+        additional_headers={"Cookie": address.cookie},
+        compression=None,
+        max_size=None,
+    )
+
+
+def test_malformed_requests_are_answered_with_a_reason(page: Browser) -> None:
+    for message in ("", "{", "[]", "null", '{"id": 1}', "\x00", "[" * 5000):
+        page.socket.send(message)
+    page.socket.send(b"\x81\x7f")
+    for op, values in (
+        ("subscribe", {"channel": "nodez", "params": {}}),
+        ("subscribe", {"channel": "nodes", "params": {"a": 1}}),
+        ("subscribe", {"channel": "echo", "params": {"topic": 5}}),
+        ("subscribe", {"channel": "echo", "params": {"topic": "/a", "max_hz": 1e9}}),
+        ("subscribe", {"channel": "graph", "params": {"view": "x"}}),
+        ("unsubscribe", {"sub": 99}),
+        ("update", {"sub": "x", "params": {}}),
+        ("cancel", {"sub": [1]}),
+        ("cal", {}),
+        ("call", {"service": "/a", "request": [], "timeout_s": 1}),
+        ("call", {"service": "a b", "type": "std_srvs/srv/SetBool", "request": {}}),
+        ("publish", {"topic": "/a", "type": "os/msg/System", "message": {}, "qos": "x"}),
+        ("__class__", {}),
+    ):
+        error = page.error(op, **values)
+        assert error["code"] in ("bad_request", "not_found"), (op, error)
+        assert error["message"]
+    assert page.ok("ping")
+
+
+def test_a_program_that_sends_only_nonsense_is_disconnected(server: Dashboard) -> None:
+    with websocket(server.address) as opened:
+        for _ in range(20):
+            opened.send("nonsense")
+        assert code_of(opened) == 1008
+
+
+def code_of(opened: ClientConnection) -> int | None:
+    """Wait until the server closes a connection; return the code, if it could send one."""
+    with pytest.raises(ConnectionClosed) as caught:
+        for _ in range(1000):
+            opened.recv(timeout=PATIENCE_S)
+    return None if caught.value.rcvd is None else caught.value.rcvd.code
+
+
+def test_large_messages_end_only_their_connection(server: Dashboard, page: Browser) -> None:
+    before_mb = server.memory_mb()
+    for size in (2_000_000, 100_000_000):
+        with websocket(server.address) as opened:
+            opened.recv(timeout=PATIENCE_S)
+            with suppress(ConnectionClosed):
+                opened.send(b"x" * size)
+            assert code_of(opened) in (1009, None)
+    # A frame that only announces its size.
+    announced = raw(server.address, handshake(server.address))
+    announced.recv(4096)
+    announced.sendall(b"\x81\xff" + (10**17).to_bytes(8, "big") + b"mask" + b"x" * 1000)
+    assert closed(announced)
+    assert page.ok("ping")
+    assert server.memory_mb() < before_mb + 30
+
+
+def handshake(address: Address) -> bytes:
+    lines = (
+        "GET /ws HTTP/1.1",
+        f"Host: {address.host}",
+        f"Origin: {address.origin}",
+        f"Cookie: {address.cookie}",
+        "Connection: Upgrade",
+        "Upgrade: websocket",
+        "Sec-WebSocket-Version: 13",
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+        "",
+        "",
+    )
+    return "\r\n".join(lines).encode()
+
+
+def closed(opened: socket.socket) -> bool:
+    """Wait until the server closes a connection."""
+    opened.settimeout(PATIENCE_S)
+    try:
+        while opened.recv(65536):
+            pass
+    except ConnectionError:
+        pass
+    opened.close()
+    return True
+
+
+def test_half_open_and_many_connections(server: Dashboard, page: Browser) -> None:
+    address = server.address
+    before = server.open_files()
+    with ExitStack() as stack:
+        for number in range(1000):
+            text = (b"", b"GET / HTTP/1.1\r\n", b"GET / HTTP/1.1\r\nX: " + b"x" * 1000)[number % 3]
+            try:
+                stack.enter_context(raw(address, text))
+            except ConnectionError:
+                continue  # the server has ended it already
+            if number % 100 == 0:
+                assert page.ok("ping")  # a browser that is connected notices nothing
+        assert server.open_files() <= before + MAX_OPEN + 5
+    slow = raw(address, b"GET / HTTP/1.1\r\nHost: x\r\nX: ")
+    started_s = time.monotonic()
+    assert closed(slow)
+    assert time.monotonic() - started_s < 12
+    with browser(address) as other:
+        assert other.ok("ping")
+    assert server.open_files() <= before + 5
+
+
+def test_odd_requests(server: Dashboard, page: Browser) -> None:
+    for text in (
+        b"\x00\x01\x02\r\n\r\n",
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"GET / HTTP/1.1\r\n" + b"X: y\r\n" * 100_000,
+        b"GET / HTTP/1.1\r\nHost: \xff\r\nCookie: \xff\r\n\r\n",
+        b"GET /?token=%ff%00&token HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n",
+        b"GET / HTTP/1.1\r\nTransfer-Encoding: chunked\r\nHost: x\r\n\r\nffffffffff\r\n",
+    ):
+        with ExitStack() as stack:
+            try:
+                opened = stack.enter_context(raw(server.address, text))
+                answer = opened.recv(100)
+            except ConnectionError:
+                continue
+            assert answer[:10] in (b"", b"HTTP/1.1 4"), text[:40]
+    assert page.ok("ping")
+
+
+def test_browsers_and_subscriptions_have_a_limit(server: Dashboard) -> None:
+    with ExitStack() as stack:
+        pages = [stack.enter_context(browser(server.address)) for _ in range(MAX_CONNECTIONS)]
+        with websocket(server.address) as one_more, pytest.raises(ConnectionClosed) as caught:
+            one_more.recv(timeout=PATIENCE_S)
+        assert caught.value.rcvd is not None
+        assert caught.value.rcvd.code == 1013
+        for number in range(64):
+            pages[0].subscribe("echo", topic=f"/nothing_{number}")
+        assert pages[0].error("subscribe", channel="nodes", params={})["code"] == "too_many"
+        assert pages[1].ok("ping")
+
+
+def test_images_are_sampled_and_made_smaller(page: Browser) -> None:
+    page.subscribe("image", topic="/camera", max_hz=10, max_width=320)
+    page.wait(lambda: len(page.pictures) >= 3)
+    header, pixels = page.pictures[-1]
+    assert (header["width"], header["height"]) == (320, 240)
+    assert (header["source_width"], header["source_encoding"]) == (640, "rgb8")
+    assert header["dropped"] > 0
+    assert pixels[:4] == bytes((10, 20, 30, 255))
+    assert len(pixels) == 320 * 240 * 4
+    page.subscribe("image", topic="/camera/compressed")
+    page.wait(lambda: page.pictures[-1][0]["encoding"] == "png")
+    assert page.pictures[-1][1].startswith(b"\x89PNG")
+    assert "has no pictures" in page.failure(page.subscribe("image", topic="/rosout"))["message"]
+
+
+def test_a_client_that_never_reads_costs_no_memory(server: Dashboard, page: Browser) -> None:
+    with ExitStack() as stack:
+        stalled = []
+        for _ in range(5):
+            opened = stack.enter_context(raw(server.address, handshake(server.address)))
+            opened.recv(4096)
+            for number, (channel, parameters) in enumerate(
+                (
+                    ("image", {"topic": "/camera", "max_hz": 15, "max_width": 640}),
+                    ("echo", {"topic": "/camera", "max_hz": 100, "max_items": 1024}),
+                    ("plot", {"series": [{"topic": "/camera", "field": "width"}]}),
+                    ("nodes", {}),
+                )
+            ):
+                request = {"id": number, "op": "subscribe", "channel": channel}
+                opened.sendall(frame(json.dumps(request | {"params": parameters}).encode()))
+            stalled.append(opened)
+        count = page.subscribe("plot", series=[{"topic": "/camera", "field": "height"}])
+        page.until(count, bool)
+        before_mb = server.memory_mb()
+        received = len(page.updates)
+        page.wait(lambda: len(page.updates) > received + 60)  # six seconds of images
+        assert server.memory_mb() < before_mb + 60
+        values = [
+            update["data"]["series"][0]
+            for update in page.updates
+            if update["sub"] == count and "data" in update
+        ]
+        passed_s = values[-1]["at_s"][-1] - values[0]["at_s"][0]
+        assert sum(len(item["values"]) for item in values) / passed_s > 20
+        assert page.ok("ping")
+
+
+def frame(text: bytes) -> bytes:
+    """Return a masked WebSocket frame with a short text."""
+    assert len(text) < 65536
+    return b"\x81\xfe" + len(text).to_bytes(2, "big") + bytes(4) + text

@@ -1,0 +1,255 @@
+"""What the views show and do, for a system of ours and for a hand-written node."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from tests.ros.support.commands import output_of
+from tests.ros.support.dashboard import Browser
+from tests.ros.support.system_process import RunningSystem
+
+PLANNER, CONTROLLER = "/planning/planner", "/control/motor_controller"
+SIMULATOR = "/perception/sensor_simulator"
+TALKER = "/lab/talker"
+
+
+def _nodes(data: Any) -> dict[str, Any]:
+    return {node["name"]: node for node in data["nodes"]}
+
+
+def test_the_graph_has_both_and_measured_rates(page: Browser) -> None:
+    picture = page.until(
+        page.subscribe("graph"),
+        lambda data: {f"node:{PLANNER}", f"node:{TALKER}"} <= data["things"].keys(),
+    )
+    assert picture["svg"].startswith("<defs>")
+    live = page.subscribe("graph.live")
+    publisher = f"publisher:{SIMULATOR}./sensor_data"
+    data = page.until(
+        live, lambda data: (data["edges"].get(publisher, {}).get("rate_hz") or 0) > 20
+    )
+    assert data["nodes"][PLANNER]["state"] == "active"
+    assert publisher in picture["things"]
+    # No system reports the rate of the hand-written node, so it is measured.
+    measured = page.until(
+        live, lambda data: (data["topics"].get("/lab/count", {}).get("rate_hz") or 0) > 30
+    )
+    assert measured["topics"]["/lab/count"]["rate_hz"] < 70
+
+
+def test_the_declared_graph_needs_no_running_node(page: Browser) -> None:
+    picture = page.until(page.subscribe("graph", view="lifecycle"), bool)
+    assert any("declared_at" in thing["details"] for thing in picture["things"].values())
+
+
+def test_nodes_have_states_figures_and_places(page: Browser, pipeline: RunningSystem) -> None:
+    channel = page.subscribe("nodes")
+    data = page.until(
+        channel,
+        lambda data: (
+            PLANNER in _nodes(data)
+            and TALKER in _nodes(data)
+            and data["systems"][0]["process"]
+            and data["systems"][0]["process"]["cpu_percent"]
+        ),
+    )
+    system = data["systems"][0]
+    assert (system["name"], system["pid"]) == ("/pipeline", str(pipeline.process.pid))
+    assert system["file"] == "systems/pipeline.yaml"
+    assert system["process"]["memory_mb"] > 10
+    node = _nodes(data)[PLANNER]
+    assert (node["state"], node["transitions"]) == ("active", ["deactivate", "shutdown"])
+    assert node["declared_at"].startswith("systems/pipeline.yaml:")
+    assert _nodes(data)[TALKER]["state"] == ""
+
+
+def test_a_node_is_deactivated_and_activated_again(page: Browser) -> None:
+    channel = page.subscribe("nodes")
+    done = page.ok("transition", node=CONTROLLER, transition="deactivate")
+    assert done["outcomes"] == [{"node": CONTROLLER, "before": "active", "after": "inactive"}]
+    assert output_of("lifecycle", "get", CONTROLLER).strip().endswith("inactive")
+    page.until(channel, lambda data: _nodes(data)[CONTROLLER]["state"] == "inactive")
+    refused = page.error("transition", node=CONTROLLER, transition="deactivate")
+    assert refused["code"] == "rejected"
+    assert "activate" in refused["hint"]
+    assert page.ok("restart", node=CONTROLLER)["outcomes"][-1]["after"] == "active"
+    assert output_of("lifecycle", "get", CONTROLLER).strip().endswith("active")
+    assert page.error("transition", node="/nobody", transition="configure")["code"] == "not_found"
+
+
+def test_the_system_is_paused_and_resumed(page: Browser) -> None:
+    channel = page.subscribe("nodes")
+    page.ok("command", system="/pipeline", command="pause")
+    page.until(channel, lambda data: _nodes(data)[PLANNER]["state"] == "inactive")
+    page.ok("command", system="/pipeline", command="resume")
+    page.until(channel, lambda data: _nodes(data).get(PLANNER, {}).get("state") == "active")
+
+
+def test_plan_source_and_drift(page: Browser) -> None:
+    steps = page.ok("plan")["steps"]
+    assert [step["number"] for step in steps] == list(range(1, 7))
+    assert any(PLANNER in step["cause"] or step["after"] for step in steps)
+    node = page.ok("node", node=PLANNER)
+    assert "planner: {type: planner" in node["source"]["text"]
+    assert {end["name"] for end in node["endpoints"]} >= {"/sensor_data", "/plan_trajectory"}
+    page.ok("set_parameter", node=PLANNER, name="max_velocity", value=2.0)
+    kinds = {(item["kind"], item["node"]) for item in page.ok("drift")["differences"]}
+    assert {("wrong parameter", PLANNER), ("extra node", TALKER)} <= kinds
+    page.ok("set_parameter", node=PLANNER, name="max_velocity", value=1.0)
+    assert page.error("node", node="/nobody")["code"] == "not_found"
+
+
+def test_parameters_are_changed_and_refused(page: Browser) -> None:
+    channel = page.subscribe("parameters", node=PLANNER)
+    data = page.until(channel, bool)
+    found = {item["name"]: item for item in data["parameters"]}["max_velocity"]
+    assert (found["type"], found["unit"], found["minimum"]) == ("double", "m/s", 0.01)
+    assert page.ok("set_parameter", node=PLANNER, name="max_velocity", value=3) == {"value": 3.0}
+    page.until(
+        channel,
+        lambda data: (
+            {"max_velocity": 3.0}.items()
+            <= {item["name"]: item["value"] for item in data["parameters"]}.items()
+        ),
+    )
+    refused = page.error("set_parameter", node=PLANNER, name="max_velocity", value=99)
+    assert refused["code"] == "rejected"
+    assert "max_velocity" in refused["message"]
+    wrong = page.error("set_parameter", node=PLANNER, name="max_velocity", value="fast")
+    assert wrong["code"] == "rejected"
+    page.ok("set_parameter", node=PLANNER, name="max_velocity", value=1.0)
+    other = page.until(page.subscribe("parameters", node=TALKER), bool)
+    assert {"speed", "gains"} <= {item["name"] for item in other["parameters"]}
+
+
+def test_topics_have_endpoints_and_figures(page: Browser) -> None:
+    channel = page.subscribe("topics", measure=["/lab/count", "/sensor_data"])
+    data = page.until(
+        channel,
+        lambda data: all(
+            (data["figures"].get(name, {}).get("rate_hz") or 0) > 20
+            for name in ("/lab/count", "/sensor_data")
+        ),
+    )
+    topic = {item["name"]: item for item in data["topics"]}["/sensor_data"]
+    assert topic["types"] == ["nav_msgs/msg/Odometry"]
+    assert [end["node"] for end in topic["publishers"]] == [SIMULATOR]
+    assert topic["publishers"][0]["qos"]["reliability"] == "best_effort"
+    assert data["figures"]["/sensor_data"]["mean_bytes"] > 700
+
+
+def test_a_topic_is_echoed_at_a_limited_rate(page: Browser) -> None:
+    channel = page.subscribe("echo", topic="/sensor_data", fields=["pose.pose"], max_hz=5)
+    data = page.until(channel, lambda data: data["messages"])
+    assert set(data["messages"][0]["value"]["pose.pose"]) == {"position", "orientation"}
+    page.wait(lambda: any(update["dropped"] > 5 for update in page.updates))
+    latched = page.until(page.subscribe("echo", topic="/lab/text"), lambda data: data["messages"])
+    assert latched["messages"][0]["value"] == {"data": "x" * 200}
+    assert page.failure(page.subscribe("echo", topic="/nothing"))["code"] == "not_found"
+    wrong = page.subscribe("echo", topic="/sensor_data", fields=["pose.poze"])
+    assert page.failure(wrong) == {
+        "code": "bad_request",
+        "message": "'pose.poze': there is no field 'poze'",
+        "hint": "did you mean 'pose'?",
+    }
+
+
+def test_plotted_values_are_those_published(page: Browser) -> None:
+    channel = page.subscribe("plot", series=[{"topic": "/lab/count", "field": "data"}])
+
+    def values() -> list[int]:
+        return [
+            value
+            for update in page.updates
+            if update["sub"] == channel and "data" in update
+            for value in update["data"]["series"][0]["values"]
+        ]
+
+    page.wait(lambda: len(values()) > 60)
+    found = values()
+    assert found == list(range(found[0], found[0] + len(found)))
+    text = page.subscribe("plot", series=[{"topic": "/lab/text", "field": "data"}])
+    assert "is not a number" in page.failure(text)["message"]
+
+
+def test_messages_are_published(page: Browser) -> None:
+    echo = page.subscribe("echo", topic="/lab/received")
+    message = {"topic": "/lab/in", "type": "std_msgs/msg/String", "message": {"data": "hello {x}"}}
+    assert page.ok("publish", **message) == {"subscriptions": 1}
+    page.until(
+        echo,
+        lambda data: {"data": "hello {x}"} in [item["value"] for item in data["messages"]],
+    )
+    repeated = page.subscribe("publishing", **message, rate_hz=50)
+    page.until(repeated, lambda data: data["count"] > 20 and data["subscriptions"] == 1)
+    page.ok("unsubscribe", sub=repeated)
+    wrong = page.error("publish", **(message | {"message": {"data": 5}}))
+    assert "data takes a string" in wrong["message"]
+
+
+def test_a_service_is_called(page: Browser) -> None:
+    channel = page.subscribe("services")
+    data = page.until(
+        channel, lambda data: {"/lab/add"} <= {item["name"] for item in data["services"]}
+    )
+    assert all("get_parameters" not in item["name"] for item in data["services"])
+    reply = page.ok("call", service="/lab/add", request={"data": True})
+    assert reply["response"] == {"success": True, "message": "switched"}
+    plan = {"start": {"x": 0.0}, "goal": {"x": 1.0}, "max_velocity": 0.5}
+    planned = page.ok("call", service="/plan_trajectory", request=plan)["response"]
+    assert planned["success"]
+    assert math.isclose(planned["path"]["poses"][-1]["pose"]["position"]["x"], 1.0)
+    missing = page.error(
+        "call", service="/nobody", type="std_srvs/srv/SetBool", request={}, timeout_s=0.3
+    )
+    assert missing["code"] == "no_response"
+    wrong = page.error("call", service="/lab/add", request={"dat": True})
+    assert wrong["hint"] == "did you mean 'data'?"
+
+
+def test_goals_are_followed_canceled_and_rejected(page: Browser) -> None:
+    def send(velocity: float) -> int:
+        goal = {"target": {"x": 1.0}, "max_velocity": velocity}
+        return page.subscribe("goal", action="/lab/navigate", goal=goal)
+
+    done = send(1.0)
+    page.until(done, lambda data: data["status"] == "executing" and data["feedback"])
+    finished = page.until(done, lambda data: data["status"] == "succeeded")
+    assert finished["result"]["distance_traveled"] == 2.5
+    endless = send(-1.0)
+    page.until(endless, lambda data: data["status"] == "executing")
+    page.ok("cancel", sub=endless)
+    assert page.until(endless, lambda data: data["status"] == "canceled")["result"]["message"]
+    assert page.failure(send(0.0))["code"] == "rejected"
+
+
+def test_the_log_is_filtered(page: Browser) -> None:
+    everything = page.subscribe("log", level="debug")
+    page.until(everything, lambda data: data["lines"])
+    some = page.subscribe("log", text="driving to", node="motor")
+    lines = page.until(some, lambda data: data["lines"])["lines"]
+    assert all("driving to" in line["text"] and line["node"] == CONTROLLER for line in lines)
+
+
+def test_timings_have_histograms(page: Browser) -> None:
+    channel = page.subscribe("timing")
+    data = page.until(
+        channel, lambda data: data["systems"] and data["systems"][0]["callbacks"][0]["calls_hz"]
+    )
+    callbacks = {(item["node"], item["name"]): item for item in data["systems"][0]["callbacks"]}
+    control = callbacks[CONTROLLER, "control"]
+    assert sum(count for _, count in control["histogram"]) == control["count"]
+    bounds = [bound for bound, _ in control["histogram"]]
+    assert bounds == sorted(bounds)
+    assert control["calls_hz"] > 20
+
+
+def test_forms_and_types(page: Browser) -> None:
+    form = page.ok("form", type="composer_interfaces/srv/PlanTrajectory")["parts"]["request"]
+    assert [field["name"] for field in form] == ["start", "goal", "max_velocity"]
+    assert "nav_msgs/msg/Odometry" in page.ok("types", kind="message", prefix="odom")["names"]
+    assert page.ok("type_of", kind="topic", name="/sensor_data")["types"] == [
+        "nav_msgs/msg/Odometry"
+    ]
+    assert "angle_min" in page.ok("fields", type="sensor_msgs/msg/LaserScan")["numeric"]

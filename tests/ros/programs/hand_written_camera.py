@@ -1,0 +1,52 @@
+"""A plain rclpy node that publishes images: /camera (rgb8, 640 x 480) at 30 Hz.
+
+Prints ``ready`` at the start.
+"""
+
+from __future__ import annotations
+
+import sys
+from array import array
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import CompressedImage, Image
+
+WIDTH, HEIGHT = 640, 480
+#: The smallest valid PNG: one transparent pixel.
+PNG = bytes.fromhex(
+    "89504e470d0a1a0a0000000d49484452000000010000000108060000001f15c489"
+    "0000000a49444154789c63000100000500010d0a2db40000000049454e44ae426082"
+)
+
+
+class Camera(Node):
+    def __init__(self) -> None:
+        super().__init__("camera")
+        self.images = self.create_publisher(Image, "camera", qos_profile_sensor_data)
+        self.compressed = self.create_publisher(
+            CompressedImage, "camera/compressed", qos_profile_sensor_data
+        )
+        self.image = Image(width=WIDTH, height=HEIGHT, encoding="rgb8", step=WIDTH * 3)
+        self.image.data = array("B", bytes((10, 20, 30)) * (WIDTH * HEIGHT))
+        self.create_timer(1 / 30, self.tick)
+
+    def tick(self) -> None:
+        self.images.publish(self.image)
+        self.compressed.publish(CompressedImage(format="png", data=PNG))
+
+
+def main() -> None:
+    rclpy.init()
+    node = Camera()
+    print("ready", flush=True)
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        sys.exit(0)
+
+
+if __name__ == "__main__":
+    main()
