@@ -136,6 +136,11 @@ class Session:
         """Return name and namespace of every known node except those of commands."""
         return self.graph.others()
 
+    def is_local_discovered(self) -> bool:
+        """Return whether all nodes of this computer are discovered."""
+        count = len(self.graph.participants())
+        return count >= count_participants(self._domain_id) and self.graph.are_nodes_known()
+
     def unresponsive_systems(self) -> dict[str, str]:
         """Return the systems of this computer that are not discovered, with their process ids.
 
@@ -195,7 +200,7 @@ class Session:
             return False
         if now_s >= self.node.joined_s + _ANNOUNCED_WITHIN_S:
             return True
-        return count >= count_participants(self._domain_id) and self.graph.are_nodes_known()
+        return self.is_local_discovered()
 
     def _discovered(self) -> tuple[int, tuple[NodeName, ...]]:
         """Return the number of known participants, including this one, and the nodes."""

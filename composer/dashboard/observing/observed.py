@@ -25,14 +25,15 @@ if TYPE_CHECKING:
     from composer.dashboard.ros_side import Work
     from composer.remote.shared_session import SharedSession
 
-_GRAPH_PERIOD_S = 1.0
-#: Nodes are discovered one after the other at first; the first view waits a moment for one.
+_PERIOD_S = 1.0
+#: Nodes are discovered one after the other at first.
 _NEW_PERIOD_S = 0.2
 _NEW_S = 4.0
-_FIRST_NODE_S = 0.5
-_FIRST_POLL_S = 0.02
-#: At most this share of a processor goes into queries of the ROS graph.
-_GRAPH_SHARE = 0.03
+_FIRST_WITHIN_S = 0.8
+_FIRST_POLL_S = 0.03
+#: Endpoints are queried when names have changed; otherwise they take at most this share of a
+#: processor.
+_SHARE = 0.03
 _STATES_PERIOD_S = 2.0
 _STATES_WITHIN_S = 2.0
 _GET_STATE = ("get_state", "lifecycle_msgs/srv/GetState")
@@ -87,7 +88,9 @@ class Observed:
         self.log = LogLines(session)
         self._states = _States(session, work)
         self._topology = Topology(0, {}, {})
-        self._graph_due_s = 0.0
+        self._names: object = None
+        self._names_due_s = 0.0
+        self._endpoints_due_s = 0.0
         self._joined_s = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -99,27 +102,39 @@ class Observed:
         self.reports.close()
 
     def topology(self) -> Topology:
-        """Return the nodes and endpoints, at most about a second old."""
+        """Return the nodes and endpoints, at most about a second old.
+
+        The first call waits a moment, so that the first view is complete.
+        """
         now_s = time.monotonic()
-        if now_s < self._graph_due_s:
+        if now_s < self._names_due_s:
             return self._topology
-        is_first, used_s = not self._graph_due_s, time.thread_time()
+        if not self._names_due_s:
+            self._wait_for_nodes()
+        is_new = now_s < self._joined_s + _NEW_S
+        self._names_due_s = now_s + (_NEW_PERIOD_S if is_new else _PERIOD_S)
+        graph = self._session.graph
+        names = (graph.nodes(), graph.topics(), graph.services())
+        if names == self._names and now_s < self._endpoints_due_s:
+            return self._topology
+        self._names = names
+        used_s = time.thread_time()
         nodes, counts = self._query()
-        while is_first and not nodes and time.monotonic() < now_s + _FIRST_NODE_S:
-            time.sleep(_FIRST_POLL_S)
-            nodes, counts = self._query()
         if nodes != self._topology.nodes or counts != self._topology.counts:
             self._topology = Topology(self._topology.revision + 1, nodes, counts)
         used_s = time.thread_time() - used_s
-        is_new = now_s < self._joined_s + _NEW_S
-        period_s = _NEW_PERIOD_S if is_new else _GRAPH_PERIOD_S
-        self._graph_due_s = time.monotonic() + max(period_s, used_s / _GRAPH_SHARE)
+        self._endpoints_due_s = time.monotonic() + max(_PERIOD_S, used_s / _SHARE)
         return self._topology
+
+    def _wait_for_nodes(self) -> None:
+        end_s = self._joined_s + _FIRST_WITHIN_S
+        while not self._session.is_local_discovered() and time.monotonic() < end_s:
+            time.sleep(_FIRST_POLL_S)
 
     def known(self) -> Topology:
         """Return the nodes and endpoints, on any thread."""
         known = self._topology
-        if known.revision and time.monotonic() < self._graph_due_s + _GRAPH_PERIOD_S:
+        if known.revision and time.monotonic() < self._endpoints_due_s + _PERIOD_S:
             return known
         return Topology(known.revision, *self._query())
 
