@@ -13,6 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from benchmarks import (
+    dashboard,
     large_systems,
     live_commands,
     others,
@@ -45,6 +46,7 @@ BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
         "the ring with Zenoh, ezmsg and dora, which are installed on the first run",
         others.measure,
     ),
+    "dashboard": ("cost of the dashboard for a running system", dashboard.measure),
     "soak": ("memory usage under a long load", soak.measure),
     "tracing": ("cost of recording callback timings", systems.tracing),
 }

@@ -72,9 +72,9 @@ def cpu_ms_per_s(side: Side, seconds: float) -> float:
     with running(side, environment()) as (process, output):
         up_s = time.perf_counter()
         time.sleep(_SETTLE_S)
-        cpu_s, began_s = _cpu_s(process.pid), time.perf_counter()
+        before_s, began_s = cpu_s(process.pid), time.perf_counter()
         time.sleep(seconds)
-        cpu_s, took_s = _cpu_s(process.pid) - cpu_s, time.perf_counter() - began_s
+        used_s, took_s = cpu_s(process.pid) - before_s, time.perf_counter() - began_s
         process.send_signal(signal.SIGINT)
         lived_s = time.perf_counter() - up_s
         process.wait(_TIMEOUT_S)
@@ -82,7 +82,7 @@ def cpu_ms_per_s(side: Side, seconds: float) -> float:
     sent_hz = sum(int(count) for count in side.sent.findall(text)) / lived_s
     if "driving to" not in text or sent_hz < _ENOUGH * EXPECTED_HZ:
         raise ProgramFailed(f"{side.command}: {sent_hz:.0f} messages/s, {EXPECTED_HZ:g} expected")
-    return 1000.0 * cpu_s / took_s
+    return 1000.0 * used_s / took_s
 
 
 @contextmanager
@@ -120,6 +120,7 @@ def _read(output: IO[bytes]) -> str:
     return os.pread(output.fileno(), size, 0).decode(errors="replace")
 
 
-def _cpu_s(pid: int) -> float:
+def cpu_s(pid: int) -> float:
+    """Return the CPU time of a process in seconds."""
     # The CPU clock of the process, see clock_getcpuclockid(3); /proc has a resolution of 10 ms.
     return time.clock_gettime((~pid << 3) | _PROCESS_CPU_CLOCK)

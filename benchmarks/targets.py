@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from benchmarks import large_systems, live_commands
+from benchmarks import dashboard, large_systems, live_commands
 from benchmarks.figures import Row, aligned, ratios, spread
 from benchmarks.rounds import EVENTS, SINGLE, UNTRACED
 
@@ -38,6 +38,9 @@ TARGETS = (
     Target(f"start, N=300, {large_systems.LEAN}", "s", large_systems.HAND_WRITTEN, 1 / 8),
     Target(f"stop, N=300, {large_systems.COMPOSED}", "s", large_systems.HAND_WRITTEN, 1 / 5),
     Target("ring, N=10", _CPU, UNTRACED, 1.1),
+    Target(dashboard.IDLE, "CPU ms/s", dashboard.WITHOUT, 1.02),
+    Target(dashboard.WATCHED, "CPU ms/s", dashboard.WITHOUT, 1.3),
+    Target(dashboard.STALLED, "p99 us", dashboard.UNWATCHED, 1.05),
     Target(f"{live_commands.ALL}, p99", "wall ms", live_commands.ONE_SECOND, 1.0),
 )
 
