@@ -133,15 +133,15 @@ class Feeds:
     def _poll(self, running: RunningFeed, ros: RosGraphSide) -> None:
         from composer.remote.session import RosError
 
-        running.due_s = max(running.due_s + running.feed.period_s, time.monotonic())
         try:
             if not running.is_started:
-                running.due_s = time.monotonic() + running.feed.period_s
+                running.due_s = time.monotonic()
                 running.feed.start(ros)
                 running.is_started = True
             for update in running.feed.poll():
                 running.last_error = ""
                 self._send(running, update)
+            running.due_s = max(running.due_s + running.feed.period_s, time.monotonic())
         except RequestError as error:
             self._fail(running, error)
         except RosError as error:

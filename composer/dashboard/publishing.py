@@ -81,7 +81,7 @@ class Outgoing:
         return PRESETS["state" if is_latched else "command"]
 
     def _subscriptions(self, topic: str) -> list[ObservedEndpoint]:
-        ends = self._ros.observed.known().of_topics().get(topic, [])
+        ends = self._ros.observed.known().of_topics.get(topic, [])
         return [end for _, end in ends if end.kind is PortKind.SUBSCRIPTION]
 
 

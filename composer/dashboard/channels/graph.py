@@ -24,12 +24,12 @@ _DECLARED_ONLY = ("lifecycle", "deployment")
 #: Topics without a report are measured, but no more than these.
 _MAX_MEASURED = 60
 _MANAGER = "manager"
+#: While the graph changes, and until a picture is ready.
+_SOON_S = 0.1
 
 
 class PictureFeed(Feed):
     """The diagram, again whenever the graph has changed. The layout runs on a worker thread."""
-
-    period_s = 0.25
 
     def __init__(self, values: Values, declared: Declared | None) -> None:
         """Read the parameters of the channel. Raises BadRequestError, RequestError."""
@@ -62,9 +62,10 @@ class PictureFeed(Feed):
             if isinstance(item, Exception):
                 raise item
             yield item
+        observed = self._ros.observed
+        self.period_s = _SOON_S if self._is_drawing or observed.is_new else 1.0
         if self._is_drawing:
             return
-        observed = self._ros.observed
         topology = observed.topology()
         states = observed.states() if self._is_live else {}
         #: Nodes with a state have one more line.
@@ -72,6 +73,7 @@ class PictureFeed(Feed):
         if wanted != self._drawn:
             self._drawn = wanted
             self._is_drawing = True
+            self.period_s = _SOON_S
             self._ros.work(lambda: self._draw(topology, states))
 
     def _draw(self, topology: Topology, states: Mapping[str, str | None]) -> None:
@@ -140,7 +142,7 @@ class LiveFeed(Feed):
     def _measure(self, reported: set[str]) -> dict[str, Any]:
         """Measure the topics that no system reports; return their rates."""
         meters = self._ros.observed.meters
-        of_topics = self._ros.observed.topology().of_topics()
+        of_topics = self._ros.observed.topology().of_topics
         managers = {f"{system}/{_MANAGER}" for system in self._ros.observed.reports.current()}
 
         def is_reporting(end: tuple[str, ObservedEndpoint]) -> bool:

@@ -64,7 +64,7 @@ class NodesFeed(Feed):
                 nodes |= {node.node: self._managed(name, node) for node in report.nodes}
         for node, state in observed.states().items():
             nodes.setdefault(node, self._other(node, state))
-        for node in observed.topology().visible():
+        for node in observed.topology().visible:
             nodes.setdefault(node, self._other(node, ""))
         states = [(name, node["state"], node.get("held_down")) for name, node in nodes.items()]
         activities = [(name, report and report.activity) for name, report in reports.items()]

@@ -47,7 +47,7 @@ class ServicesFeed(Feed):
         self, topology: Topology, server: PortKind, client: PortKind
     ) -> list[dict[str, Any]]:
         found: dict[str, dict[str, Any]] = {}
-        for node in topology.visible():
+        for node in topology.visible:
             for end in topology.nodes[node]:
                 if end.kind not in (server, client) or (end.is_for_tools and not self._hidden):
                     continue

@@ -53,7 +53,7 @@ class TopicsFeed(Feed):
     def poll(self) -> Iterator[Update]:
         """Yield the list with figures."""
         topology = self._ros.observed.topology()
-        of_topics = topology.of_topics()
+        of_topics = topology.of_topics
         if topology.revision != self._revision:
             self._revision = topology.revision
             self._topics = self._listed(topology)
@@ -80,7 +80,7 @@ class TopicsFeed(Feed):
     def _listed(self, topology: Topology) -> list[dict[str, Any]]:
         return [
             _topic(name, ends)
-            for name, ends in sorted(topology.of_topics().items())
+            for name, ends in sorted(topology.of_topics.items())
             if self._hidden or not (is_hidden(name) or all(end.is_for_tools for _, end in ends))
         ]
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
 from composer.dashboard.observing.log_lines import LogLines
@@ -31,15 +32,19 @@ _NEW_PERIOD_S = 0.2
 _NEW_S = 4.0
 _FIRST_WITHIN_S = 0.8
 _FIRST_POLL_S = 0.03
-#: Endpoints are queried when names have changed; otherwise they take at most this share of a
-#: processor.
+#: Endpoints are queried when names have changed, else less often: they take at most this share of
+#: a processor.
+_ENDPOINTS_PERIOD_S = 3.0
 _SHARE = 0.03
 _STATES_PERIOD_S = 2.0
+_SYSTEMS_PERIOD_S = 2.0
+#: Managers report every second.
+_SILENT_S = 5.0
 _STATES_WITHIN_S = 2.0
-_GET_STATE = ("get_state", "lifecycle_msgs/srv/GetState")
+_GET_STATE = "lifecycle_msgs/srv/GetState"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Topology:
     """The nodes of the ROS graph with all of their endpoints. ``revision`` counts changes.
 
@@ -50,9 +55,19 @@ class Topology:
     nodes: Mapping[str, tuple[ObservedEndpoint, ...]]
     counts: Mapping[str, int]
 
+    @cached_property
     def visible(self) -> list[str]:
-        """Return the names of nodes that are not hidden, sorted."""
+        """The names of nodes that are not hidden, sorted."""
         return [name for name in self.nodes if not is_hidden(name)]
+
+    @cached_property
+    def lifecycle_nodes(self) -> frozenset[str]:
+        """The nodes that report their lifecycle state on request."""
+        return frozenset(
+            node
+            for node, ends in self.nodes.items()
+            if any((end.name, end.type) == (f"{node}/get_state", _GET_STATE) for end in ends)
+        )
 
     def snapshot(self, states: Mapping[str, str | None]) -> Snapshot:
         """Return the nodes as :mod:`composer.graph` and :mod:`composer.drift` read them."""
@@ -68,10 +83,11 @@ class Topology:
             )
         )
 
-    def of_topics(self) -> dict[str, list[tuple[str, ObservedEndpoint]]]:
-        """Return the endpoints of each topic with the names of their nodes."""
+    @cached_property
+    def of_topics(self) -> Mapping[str, list[tuple[str, ObservedEndpoint]]]:
+        """The endpoints of each topic with the names of their nodes."""
         found: dict[str, list[tuple[str, ObservedEndpoint]]] = {}
-        for name in self.visible():
+        for name in self.visible:
             for end in self.nodes[name]:
                 if end.kind in (PortKind.PUBLISHER, PortKind.SUBSCRIPTION):
                     found.setdefault(end.name, []).append((name, end))
@@ -111,7 +127,7 @@ class Observed:
             return self._topology
         if not self._names_due_s:
             self._wait_for_nodes()
-        is_new = now_s < self._joined_s + _NEW_S
+        is_new = self.is_new
         self._names_due_s = now_s + (_NEW_PERIOD_S if is_new else _PERIOD_S)
         graph = self._session.graph
         names = (graph.nodes(), graph.topics(), graph.services())
@@ -123,8 +139,14 @@ class Observed:
         if nodes != self._topology.nodes or counts != self._topology.counts:
             self._topology = Topology(self._topology.revision + 1, nodes, counts)
         used_s = time.thread_time() - used_s
-        self._endpoints_due_s = time.monotonic() + max(_PERIOD_S, used_s / _SHARE)
+        period_s = _NEW_PERIOD_S if is_new else _ENDPOINTS_PERIOD_S
+        self._endpoints_due_s = time.monotonic() + max(period_s, used_s / _SHARE)
         return self._topology
+
+    @property
+    def is_new(self) -> bool:
+        """Whether the session has just begun, so that nodes are still being discovered."""
+        return time.monotonic() < self._joined_s + _NEW_S
 
     def _wait_for_nodes(self) -> None:
         end_s = self._joined_s + _FIRST_WITHIN_S
@@ -134,7 +156,7 @@ class Observed:
     def known(self) -> Topology:
         """Return the nodes and endpoints, on any thread."""
         known = self._topology
-        if known.revision and time.monotonic() < self._endpoints_due_s + _PERIOD_S:
+        if known.revision and time.monotonic() < self._endpoints_due_s + _ENDPOINTS_PERIOD_S:
             return known
         return Topology(known.revision, *self._query())
 
@@ -156,14 +178,7 @@ class Observed:
             if report is not None
             for node in report.nodes
         }
-        others = {
-            node
-            for node, ends in self.topology().nodes.items()
-            if node not in managed
-            and any(
-                (end.name, end.type) == (f"{node}/{_GET_STATE[0]}", _GET_STATE[1]) for end in ends
-            )
-        }
+        others = self.topology().lifecycle_nodes - managed.keys()
         return self._states.of(others) | managed
 
 
@@ -176,6 +191,9 @@ class SystemReports:
         self._users = 0
         self._callback_users = 0
         self._with_callbacks = False
+        self._due_s = 0.0
+        #: The last report of each system, and when it was seen first.
+        self._seen: dict[str, tuple[SystemReport | None, float]] = {}
 
     def acquire(self, *, callbacks: bool = False) -> None:
         """Subscribe to the reports, with timings of callbacks on request."""
@@ -196,14 +214,26 @@ class SystemReports:
         with_callbacks = self._callback_users > 0
         if self._systems is None or with_callbacks is not self._with_callbacks:
             self.close()
-            self._with_callbacks = with_callbacks
+            self._with_callbacks, self._due_s = with_callbacks, 0.0
             self._systems = Systems(self._session, Deadline(math.inf), callbacks=with_callbacks)
         systems = self._systems
-        local = local_systems()
-        known = {*systems.discover(), *local}
-        systems.subscribe(local)
-        systems.forget([name for name in systems.current() if name not in known])
-        return systems.current()
+        now_s = time.monotonic()
+        if now_s >= self._due_s:
+            self._due_s = now_s + _SYSTEMS_PERIOD_S
+            local = local_systems()
+            known = {*systems.discover(), *local}
+            systems.subscribe(local)
+            systems.forget([name for name in systems.current() if name not in known])
+        return {name: self._fresh(name, report) for name, report in systems.current().items()}
+
+    def _fresh(self, name: str, report: SystemReport | None) -> SystemReport | None:
+        """Return the last report of a system, None if that is too old."""
+        now_s = time.monotonic()
+        last, seen_s = self._seen.get(name, (None, now_s))
+        if report is not None and report is not last:
+            self._seen[name] = (report, now_s)
+            return report
+        return last if now_s < seen_s + _SILENT_S else None
 
     def close(self) -> None:
         """Unsubscribe."""
@@ -222,7 +252,7 @@ class _States:
         self._due_s = 0.0
         self._is_asking = False
 
-    def of(self, nodes: set[str]) -> dict[str, str | None]:
+    def of(self, nodes: Set[str]) -> dict[str, str | None]:
         """Return the states that are known, and ask for new ones if it is time."""
         now_s = time.monotonic()
         if nodes and now_s >= self._due_s and not self._is_asking:

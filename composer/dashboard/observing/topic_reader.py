@@ -73,7 +73,7 @@ class TopicReader:
         from composer.remote.name_matching import full_name
 
         full_name("topic", self.topic)  # raises if it is not a valid name
-        ends = [end for _, end in self._ros.observed.topology().of_topics().get(self.topic, [])]
+        ends = [end for _, end in self._ros.observed.topology().of_topics.get(self.topic, [])]
         publishers = [end for end in ends if end.kind is PortKind.PUBLISHER]
         type_name = self._given_type or self._only_type(publishers)
         profile = self._wanted_profile(publishers, type_name)
