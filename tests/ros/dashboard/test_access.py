@@ -1,4 +1,4 @@
-"""Only those with the token get anything, and the dashboard does nothing while nobody looks."""
+"""Only those with the token get anything, and the dashboard does nothing without a browser."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def until(condition: Callable[[], bool]) -> None:
         time.sleep(0.02)  # poll: nothing announces it
 
 
-def test_nothing_happens_while_nobody_looks(ros_domain_id: int) -> None:
+def test_nothing_happens_without_a_browser(ros_domain_id: int) -> None:
     with dashboard() as server:
         assert get(server.address).status == 200
         threads = Path(f"/proc/{server.process.pid}/task")

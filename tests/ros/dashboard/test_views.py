@@ -75,7 +75,7 @@ def test_a_node_is_deactivated_and_activated_again(page: Browser) -> None:
     assert "activate" in refused["hint"]
     assert page.ok("restart", node=CONTROLLER)["outcomes"][-1]["after"] == "active"
     assert output_of("lifecycle", "get", CONTROLLER).strip().endswith("active")
-    assert page.error("transition", node="/nobody", transition="configure")["code"] == "not_found"
+    assert page.error("transition", node="/missing", transition="configure")["code"] == "not_found"
 
 
 def test_the_system_is_paused_and_resumed(page: Browser) -> None:
@@ -97,7 +97,7 @@ def test_plan_source_and_drift(page: Browser) -> None:
     kinds = {(item["kind"], item["node"]) for item in page.ok("drift")["differences"]}
     assert {("wrong parameter", PLANNER), ("extra node", TALKER)} <= kinds
     page.ok("set_parameter", node=PLANNER, name="max_velocity", value=1.0)
-    assert page.error("node", node="/nobody")["code"] == "not_found"
+    assert page.error("node", node="/missing")["code"] == "not_found"
 
 
 def test_parameters_are_changed_and_refused(page: Browser) -> None:
@@ -201,7 +201,7 @@ def test_a_service_is_called(page: Browser) -> None:
     assert planned["success"]
     assert math.isclose(planned["path"]["poses"][-1]["pose"]["position"]["x"], 1.0)
     missing = page.error(
-        "call", service="/nobody", type="std_srvs/srv/SetBool", request={}, timeout_s=0.3
+        "call", service="/missing", type="std_srvs/srv/SetBool", request={}, timeout_s=0.3
     )
     assert missing["code"] == "no_response"
     wrong = page.error("call", service="/lab/add", request={"dat": True})
