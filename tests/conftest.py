@@ -35,6 +35,9 @@ DOMAIN_IDS = range(1, 102)
 
 register_profiles()
 
+#: Fixtures of folders that have nothing else in common.
+pytest_plugins = ("tests.chromium",)
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(

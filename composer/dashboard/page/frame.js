@@ -38,9 +38,11 @@ export function createFrame(app) {
   const figures = h("p", { class: "figures" });
   const commands = h("div", { class: "commands" });
   const theme = h("button", { type: "button", class: "quiet", id: "appearance", title: "Light or dark" }, "Theme: auto");
+  const readOnly = h("span", { class: "badge" }, "read-only");
   const links = new Map();
+  let shown = [];
 
-  bar.append(title, activity, figures, commands, theme);
+  bar.append(title, readOnly, activity, figures, commands, theme);
   for (const [index, [view, label, short]] of VIEWS.entries()) {
     const link = h(
       "a",
@@ -63,7 +65,12 @@ export function createFrame(app) {
 
   function showHello(hello) {
     setText(title, hello.title);
-    if (hello.read_only) setText(activity, "read-only");
+    bar.classList.toggle("read-only", hello.read_only);
+    showTitle();
+  }
+
+  function showTitle() {
+    document.title = [...shown, app.hello?.title].filter(Boolean).join(" · ");
   }
 
   function showView(view, name) {
@@ -72,7 +79,8 @@ export function createFrame(app) {
       else link.removeAttribute("aria-current");
     }
     const label = VIEWS.find(([id]) => id === view)[1];
-    document.title = [name, label, app.hello?.title].filter(Boolean).join(" · ");
+    shown = [name, label];
+    showTitle();
   }
 
   function showConnection({ state, retryInMs }) {
@@ -99,7 +107,7 @@ export function createFrame(app) {
     }
     const managed = data.nodes.filter((node) => node.system === system.name).length;
     activity.dataset.activity = system.answers ? system.activity : "silent";
-    setText(activity, system.answers ? `${system.activity} · ${active} of ${managed} nodes active` : "not responding");
+    setText(activity, system.answers ? `${system.activity} · ${active} of ${managed} active` : "not responding");
     activity.title = system.message;
     const { process } = system;
     setText(figures, process ? [
@@ -117,11 +125,11 @@ export function createFrame(app) {
     commands.dataset.shown = wanted.join();
     commands.replaceChildren(...wanted.map((name) => {
       const { label, ask, hint } = COMMANDS[name];
-      const pressed = button(label, () => attempt(pressed, async () => {
+      const pressed = button([icon(name), h("span", {}, label)], () => attempt(pressed, async () => {
         if (ask && !(await confirmed(`${ask} ${system.name}?`, { verb: label, hint }))) return;
         const { message } = await app.connection.request("command", { system: system.name, command: name });
         toast(message || `${label}: done`);
-      }), { data: { command: name } });
+      }), { "aria-label": `${label} the system`, title: `${label} the system`, data: { command: name } });
       return pressed;
     }));
   }

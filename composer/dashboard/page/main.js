@@ -39,8 +39,8 @@ function main() {
   app.connection = createConnection(`ws://${location.host}/ws`, {
     onhello: (hello) => {
       app.hello = hello;
-      document.documentElement.classList.toggle("read-only", hello.read_only);
       frame.showHello(hello);
+      dispatchEvent(new Event("hello"));
     },
     onstate: frame.showConnection,
   });

@@ -12,7 +12,7 @@ const LEFT = /(remaining|left|to_go)/i;
 
 export function createGoal(app, { action, type, goal }) {
   const status = h("span", { class: "goal-status", data: { tone: "none" } }, "sent");
-  const elapsed = h("span", { class: "faint" });
+  const elapsed = h("span", { class: "muted" });
   const cancel = button("Cancel", () => attempt(cancel, () => app.connection.request("cancel", { sub: subscription.sub() })));
   const progress = h("progress", { "aria-label": `Progress of the goal for ${action}`, max: "1" });
   const feedback = createMessageTree();

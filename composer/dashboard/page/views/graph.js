@@ -8,7 +8,7 @@ import { button, empty, h, s } from "../dom.js";
 import { icon } from "../icons.js";
 import { pathOf } from "../router.js";
 import { dropNote, searchField, tabs } from "../widgets/parts.js";
-import { articleOf } from "./graph_details.js";
+import { createArticle } from "./graph_details.js";
 import { createFilterMenu } from "./graph_filter.js";
 import { createOverlay } from "./graph_overlay.js";
 
@@ -18,8 +18,8 @@ const DISCOVERY_MS = 4000;
 const VIEWS = [
   ["nodes", "Nodes"],
   ["connections", "Ports"],
-  ["lifecycle", "Bring-up"],
-  ["deployment", "Executors"],
+  ["lifecycle", "Bring-up", true],
+  ["deployment", "Executors", true],
 ];
 
 export function createGraphView(app) {
@@ -33,7 +33,7 @@ export function createGraphView(app) {
   const neighbors = h("nav", { class: "neighbors", "aria-label": "Connected to" });
   const close = button(icon("close"), () => {}, { class: "quiet close", "aria-label": "Close details" });
   const panel = h("aside", { class: "detail floating", "aria-label": "Details", tabindex: "-1", hidden: true }, close, about, neighbors);
-  const zoom = (label, title, action) => button(label, action, { title, "aria-label": title });
+  const zoom = (label, title, action) => button(label, action, { title, "aria-label": label === "Fit" ? null : title });
   const element = h(
     "div",
     { class: "view graph" },
@@ -56,22 +56,32 @@ export function createGraphView(app) {
   let picture = null;
   let viewport = null;
   let overlay = null;
+  let article = null;
   let things = {};
   let live = { nodes: {}, edges: {}, topics: {} };
   let view = "";
   let wanted = null;
   let ends = [];
+  let diagram = null;
+  let direction = "LR";
   let shownAt = 0;
 
   const current = () => picture;
   const selection = createSelection({ panel, about, neighbors, close }, current, () => viewport, {
-    articleOf: (key) => articleOf(app, key, things[key], live),
+    articleOf: describe,
     changed: remember,
   });
   const search = createSearch({ input, output }, current, {
     detailsOf: (key) => `${JSON.stringify(things[key]?.details ?? "")} ${live.nodes[things[key]?.node]?.state ?? ""}`.toLowerCase(),
     goTo: selection.goTo,
   });
+
+  function describe(key) {
+    article?.end();
+    article = things[key] ? createArticle(app, key, things[key]) : null;
+    article?.update(live);
+    return article?.element;
+  }
 
   function draw(data) {
     const parsed = new DOMParser().parseFromString(`<svg xmlns="http://www.w3.org/2000/svg">${data.svg}</svg>`, "image/svg+xml");
@@ -92,11 +102,11 @@ export function createGraphView(app) {
     const svg = s("svg", { class: "picture", viewBox: `0 0 ${data.width} ${data.height}`, role: "group", "aria-label": `${data.title}: ${data.view}` }, world);
     canvas.replaceChildren(svg);
     picture = readPicture(canvas);
-    overlay = createOverlay(picture, things);
-    overlay.show(live);
     viewport = createViewport(picture);
     viewport.fit();
+    overlay = createOverlay(picture, things);
     listenToItems(picture, selection, viewport);
+    overlay.show(live);
     filter.update(picture);
     applyTo(picture, filter.hidden());
     search.update();
@@ -107,13 +117,21 @@ export function createGraphView(app) {
     note.show(dropped);
     live = data;
     overlay?.show(live);
-    if (selection.isOpen() && wanted) about.replaceChildren(...[articleOf(app, wanted, things[wanted], live)].filter(Boolean));
+    article?.update(live);
   }
 
   function fail(error) {
     canvas.replaceChildren(empty("The graph cannot be shown.", error.message));
     picture = null;
   }
+
+  /** The bring-up and the executors are in the file of a system. */
+  function showLinks() {
+    const possible = VIEWS.filter(([id, , isDeclared]) => !isDeclared || app.hello?.file || id === view);
+    links.replaceChildren(tabs("Diagram", possible.map(([id, label]) => [id, label, pathOf("graph", "", { view: id === "nodes" ? "" : id })]), view));
+  }
+
+  addEventListener("hello", showLinks);
 
   function select(key) {
     if (!picture) return;
@@ -125,6 +143,10 @@ export function createGraphView(app) {
 
   /** Keep the selection in the address. */
   function remember(key) {
+    if (key === null) {
+      article?.end();
+      article = null;
+    }
     if (key === wanted) return;
     wanted = key;
     const name = key?.startsWith("node:") ? key.slice("node:".length) : "";
@@ -144,17 +166,32 @@ export function createGraphView(app) {
     shownAt = performance.now();
     view = next;
     wanted = key;
-    links.replaceChildren(tabs("Diagram", VIEWS.filter(([id]) => id === "nodes" || id === "connections" || app.hello?.file || id === view)
-      .map(([id, label]) => [id, label, pathOf("graph", "", { view: id === "nodes" ? "" : id })]), view));
+    showLinks();
     canvas.replaceChildren(empty("Loading the graph …"));
+    direction = directionNow();
+    diagram = app.connection.subscribe("graph", { view, direction }, draw, { onerror: fail });
     ends = [
-      app.connection.subscribe("graph", { view }, draw, { onerror: fail }),
+      diagram,
       app.connection.subscribe("graph.live", {}, receiveLive),
     ];
     document.addEventListener("keydown", onkey);
   }
 
+  /** A diagram from top to bottom is larger on a narrow screen. */
+  function directionNow() {
+    return canvas.clientWidth < canvas.clientHeight ? "TB" : "LR";
+  }
+
+  const resized = new ResizeObserver(() => {
+    if (ends.length === 0 || canvas.clientWidth === 0 || directionNow() === direction) return;
+    direction = directionNow();
+    diagram.update({ view, direction });
+  });
+  resized.observe(canvas);
+
   function hide() {
+    article?.end();
+    article = null;
     for (const subscription of ends) subscription.end();
     ends = [];
     document.removeEventListener("keydown", onkey);

@@ -2,7 +2,7 @@
 import { h } from "../dom.js";
 import { count, duration, hertz } from "../format.js";
 import { pathOf } from "../router.js";
-import { facts, stateBadge } from "../widgets/parts.js";
+import { facts, section, stateBadge } from "../widgets/parts.js";
 import { qosText } from "../widgets/qos.js";
 
 const LABELS = { rate_hz: "declared rate", timeout_ms: "timeout", qos: "QoS" };
@@ -10,28 +10,55 @@ const UNITS = { rate_hz: " Hz", timeout_ms: " ms" };
 const LEFT_OUT = ["full_name", "qos_explicit", "ports", "timers", "parameters"];
 const PAGES = { topic: "topics", service: "services", action: "actions" };
 
-export function articleOf(app, key, thing, live) {
-  if (!thing) return null;
+/** Return {element, update, end}: `update(live)` shows what is measured now. */
+export function createArticle(app, key, thing) {
   const { details, wrong, node } = thing;
-  const isEdge = !["node", "topic", "service", "action", "state"].includes(kindOf(key));
-  const current = !isEdge && kindOf(key) === "node" ? live.nodes[node] : null;
-  return h(
+  const kind = kindOf(key);
+  const isEdge = !["node", "topic", "service", "action", "state"].includes(kind);
+  const current = h("div");
+  const parameters = h("div");
+  const declared = h("div");
+  const element = h(
     "article",
     {},
     h("h2", {}, titleOf(key, details)),
-    h("p", { class: "kind" }, kindOf(key).replaceAll("_", " ")),
+    h("p", { class: "kind" }, kind.replaceAll("_", " ")),
     linksOf(key, thing, isEdge),
     wrong && h("p", { class: "problem" }, wrong),
-    current && nodeState(current),
-    isEdge && measured(live.edges[key] ?? live.topics[details.name]),
+    current,
     plainFacts(details),
     (details.ports ?? []).length > 0 && [h("h3", {}, "Ports"), details.ports.map(record)],
     (details.timers ?? []).length > 0 && [h("h3", {}, "Timers"), details.timers.map(record)],
-    Object.keys(details.parameters ?? {}).length > 0 && [
-      h("h3", {}, "Parameters"),
-      facts(Object.entries(details.parameters).map(([name, value]) => [name, written(value)])),
-    ],
+    parameters,
+    declared,
   );
+  let subscription = null;
+  if (kind === "node") {
+    subscription = app.connection.subscribe("parameters", { node }, (data) => parameters.replaceChildren(...parameterList(data.parameters)));
+    app.connection.request("node", { node }).then(
+      ({ source }) => source?.text && declared.replaceChildren(sourceOf(source)),
+      () => {}, // Not declared: there is nothing to add.
+    );
+  }
+  return {
+    element,
+    update(live) {
+      const state = kind === "node" ? live.nodes[node] : null;
+      const edge = isEdge ? live.edges[key] ?? live.topics[details.name] : null;
+      current.replaceChildren(...[state && nodeState(state), edge && measured(edge)].filter(Boolean));
+    },
+    end: () => subscription?.end(),
+  };
+}
+
+function parameterList(parameters) {
+  if (parameters.length === 0) return [];
+  return [h("h3", {}, "Parameters"), facts(parameters.map(({ name, value, unit }) => [name, `${written(value)}${unit ? ` ${unit}` : ""}`]))];
+}
+
+/** The lines of YAML that declare a node. */
+export function sourceOf({ file, line, text }) {
+  return section(`Declared at ${file}:${line}`, h("pre", { class: "source", tabindex: "0" }, text));
 }
 
 function kindOf(key) {
@@ -65,7 +92,7 @@ function nodeState(node) {
       "p",
       { class: "node-state" },
       stateBadge(node.state),
-      node.since_s ? h("span", { class: "faint" }, ` for ${duration(Date.now() / 1000 - node.since_s)}`) : null,
+      node.since_s ? h("span", { class: "muted" }, ` for ${duration(Date.now() / 1000 - node.since_s)}`) : null,
     ),
     node.last_error && h("p", { class: "problem" }, h("strong", {}, "Last error: "), node.last_error),
     node.held_down && h("p", { class: "note" }, node.held_down),
@@ -77,7 +104,6 @@ function nodeState(node) {
 }
 
 function measured(edge) {
-  if (!edge) return null;
   return facts([
     ["measured rate", hertz(edge.rate_hz)],
     ["dropped", edge.dropped_total === undefined ? null : `${count(edge.dropped_total)} messages`],

@@ -16,7 +16,7 @@ export function createLogView(app) {
   const node = searchField("Node", (text) => typed("node", text));
   const text = searchField("Search texts ( / )", (words) => typed("text", words));
   const pause = toggle("Pause", false, (on) => (on ? null : flush()));
-  const count = h("span", { class: "faint" });
+  const count = h("span", { class: "muted" });
   const drops = dropNote();
   const list = h("ol", { class: "log", tabindex: "0", "aria-label": "Log lines" });
   const message = h("div", {}, empty("Loading …"));

@@ -5,6 +5,7 @@ import { pathOf } from "../router.js";
 import { attempt, confirmed, toast } from "../widgets/notices.js";
 import { detailHead, facts, section, stateBadge } from "../widgets/parts.js";
 import { qosText } from "../widgets/qos.js";
+import { sourceOf } from "./graph_details.js";
 
 const TRANSITIONS = ["configure", "activate", "deactivate", "cleanup", "shutdown"];
 const VIEWS = { publisher: "topics", subscription: "topics", service: "services", client: "services", "action server": "actions", "action client": "actions" };
@@ -68,7 +69,7 @@ export function createNodeDetail(app) {
       "p",
       { class: "node-state" },
       stateBadge(node.state),
-      node.since_s ? h("span", { class: "faint" }, ` for ${duration(Date.now() / 1000 - node.since_s)}`) : null,
+      node.since_s ? h("span", { class: "muted" }, ` for ${duration(Date.now() / 1000 - node.since_s)}`) : null,
       node.desired && node.desired !== node.state ? h("span", { class: "desired" }, ` should be ${node.desired}`) : null,
     ));
     showActions(node);
@@ -155,9 +156,12 @@ export function createNodeDetail(app) {
         qos ? h("span", { class: "qos" }, qosText(qos)) : null,
       );
       const { source } = found;
+      const tools = found.endpoints.filter((end) => end.for_tools);
+      const own = found.endpoints.filter((end) => !end.for_tools);
       declared.replaceChildren(
-        found.endpoints?.length ? section("Ports", h("ul", { class: "endpoints" }, found.endpoints.map(endpoint))) : "",
-        source?.text ? section(`Declared at ${source.file}:${source.line}`, h("pre", { class: "source", tabindex: "0" }, source.text)) : "",
+        own.length > 0 ? section("Ports", h("ul", { class: "endpoints" }, own.map(endpoint))) : "",
+        tools.length > 0 ? h("details", { class: "block" }, h("summary", { class: "plain" }, `${tools.length} ports for tools`), h("ul", { class: "endpoints" }, tools.map(endpoint))) : "",
+        source?.text ? sourceOf(source) : "",
       );
     } catch (error) {
       if (node === name) declared.replaceChildren(h("p", { class: "hint" }, error.message));

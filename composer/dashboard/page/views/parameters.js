@@ -174,7 +174,7 @@ function createLine(app, node, first) {
       parameter = now;
       if (!isEdited) editor.set(now.value);
       const range = rangeOf(now);
-      setText(hint, [range !== now.unit ? range : "", now.step ? `steps of ${now.step}` : "", now.read_only ? "read-only" : "", now.description, now.constraints].filter(Boolean).join(" · "));
+      setText(hint, [range !== now.unit ? range : "", now.step ? `steps of ${now.step}` : "", now.read_only ? "read-only" : "", now.description?.replace(` [${now.unit}]`, ""), now.constraints].filter(Boolean).join(" · "));
       const differs = now.declared !== null && now.declared !== undefined && JSON.stringify(now.declared) !== JSON.stringify(now.value);
       setText(declared, differs ? `declared ${textOf(now.declared)}${now.declared_at ? ` at ${now.declared_at}` : ""}` : "");
     },
@@ -215,18 +215,22 @@ function createEditor(parameter, isFixed, edited) {
 
 function sliderOf({ name, type, minimum, maximum, step }, isFixed, onmove, edited) {
   if (typeof minimum !== "number" || typeof maximum !== "number") return null;
-  const fine = type === "integer" ? 1 : Number(((maximum - minimum) / 200).toPrecision(1));
   const slider = h("input", {
     type: "range",
     min: minimum,
     max: maximum,
-    step: step || fine,
+    step: step || (type === "integer" ? 1 : "any"),
     disabled: isFixed,
     "aria-label": `${name}, as a slider`,
-    oninput: () => onmove(Number(slider.value)),
+    oninput: () => onmove(rounded(Number(slider.value))),
     onchange: () => edited(true),
   });
   return slider;
+}
+
+/** A slider has fewer positions than digits. */
+function rounded(value) {
+  return Number(value.toPrecision(3));
 }
 
 /** The type is checked here, the range by the node: it says why it refuses a value. */

@@ -30,7 +30,7 @@ export function createPlan(app) {
         h("td", { class: "number" }, String(step.number)),
         h("th", { scope: "row" }, h("a", { href: pathOf("nodes", step.node) }, step.node)),
         h("td", {}, step.transition),
-        h("td", { class: "wrap" }, step.cause, step.after?.length ? h("span", { class: "faint" }, ` after step ${step.after.join(", ")}`) : null),
+        h("td", { class: "wrap" }, step.cause, step.after?.length ? h("span", { class: "muted" }, ` after step ${step.after.join(", ")}`) : null),
       ))),
     ));
   }

@@ -101,7 +101,7 @@ export function createServicesView(app) {
     const timeout = h("input", { type: "number", min: "0.1", max: String(LONGEST_S), step: "any", value: String(TIMEOUT_S), class: "narrow", "aria-label": "Timeout in s" });
     const response = h("div", { role: "status", "aria-live": "polite" });
     const call = button("Call", () => attempt(call, run), { class: "primary", type: "submit" });
-    const form = createForm(fields, { label: `Request for ${entry.name}`, submit: call, beside: [h("span", { class: "faint" }, "Timeout"), timeout, "s"] });
+    const form = createForm(fields, { label: `Request for ${entry.name}`, submit: call, beside: [h("span", { class: "muted" }, "Timeout"), timeout, "s"] });
     form.element.addEventListener("submit", (event) => event.preventDefault());
 
     async function run() {

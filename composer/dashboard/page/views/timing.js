@@ -82,7 +82,7 @@ export function createTimingView(app) {
         h("h3", {}, chain.chain),
         h("div", { class: "budget", "aria-hidden": "true" }, at(chain.p99_ms, "p99"), at(chain.mean_ms, "mean"), at(chain.latency_ms, "limit")),
         h("p", {}, `mean ${milliseconds(chain.mean_ms)} · p99 ${milliseconds(chain.p99_ms)} · max ${milliseconds(chain.longest_ms)} · budget ${milliseconds(chain.latency_ms)}`),
-        h("p", { class: isLate ? "problem" : "faint" }, `${count(chain.late)} of ${count(chain.count)} over the budget`),
+        h("p", { class: isLate ? "problem" : "muted" }, `${count(chain.late)} of ${count(chain.count)} over the budget`),
       );
     }));
   }

@@ -33,7 +33,7 @@ export function createHistogram() {
         s("title", {}, `up to ${milliseconds(edge)}: ${count(calls)} calls`),
       );
     });
-    const label = (edge, anchor) => s("text", { x: x(edge), y: HEIGHT - 6, "text-anchor": anchor }, milliseconds(edge));
+    const label = (edge, anchor) => s("text", { class: anchor, x: x(edge), y: HEIGHT - 6 }, milliseconds(edge));
     const middle = Math.sqrt(least * most);
     element.replaceChildren(
       s(

@@ -4,7 +4,7 @@
  * A series is {topic, field}; its points come from the channel `plot`.
  */
 import { button, h } from "../dom.js";
-import { number } from "../format.js";
+import { number, timeOfDay } from "../format.js";
 import uPlot from "../vendor/uplot/uPlot.esm.js";
 import { dropNote, toggle } from "./parts.js";
 
@@ -143,7 +143,10 @@ export function createPlot(connection, { onremove }) {
       height: HEIGHT,
       legend: { show: false },
       cursor: { drag: { x: true, y: false } },
-      axes: [axis, { ...axis, size: 64 }],
+      axes: [
+        { ...axis, values: (_, splits) => splits.map((time) => timeOfDay(time).slice(0, -4)), space: 80 },
+        { ...axis, size: 64 },
+      ],
       series: [
         {},
         ...series.map((one, index) => ({

@@ -17,7 +17,7 @@ export function createTable({ label, columns, keyOf, hrefOf, sortBy = null, noth
   const element = h("div", { class: "scroll", tabindex: "-1" }, table, message);
   const known = new Map();
   let rows = null;
-  let sort = { id: sortBy, direction: "ascending" };
+  let sort = { id: sortBy, direction: firstDirection(columns.find(({ id }) => id === sortBy)) };
   let selected = "";
 
   function headerCell(column) {
@@ -25,7 +25,7 @@ export function createTable({ label, columns, keyOf, hrefOf, sortBy = null, noth
     cell.append(
       button(column.label, () => {
         const isSame = sort.id === column.id;
-        const first = column.number ? "descending" : "ascending";
+        const first = firstDirection(column);
         const other = first === "ascending" ? "descending" : "ascending";
         sort = { id: column.id, direction: isSame && sort.direction === first ? other : first };
         show();
@@ -131,6 +131,11 @@ export function createTable({ label, columns, keyOf, hrefOf, sortBy = null, noth
         .map((line) => line.dataset.key);
     },
   };
+}
+
+/** Numbers are most interesting where they are large. */
+function firstDirection(column) {
+  return column?.number ? "descending" : "ascending";
 }
 
 function classOf({ number, level = 1 }) {

@@ -1,0 +1,252 @@
+"""The page in a real browser, against a running system and a hand-written node."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from rclpy.qos import qos_profile_sensor_data
+from std_msgs.msg import Int32
+
+from tests.ros.support.commands import output_of
+from tests.ros.support.dashboard import Dashboard
+from tests.ros.support.in_process import Peer, wait_until
+from tests.ros.support.pages import opened
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Locator, Page
+
+pytestmark = pytest.mark.browser
+PLANNER = "/planning/planner"
+VIEWS = ("graph", "nodes", "topics", "services", "parameters", "log", "timing")
+DETAILS = (
+    f"nodes{PLANNER}",
+    f"graph{PLANNER}",
+    "topics/sensor_data",
+    "topics/lab/in?tab=publish",
+    f"parameters{PLANNER}",
+    "services/plan_trajectory",
+    "actions/lab/navigate",
+)
+#: What a view shows once its data has arrived.
+READY = ".data tbody tr:visible, .world, .log li, .detail:visible .detail-head"
+AXE = Path(__file__).parents[2] / "browser" / "node_modules" / "axe-core" / "axe.min.js"
+
+
+@pytest.fixture
+def view(browser: Browser, server: Dashboard) -> Iterator[Page]:
+    with opened(browser, server.address) as page:
+        yield page
+
+
+def node(name: str) -> str:
+    return f'.world [data-key="node:{name}"]'
+
+
+def detail(page: Page) -> Locator:
+    return page.locator("aside.detail:visible")
+
+
+def expect_text(place: Locator, pattern: str) -> None:
+    place.filter(has_text=re.compile(pattern)).first.wait_for()
+
+
+def test_the_graph_shows_states_rates_and_details(view: Page) -> None:
+    expect_text(view.locator(f'{node(PLANNER)}[data-state="active"]'), "planner")
+    expect_text(view.locator(".world [data-label]"), r"(29|30)\.?\d* Hz")
+    expect_text(view.locator(node("/lab/talker")), "no lifecycle|talker")
+    view.click(node(PLANNER))
+    for expected in (
+        "best effort",
+        "nav_msgs/msg/Odometry",
+        "max_velocity",
+        "1 m/s",
+        "pipeline.yaml:10",
+        "restarts",
+    ):
+        expect_text(detail(view), re.escape(expected))
+    assert view.url.endswith("/graph/planning/planner")
+    view.keyboard.press("Escape")
+    detail(view).wait_for(state="hidden")
+    view.keyboard.press("/")
+    view.keyboard.type("motor_commands")
+    expect_text(view.locator(".matches"), r"\d+ found")
+    view.keyboard.press("Enter")
+    expect_text(detail(view), "/motor_commands")
+
+
+def test_every_view_has_an_address_and_a_key(view: Page) -> None:
+    for number, name in enumerate(VIEWS, 1):
+        view.keyboard.press(str(number))
+        view.wait_for_url(f"**/{name}")
+        assert view.locator(f'#rail a[href="/{name}"]').get_attribute("aria-current") == "page"
+    view.goto("/nodes?show=plan")
+    expect_text(view.locator("tbody tr"), "planner.*configure")
+    view.go_back()
+    view.wait_for_url("**/timing")
+    expect_text(view.locator("tbody tr"), "timer control")
+    view.click("tbody a:has-text('timer control')")
+    view.locator(".histogram rect").first.wait_for()
+    expect_text(view.locator(".facts:visible"), r"p99[\d.]+ (ms|µs)")
+    view.goto("/graph?view=lifecycle")
+    expect_text(view.locator(".world"), "configure")
+
+
+def test_a_node_is_deactivated_and_activated_by_click(view: Page) -> None:
+    view.goto(f"/nodes{PLANNER}")
+    view.click("button[data-transition=deactivate]")
+    expect_text(detail(view).locator(".state"), "inactive")
+    assert "inactive" in output_of("lifecycle", "get", PLANNER)
+    view.click("button[data-transition=activate]")
+    expect_text(detail(view).locator(".state"), "^active")
+    assert "inactive" not in output_of("lifecycle", "get", PLANNER)
+    view.click("#bar [data-command=pause]")
+    expect_text(view.locator(".activity"), "paused · 0 of 3 active")
+    view.click("#bar [data-command=resume]")
+    expect_text(view.locator(".activity"), "running · 3 of 3 active")
+
+
+def test_a_parameter_is_changed_and_refused(view: Page) -> None:
+    view.goto(f"/parameters{PLANNER}")
+    line = view.locator("[data-name=max_velocity]")
+    line.locator("input[type=text]").fill("1.5")
+    view.keyboard.press("Enter")
+    expect_text(line.locator(".outcome"), "Set")
+    assert "1.5" in output_of("param", "get", PLANNER, "max_velocity")
+    line.locator("input[type=text]").fill("50")
+    view.keyboard.press("Enter")
+    expect_text(line.locator(".outcome[data-tone=bad]"), "at most 5|between|range|maximum")
+    assert "1.5" in output_of("param", "get", PLANNER, "max_velocity")
+    line.locator("input[type=text]").fill("fast")
+    view.keyboard.press("Enter")
+    expect_text(line.locator(".outcome"), "a number is expected")
+    view.keyboard.press("Escape")
+    assert line.locator("input[type=text]").input_value() == "1.5"
+    line.locator("input[type=range]").fill("1")
+    expect_text(line.locator(".outcome"), "Set")
+
+
+def test_plotted_values_are_those_published(view: Page, peer: Peer) -> None:
+    published: list[int] = []
+    peer.node.create_subscription(
+        Int32, "/lab/count", lambda message: published.append(message.data), qos_profile_sensor_data
+    )
+    wait_until(lambda: published)
+    view.goto("/topics/lab/count")
+    value = view.locator(".message [data-path=data] .value")
+    value.wait_for()
+    assert int(value.inner_text()) in range(published[0], published[-1] + 100)
+    view.click("button[aria-label='Plot data']")
+    view.wait_for_url("**tab=plot**")
+    expect_text(view.locator(".legend output"), r"^\d+$")
+    first = int(view.inner_text(".legend output"))
+    wait_until(lambda: int(view.inner_text(".legend output")) > first + 50)
+    assert view.locator(".plot canvas").is_visible()
+    view.click(".plot-panel >> text=Pause")
+    with view.expect_download() as download:
+        view.click("text=Export CSV")
+    head, *rows = csv.reader(io.StringIO(download.value.path().read_text(encoding="utf-8")))
+    assert head == ["time_s", "/lab/count:data"]
+    plotted = [int(row[1]) for row in rows]
+    wait_until(lambda: published[-1] >= plotted[-1])
+    assert len(plotted) > 50
+    start = published.index(plotted[0])
+    assert plotted == published[start : start + len(plotted)]
+
+
+def test_a_message_is_published_from_a_form(view: Page) -> None:
+    view.goto("/topics/lab/in?tab=publish")
+    view.get_by_label("data").fill("hello <b>you</b>")
+    view.click("form >> text=Publish")
+    expect_text(view.locator(".toast"), "to 1 subscription")
+    view.goto("/topics/lab/received")
+    expect_text(view.locator(".message"), "hello <b>you</b>")
+
+
+def test_a_service_is_called(view: Page) -> None:
+    view.goto("/services")
+    view.click("tbody a:has-text('/plan_trajectory')")
+    view.locator("fieldset", has_text="goal").get_by_label("x").fill("1")
+    view.get_by_label("max_velocity").fill("0.5")
+    view.click("form >> text=Call")
+    expect_text(detail(view), r"Response after [\d.]+ ms")
+    expect_text(detail(view).locator(".message"), "trajectory|path|points|success")
+    view.goto("/services/lab/add")
+    view.get_by_label("data").check()
+    view.click("form >> text=Call")
+    expect_text(detail(view).locator(".message"), "switched")
+
+
+def test_a_goal_is_sent_followed_and_canceled(view: Page) -> None:
+    view.goto("/actions/lab/navigate")
+    view.get_by_label("max_velocity").fill("-1")
+    view.click("text=Send goal")
+    goal = view.locator(".goal").first
+    expect_text(goal.locator("[data-path=progress_percent]"), r"progress_percent[1-9]")
+    assert goal.locator("progress").get_attribute("value") is not None
+    view.click("#rail a[href='/log']")
+    view.go_back()
+    goal.locator("text=Cancel").click()
+    expect_text(goal.locator(".goal-status"), "canceled")
+    expect_text(goal, "stopped")
+    view.get_by_label("max_velocity").fill("0")
+    view.click("text=Send goal")
+    expect_text(view.locator(".goal").first, "reject|refused")
+
+
+def test_the_log_is_filtered_and_leads_to_nodes(view: Page) -> None:
+    view.goto("/log")
+    expect_text(view.locator(".log li"), "driving to")
+    view.get_by_label("Node").fill("planner")
+    view.wait_for_url("**node=planner**")
+    expect_text(view.locator(".empty:visible"), "No log lines")
+    view.get_by_label("Node").fill("motor")
+    expect_text(view.locator(".log li"), "driving to")
+    view.click(".log li a >> nth=0")
+    view.wait_for_url("**/nodes/control/motor_controller")
+
+
+def visit(page: Page, path: str) -> None:
+    """Go to a view as a link does, without loading the page again, and wait for its data."""
+    page.evaluate("path => history.pushState(null, '', path)", path)
+    page.evaluate("dispatchEvent(new PopStateEvent('popstate'))")
+    page.locator(READY).first.wait_for()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_view_has_a_serious_accessibility_violation(
+    scheme: str, browser: Browser, server: Dashboard
+) -> None:
+    if not AXE.exists():
+        pytest.skip("axe-core is not installed: npm ci --prefix tests/browser")
+    with opened(browser, server.address, color_scheme=scheme) as page:
+        page.evaluate(AXE.read_text(encoding="utf-8"))
+        for path in (*VIEWS, *DETAILS):
+            visit(page, f"/{path}")
+            found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
+            serious = [
+                (path, violation["id"], [item["html"] for item in violation["nodes"]][:3])
+                for violation in found["violations"]
+                if violation["impact"] in ("serious", "critical")
+            ]
+            assert serious == []
+
+
+@pytest.mark.parametrize("width", [360, 768])
+def test_no_view_is_wider_than_the_screen(width: int, browser: Browser, server: Dashboard) -> None:
+    with opened(browser, server.address, viewport={"width": width, "height": 800}) as page:
+        for path in (*VIEWS, *DETAILS):
+            visit(page, f"/{path}")
+            assert page.evaluate("document.scrollingElement.scrollWidth") <= width
+            cut = page.evaluate(
+                """() => [...document.querySelectorAll("#bar *, #rail a, .view-head *, .toolbar *")]
+                .filter(element => element.checkVisibility({contentVisibilityAuto: true}))
+                .filter(element => element.getBoundingClientRect().right > innerWidth + 1)
+                .map(element => element.outerHTML.slice(0, 80))"""
+            )
+            assert cut == [], path

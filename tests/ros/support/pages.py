@@ -1,0 +1,42 @@
+"""Pages of the dashboard in a browser, and everything they did that they must not do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from tests.ros.support.dashboard import Address
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+PATIENCE_MS = 20_000
+
+
+@contextmanager
+def opened(browser: Browser, address: Address, **options: Any) -> Iterator[Page]:
+    """Open the page for the length of the block.
+
+    At the end, it must not have complained, nor requested anything beyond the server.
+    """
+    settings: dict[str, Any] = {"viewport": {"width": 1280, "height": 800}, **options}
+    context = browser.new_context(base_url=address.origin, **settings)
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    complaints: list[str] = []
+    requests: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    page.on("websocket", lambda socket: requests.append(socket.url))
+    try:
+        page.goto(f"{address.origin}/?token={address.token}")
+        yield page
+        assert complaints == []
+        own = (address.origin, f"ws://{address.host}/ws", f"blob:{address.origin}")
+        assert [url for url in requests if not url.startswith(own)] == []
+    finally:
+        page.screenshot(path="fail.png")
+        print("COMPL", complaints)
+        context.close()
