@@ -3,32 +3,28 @@ import { createConnection } from "./connection.js";
 import { h } from "./dom.js";
 import { createFrame } from "./frame.js";
 import { createRouter } from "./router.js";
-import { createGraphView } from "./views/graph.js";
-import { createLogView } from "./views/log.js";
-import { createNodesView } from "./views/nodes.js";
-import { createParametersView } from "./views/parameters.js";
-import { createServicesView } from "./views/services.js";
-import { createTimingView } from "./views/timing.js";
-import { createTopicsView } from "./views/topics.js";
 
-/** View -> how it is made; the address of an action is in the view of services. */
+/** View -> its module, loaded when it is first shown; actions are in the view of services. */
 const VIEWS = {
-  graph: createGraphView,
-  nodes: createNodesView,
-  topics: createTopicsView,
-  services: createServicesView,
-  actions: createServicesView,
-  parameters: createParametersView,
-  log: createLogView,
-  timing: createTimingView,
+  graph: () => import("./views/graph.js"),
+  nodes: () => import("./views/nodes.js"),
+  topics: () => import("./views/topics.js"),
+  services: () => import("./views/services.js"),
+  actions: () => import("./views/services.js"),
+  parameters: () => import("./views/parameters.js"),
+  log: () => import("./views/log.js"),
+  timing: () => import("./views/timing.js"),
 };
 /** How long a page may be hidden before it stops receiving. */
 const HIDDEN_MS = 3000;
+/** How long after the page the other views are loaded. */
+const LOAD_OTHERS_MS = 2000;
 
 function main() {
   const place = document.getElementById("main");
   const made = new Map();
   let shown = null;
+  let wanted = null;
   let hiding = 0;
 
   const app = { hello: null, nodes: null };
@@ -46,21 +42,24 @@ function main() {
   });
   frame.start(app.connection);
 
-  function show(route) {
-    const make = VIEWS[route.view];
-    if (!make) {
+  async function show(route) {
+    wanted = route;
+    const load = VIEWS[route.view];
+    if (!load) {
       leave();
       place.replaceChildren(h("p", { class: "empty" }, `There is no view '${route.view}'.`));
       return;
     }
-    if (!made.has(make)) made.set(make, make(app));
-    const view = made.get(make);
+    frame.showView(route.view === "actions" ? "services" : route.view, route.name);
+    const module = await load();
+    if (route !== wanted) return;
+    if (!made.has(module)) made.set(module, module.createView(app));
+    const view = made.get(module);
     if (view !== shown) {
       leave();
       place.replaceChildren(view.element);
       shown = view;
     }
-    frame.showView(route.view === "actions" ? "services" : route.view, route.name);
     view.show(route);
   }
 
@@ -76,6 +75,12 @@ function main() {
   });
   frame.listenToKeys((view) => router.go(`/${view}`));
   show(router.read());
+  addEventListener("load", () => setTimeout(loadOthers, LOAD_OTHERS_MS));
+}
+
+/** Other views are then shown at once. */
+function loadOthers() {
+  for (const load of Object.values(VIEWS)) load().catch(() => {});
 }
 
 main();

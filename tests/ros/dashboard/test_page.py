@@ -13,7 +13,7 @@ import pytest
 from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import Int32
 
-from tests.ros.support.commands import output_of
+from tests.ros.support.commands import hand_written, output_of
 from tests.ros.support.dashboard import Dashboard
 from tests.ros.support.in_process import Peer, wait_until
 from tests.ros.support.pages import opened
@@ -100,6 +100,8 @@ def test_every_view_has_an_address_and_a_key(view: Page) -> None:
 def test_a_node_is_deactivated_and_activated_by_click(view: Page) -> None:
     view.goto(f"/nodes{PLANNER}")
     view.click("button[data-transition=deactivate]")
+    expect_text(view.locator("dialog"), "depend on it: /control/motor_controller")
+    view.click("dialog >> text=Only this node")
     expect_text(detail(view).locator(".state"), "inactive")
     assert "inactive" in output_of("lifecycle", "get", PLANNER)
     view.click("button[data-transition=activate]")
@@ -157,6 +159,21 @@ def test_plotted_values_are_those_published(view: Page, peer: Peer) -> None:
     assert len(plotted) > 50
     start = published.index(plotted[0])
     assert plotted == published[start : start + len(plotted)]
+
+
+def test_images_are_shown(view: Page) -> None:
+    with hand_written("hand_written_camera.py"):
+        view.goto("/topics/camera?tab=image")
+        expect_text(detail(view), r"640 × 480 rgb8")
+        drawn = view.evaluate(
+            """() => {
+            const canvas = document.querySelector("canvas.image");
+            const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, 1).data;
+            return [canvas.width, pixels[3]];
+            }"""
+        )
+        assert drawn[0] >= 320
+        assert drawn[1] == 255  # opaque: something was drawn
 
 
 def test_a_message_is_published_from_a_form(view: Page) -> None:

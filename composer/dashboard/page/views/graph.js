@@ -22,7 +22,7 @@ const VIEWS = [
   ["deployment", "Executors", true],
 ];
 
-export function createGraphView(app) {
+export function createView(app) {
   const links = h("div");
   const input = searchField("Search ( / )", () => {});
   const output = h("output", { class: "matches", "aria-live": "polite" });

@@ -49,7 +49,7 @@ export function createOverlay(picture, things) {
     entry.item.element.setAttribute("aria-label", `node ${entry.item.name}, ${labelOfState(state)}`);
   }
 
-  /** Write the dropped messages beside the middle of a line; only there if there are any. */
+  /** Write the dropped messages next to the middle of a line; only there if there are any. */
   function showDrops(line, total) {
     const [path] = line.parts;
     path.classList.toggle("lossy", total > 0);

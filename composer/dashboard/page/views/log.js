@@ -10,7 +10,7 @@ const HISTORY = 500;
 const TYPING_MS = 250;
 const NEAR_END = 40;
 
-export function createLogView(app) {
+export function createView(app) {
   const level = h("select", { "aria-label": "Lowest level", onchange: () => filter("level", level.value) },
     LEVELS.map((name) => h("option", { value: name }, name === "fatal" ? "fatal" : `${name} and above`)));
   const node = searchField("Node", (text) => typed("node", text));

@@ -2,12 +2,13 @@
 import { button, empty, h } from "../dom.js";
 import { count, duration, hertz, milliseconds, percent } from "../format.js";
 import { pathOf } from "../router.js";
-import { attempt, confirmed, toast } from "../widgets/notices.js";
+import { asked, attempt, confirmed, toast } from "../widgets/notices.js";
 import { detailHead, facts, section, stateBadge } from "../widgets/parts.js";
 import { qosText } from "../widgets/qos.js";
 import { sourceOf } from "./graph_details.js";
 
 const TRANSITIONS = ["configure", "activate", "deactivate", "cleanup", "shutdown"];
+const LOWERING = ["deactivate", "cleanup", "shutdown"];
 const VIEWS = { publisher: "topics", subscription: "topics", service: "services", client: "services", "action server": "actions", "action client": "actions" };
 
 export function createNodeDetail(app) {
@@ -113,12 +114,36 @@ export function createNodeDetail(app) {
     const node = name;
     const text = `${label[0].toUpperCase()}${label.slice(1)}`;
     const pressed = button(text, () => attempt(pressed, async () => {
-      const question = `${text} ${node}?`;
-      if (isFinal && !(await confirmed(question, { verb: text, hint: "A node that is shut down cannot be used again." }))) return;
-      const { outcomes } = await app.connection.request(op, { node, ...args });
+      const dependents = LOWERING.includes(label) ? activeDependents(node) : [];
+      const answer = await answerTo(`${text} ${node}?`, text, dependents, isFinal);
+      if (answer === null) return;
+      const extra = answer === "all" ? { dependents: true } : {};
+      const { outcomes } = await app.connection.request(op, { node, ...args, ...extra });
       toast((outcomes ?? []).map(({ node: moved, before, after }) => `${moved}: ${before} → ${after}`).join("\n") || `${text}: done`);
     }), { data: { transition: label } });
     return pressed;
+  }
+
+  async function answerTo(question, text, dependents, isFinal) {
+    const final = isFinal ? "A node that is shut down cannot be used again." : "";
+    if (dependents.length > 0) {
+      const hint = [`Active nodes depend on it: ${dependents.join(", ")}.`, final].filter(Boolean).join(" ");
+      return asked(question, { hint, answers: [["Only this node", "one"], ["With dependents", "all"]] });
+    }
+    if (!isFinal || (await confirmed(question, { verb: text, hint: final }))) return "one";
+    return null;
+  }
+
+  /** The active nodes that wait for this one, directly or through others. */
+  function activeDependents(node) {
+    const found = new Set([node]);
+    for (const known of found) {
+      for (const other of app.nodes.nodes) {
+        if (other.state === "active" && known in (other.depends_on ?? {})) found.add(other.name);
+      }
+    }
+    found.delete(node);
+    return [...found];
   }
 
   function showTiming({ systems }) {

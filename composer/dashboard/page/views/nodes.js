@@ -34,7 +34,7 @@ function since(node) {
   return node.since_s ? duration(Date.now() / 1000 - node.since_s) : "–";
 }
 
-export function createNodesView(app) {
+export function createView(app) {
   let searched = "";
   let name = "";
   const table = createTable({

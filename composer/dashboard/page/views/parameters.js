@@ -8,7 +8,7 @@ import { createTable } from "../widgets/table.js";
 
 const LISTS = /_array$/;
 
-export function createParametersView(app) {
+export function createView(app) {
   const table = createTable({
     label: "Nodes",
     columns: [

@@ -22,7 +22,7 @@ export function createPublish(app, topic) {
     const rate = h("input", { type: "number", min: "0.1", max: "100", step: "any", value: "1", class: "narrow", "aria-label": "Rate in Hz" });
     const once = button("Publish", () => attempt(once, publishOnce), { class: "primary", type: "submit" });
     const repeat = button("Repeat", () => (repeating ? stop() : start()));
-    const form = createForm(fields, { label: `Message for ${topic.name}`, submit: once, beside: [rate, "Hz", repeat] });
+    const form = createForm(fields, { label: `Message for ${topic.name}`, submit: once, extras: [rate, "Hz", repeat] });
     form.element.addEventListener("submit", (event) => event.preventDefault());
     element.replaceChildren(form.element, h("p", { class: "line" }, status));
 

@@ -18,7 +18,7 @@ const COLUMNS = [
   { id: "servers", label: "Server", level: 3, text: ({ servers }) => servers.join(", ") || "none", tone: ({ servers }) => (servers.length === 0 ? "warn" : "") },
 ];
 
-export function createServicesView(app) {
+export function createView(app) {
   const table = createTable({
     label: "Services and actions",
     columns: COLUMNS,
@@ -33,7 +33,7 @@ export function createServicesView(app) {
       "div",
       { class: "toolbar" },
       searchField("Search services and actions ( / )", (text) => { searched = text; update(); }),
-      toggle("Hidden", false, (on) => { withHidden = on; subscription?.update({ hidden: on }); }, { title: "Show services of parameters, lifecycles and tools" }),
+      toggle("Show hidden", false, (on) => { withHidden = on; subscription?.update({ hidden: on }); }, { title: "Show services of parameters, lifecycles and tools" }),
     ),
     list: table.element,
     detail,
@@ -101,7 +101,7 @@ export function createServicesView(app) {
     const timeout = h("input", { type: "number", min: "0.1", max: String(LONGEST_S), step: "any", value: String(TIMEOUT_S), class: "narrow", "aria-label": "Timeout in s" });
     const response = h("div", { role: "status", "aria-live": "polite" });
     const call = button("Call", () => attempt(call, run), { class: "primary", type: "submit" });
-    const form = createForm(fields, { label: `Request for ${entry.name}`, submit: call, beside: [h("span", { class: "muted" }, "Timeout"), timeout, "s"] });
+    const form = createForm(fields, { label: `Request for ${entry.name}`, submit: call, extras: [h("span", { class: "muted" }, "Timeout"), timeout, "s"] });
     form.element.addEventListener("submit", (event) => event.preventDefault());
 
     async function run() {

@@ -22,7 +22,7 @@ const COLUMNS = [
   { id: "dropped", label: "Dropped", number: true, level: 3, value: ({ dropped }) => dropped, text: ({ dropped }) => count(dropped), tone: ({ dropped }) => (dropped > 0 ? "warn" : "") },
 ];
 
-export function createTimingView(app) {
+export function createView(app) {
   const common = { columns: COLUMNS, keyOf, hrefOf: (row) => pathOf("timing", "", { show: tab === "callbacks" ? "" : tab, of: keyOf(row) }) };
   const tables = {
     callbacks: createTable({ ...common, label: "Callbacks", sortBy: "p99", nothing: () => nothing("callbacks") }),

@@ -14,7 +14,7 @@ const MOST_MEASURED = 40;
 const MEASURE_AGAIN_MS = 1000;
 const MOST_SERIES = 16;
 
-export function createTopicsView(app) {
+export function createView(app) {
   const figures = new Map();
   const figure = (topic, name) => figures.get(topic.name)?.[name];
   const columns = [
@@ -40,7 +40,7 @@ export function createTopicsView(app) {
       "div",
       { class: "toolbar" },
       searchField("Search topics and types ( / )", (text) => { searched = text; update(); }),
-      toggle("Hidden", false, (on) => { withHidden = on; measure(true); }, { title: "Show topics of services, actions and tools" }),
+      toggle("Show hidden", false, (on) => { withHidden = on; measure(true); }, { title: "Show topics of services, actions and tools" }),
     ),
     list: table.element,
     detail,

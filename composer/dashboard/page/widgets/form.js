@@ -16,7 +16,7 @@ const LIMITS = {
   uint32: [0, 4_294_967_295],
 };
 
-export function createForm(fields, { label, submit, beside = [] }) {
+export function createForm(fields, { label, submit, extras = [] }) {
   const parts = fields.map((field) => [field.name, editorOf(field)]);
   const form = h(
     "form",
@@ -24,7 +24,7 @@ export function createForm(fields, { label, submit, beside = [] }) {
     parts.length > 0
       ? parts.map(([, part]) => part.element)
       : h("p", { class: "hint" }, "This type has no fields."),
-    h("div", { class: "actions" }, beside, submit),
+    h("div", { class: "actions" }, extras, submit),
   );
   return {
     element: form,

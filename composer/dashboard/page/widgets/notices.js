@@ -27,26 +27,36 @@ export async function attempt(pressed, action) {
   }
 }
 
-/** Ask before an action that cannot be undone; return whether to do it. */
-export function confirmed(question, { verb, hint = "" }) {
+/**
+ * Ask before an action; return the chosen value, or null.
+ *
+ * `answers` are [label, value], the last one the most far-reaching.
+ */
+export function asked(question, { hint = "", answers }) {
   return new Promise((resolve) => {
     const dialog = h(
       "dialog",
-      { "aria-label": question, onclose: () => finish(dialog.returnValue === "yes") },
+      { "aria-label": question, onclose: () => finish() },
       h("p", {}, question),
       hint && h("p", { class: "hint" }, hint),
       h(
         "div",
         { class: "actions" },
-        button("Cancel", () => dialog.close("no")),
-        button(verb, () => dialog.close("yes"), { class: "danger" }),
+        button("Cancel", () => dialog.close("")),
+        answers.map(([label, value], index) =>
+          button(label, () => dialog.close(value), { class: index === answers.length - 1 ? "danger" : null })),
       ),
     );
-    function finish(answer) {
+    function finish() {
       dialog.remove();
-      resolve(answer);
+      resolve(dialog.returnValue || null);
     }
     document.body.append(dialog);
     dialog.showModal();
   });
+}
+
+/** Ask before an action that cannot be undone; return whether to do it. */
+export async function confirmed(question, { verb, hint = "" }) {
+  return (await asked(question, { hint, answers: [[verb, "yes"]] })) === "yes";
 }

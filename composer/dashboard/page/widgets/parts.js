@@ -8,19 +8,19 @@ export function stateBadge(state) {
   return h("span", { class: "state", data: { state: kindOfState(state) } }, shape, labelOfState(state));
 }
 
-/** A list with details beside it; on a narrow screen one of them at a time. */
+/** A list with details next to it; on a narrow screen one of them at a time. */
 export function split({ toolbar, list, detail }) {
   return h("div", { class: "split" }, h("div", { class: "list" }, toolbar, list), detail);
 }
 
-/** The head of details: back to the list, a title that can be copied, and what belongs beside it. */
-export function detailHead(title, backTo, ...beside) {
+/** The head of details: back to the list, a title that can be copied, and what belongs next to it. */
+export function detailHead(title, backTo, ...extras) {
   return h(
     "header",
     { class: "detail-head" },
     h("a", { class: "back", href: backTo, "aria-label": "Back to the list" }, icon("back")),
     h("h2", {}, title),
-    beside,
+    extras,
   );
 }
 
