@@ -25,6 +25,7 @@ T = TypeVar("T")
 #: After the last browser has left, as one that loads the page again comes back at once.
 LINGER_S = 3.0
 _THREADS = 8
+_BACKGROUND_THREADS = 2
 #: Requests that run or wait for a thread; more are refused.
 _MAX_REQUESTS = 32
 _JOINED_WITHIN_S = 20.0
@@ -59,6 +60,8 @@ class RosSide:
         self._side: RosGraphSide | None = None
         self._joined = threading.Event()
         self._pool = ThreadPoolExecutor(_THREADS, thread_name_prefix="request")
+        # Apart from requests, which may take all of their threads for minutes.
+        self._background = ThreadPoolExecutor(_BACKGROUND_THREADS, thread_name_prefix="work")
         self._requests = 0
         self._is_open = True
         self.state, self.message = "left", ""
@@ -84,7 +87,8 @@ class RosSide:
             self._is_open = False
             thread = self._thread
         self._feeds.stop()
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        for pool in (self._pool, self._background):
+            pool.shutdown(wait=False, cancel_futures=True)
         if thread is not None:
             thread.join(within_s)
 
@@ -115,7 +119,7 @@ class RosSide:
 
     def _work(self, function: Callable[[], None]) -> None:
         with suppress(RuntimeError):  # the dashboard ends
-            self._pool.submit(_logged, function)
+            self._background.submit(_logged, function)
 
     def _is_needed(self) -> bool:
         """Return whether to stay in the ROS graph; if not, the next browser makes it join again."""

@@ -26,6 +26,7 @@ _MAX_MEASURED = 60
 _MANAGER = "manager"
 #: While the graph changes, and until a picture is ready.
 _SOON_S = 0.1
+_MAX_PICTURES = 4
 
 
 class PictureFeed(Feed):
@@ -64,17 +65,22 @@ class PictureFeed(Feed):
             yield item
         observed = self._ros.observed
         self.period_s = _SOON_S if self._is_drawing or observed.is_new else 1.0
-        if self._is_drawing:
+        if self._is_drawing or (self._is_live and observed.waits_for_reports):
             return
         topology = observed.topology()
         states = observed.states() if self._is_live else {}
         #: Nodes with a state have one more line.
         wanted = (topology.revision if self._is_live else 0, frozenset(states))
-        if wanted != self._drawn:
-            self._drawn = wanted
-            self._is_drawing = True
-            self.period_s = _SOON_S
-            self._ros.work(lambda: self._draw(topology, states))
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
+        known = observed.pictures.get((wanted, self._view, self._direction, self._is_live))
+        if known is not None:
+            yield Update(known)
+            return
+        self._is_drawing = True
+        self.period_s = _SOON_S
+        self._ros.work(lambda: self._draw(topology, states))
 
     def _draw(self, topology: Topology, states: Mapping[str, str | None]) -> None:
         from composer.dashboard.pictures import declared_scene, live_scene, picture
@@ -87,11 +93,20 @@ class PictureFeed(Feed):
             else:
                 scene = live_scene(topology.snapshot(states))
             data = picture(scene, View(self._view), Direction(self._direction))
-            self._finished.append(Update(to_json({"revision": topology.revision, **data})))
+            text = to_json({"revision": topology.revision, **data})
+            self._keep((self._drawn, self._view, self._direction, self._is_live), text)
+            self._finished.append(Update(text))
         except Exception as error:  # reported by the next poll
             self._finished.append(error)
         finally:
             self._is_drawing = False
+
+    def _keep(self, key: object, text: str) -> None:
+        """Keep a diagram for the next page that shows it."""
+        pictures = self._ros.observed.pictures
+        pictures[key] = text
+        while len(pictures) > _MAX_PICTURES:
+            pictures.pop(next(iter(pictures)), None)
 
 
 class LiveFeed(Feed):

@@ -21,6 +21,7 @@ from composer.remote.snapshot import endpoints
 from composer.remote.system_reports import SystemReport
 from composer.remote.systems import Systems
 from composer.runtime.process.instance_lock import local_systems
+from composer.runtime.ros.graph import SETTLE_S
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import Work
@@ -30,7 +31,8 @@ _PERIOD_S = 1.0
 #: Nodes are discovered one after the other at first.
 _NEW_PERIOD_S = 0.2
 _NEW_S = 4.0
-_FIRST_WITHIN_S = 0.8
+_FIRST_WITHIN_S = 1.0
+_FIRST_REPORTS_WITHIN_S = 1.5
 _FIRST_POLL_S = 0.03
 #: Endpoints are queried when names have changed, else less often: they take at most this share of
 #: a processor.
@@ -104,6 +106,8 @@ class Observed:
         self.log = LogLines(session)
         self._states = _States(session, work)
         self._topology = Topology(0, {}, {})
+        #: The last diagrams, by what they depend on.
+        self.pictures: dict[object, str] = {}
         self._names: object = None
         self._names_due_s = 0.0
         self._endpoints_due_s = 0.0
@@ -148,9 +152,22 @@ class Observed:
         """Whether the session has just begun, so that nodes are still being discovered."""
         return time.monotonic() < self._joined_s + _NEW_S
 
+    @property
+    def waits_for_reports(self) -> bool:
+        """Whether systems have not reported the states of their nodes yet, but soon may."""
+        is_early = time.monotonic() < self._joined_s + _FIRST_REPORTS_WITHIN_S
+        return is_early and any(report is None for report in self.reports.current().values())
+
     def _wait_for_nodes(self) -> None:
+        """Wait until the nodes of this computer are known, and their topics change no more."""
         end_s = self._joined_s + _FIRST_WITHIN_S
-        while not self._session.is_local_discovered() and time.monotonic() < end_s:
+        last, since_s = -1, 0.0
+        while (now_s := time.monotonic()) < end_s:
+            count = len(self._session.graph.topics())
+            if count != last:
+                last, since_s = count, now_s
+            if now_s >= since_s + SETTLE_S and self._session.is_local_discovered():
+                return
             time.sleep(_FIRST_POLL_S)
 
     def known(self) -> Topology:
