@@ -7,14 +7,13 @@ import os
 import select
 import signal
 import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 
 from composer.cli.support.errors import CommandError
-from composer.cli.support.process import is_in_background
+from composer.cli.support.process import compose_command, is_in_background
 from composer.cli.support.terminal import say
 
 #: Holds the file descriptor on which a dashboard reports its address to ``compose run``.
@@ -45,8 +44,7 @@ class DashboardProcess:
         self._reading, writing = os.pipe()
         try:
             self._process = subprocess.Popen(  # noqa: S603 - this very program
-                # -P: do not import modules from the current folder
-                [sys.executable, "-P", "-m", "composer", "dashboard", *arguments],
+                [*compose_command(), "dashboard", *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 env={**os.environ, _VARIABLE: str(writing)},
