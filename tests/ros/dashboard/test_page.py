@@ -164,7 +164,7 @@ def test_plotted_values_are_those_published(view: Page, peer: Peer) -> None:
 def test_images_are_shown(view: Page) -> None:
     with hand_written("hand_written_camera.py"):
         view.goto("/topics/camera?tab=image")
-        expect_text(detail(view), r"640 × 480 rgb8")
+        expect_text(detail(view), r"640 . 480 rgb8")
         drawn = view.evaluate(
             """() => {
             const canvas = document.querySelector("canvas.image");
