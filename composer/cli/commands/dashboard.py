@@ -38,7 +38,6 @@ EPILOGS = {
         "compose dashboard --open                     open the browser",
         "compose dashboard --read-only                change nothing",
         "compose dashboard --host 0.0.0.0 --token-file token    for other computers",
-        "compose run pipeline --dashboard             start it with a system",
     )
 }
 _HIGHEST_PORT = 65535
