@@ -13,6 +13,7 @@ from composer.field_types import (
     ANYTHING,
     INTEGER,
     NUMBER,
+    STATUS,
     STRING,
     FieldChecker,
     Problem,
@@ -21,7 +22,8 @@ from composer.field_types import (
     type_of,
 )
 from composer.interfaces import Action, Message, Service
-from composer.model import Event, Node, Port, Reaction
+from composer.model import Event, Node, Parameter, Port, Reaction
+from composer.tree import Plain
 
 
 class _NameTypes(dict[str, ValueType]):
@@ -64,13 +66,20 @@ def _problems(context: Context) -> Iterator[Problem]:
 
 def _node_names(node: Node) -> _NameTypes:
     parameters = _NameTypes(
-        {item.name.value: parameter_type(item.type.value) for item in node.parameters}
+        {
+            item.name.value: parameter_type(item.type.value, _choices(item))
+            for item in node.parameters
+        }
     )
     state = _NameTypes({name.value: type_of(value) for name, value in node.state})
     types: dict[str, ValueType] = dict.fromkeys(COMMON_NAMES, ANYTHING)
     types |= {"parameters": parameters, "state": state}
     types |= {"count": INTEGER, "now": NUMBER, "node": STRING}
     return _NameTypes(types)
+
+
+def _choices(parameter: Parameter) -> tuple[Plain, ...]:
+    return () if parameter.choices is None else parameter.choices.value
 
 
 def _scope(context: Context, names: _NameTypes, event: Event, port: Port | None) -> _NameTypes:
@@ -82,7 +91,9 @@ def _scope(context: Context, names: _NameTypes, event: Event, port: Port | None)
 
 
 def _type_of_name(name: str, definition: Message | Service | Action | None) -> ValueType:
-    if name in {"status", "failure"}:
+    if name == "status":
+        return STATUS
+    if name == "failure":
         return STRING
     if isinstance(definition, Message):
         return definition

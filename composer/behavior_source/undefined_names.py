@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import ast
 import builtins
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field
 
 from composer.behavior_source.traversal import children, walk
@@ -74,6 +75,9 @@ def _evaluated(
             outside: list[ast.AST] = [*node.args.defaults, *filter(None, node.args.kw_defaults)]
             outside += getattr(node, "decorator_list", [])
             body = node.body if isinstance(node.body, list) else [node.body]
+            for name in _only_changed(node, body):
+                known = set().union(*(scope.names for scope in visible))
+                yield name, (_Scope(known - {name.id}),)
             inside = (*visible, _Scope({*_arguments(node.args), *_defined(body), *_types(node)}))
             yield from ((item, scopes) for item in outside)
             yield from ((item, inside) for item in body)
@@ -145,6 +149,26 @@ def _defined(body: Iterable[ast.AST]) -> Iterator[str]:
             yield from (part.target.id for part in inner)
         elif not isinstance(node, ast.Lambda):
             pending.extend(children(node))
+
+
+def _only_changed(node: ast.AST, body: Sequence[ast.AST]) -> Iterator[ast.Name]:
+    """Yield the names of a function that it changes, as in ``count += 1``, but never sets.
+
+    They are local to it, so the names around it do not count.
+    """
+    changed = [
+        inner.target
+        for inner in walk(body, closed=(*_DEFINITIONS, ast.Lambda))
+        if isinstance(inner, ast.AugAssign) and isinstance(inner.target, ast.Name)
+    ]
+    if not changed:
+        return
+    bound = Counter(_defined(body))
+    arguments = {item.arg for item in walk([node]) if isinstance(item, ast.arg)}
+    times = Counter(target.id for target in changed)
+    for target in changed:
+        if bound[target.id] == times[target.id] and target.id not in arguments:
+            yield ast.copy_location(ast.Name(f"{target.id}", ast.Load()), target)
 
 
 def _globals(nodes: Iterable[ast.AST]) -> Iterator[str]:

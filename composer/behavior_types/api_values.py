@@ -9,7 +9,7 @@ from functools import cache
 from composer import behavior
 from composer.behavior_types.api import members
 from composer.behavior_types.values import NONE, ApiMethod, ApiValue, InterfaceClass, Value
-from composer.field_types import ANYTHING, BOOL, NUMBER, STRING
+from composer.field_types import ANYTHING, BOOL, NUMBER, STATUS, STRING
 from composer.interfaces import Action, Interfaces, Message, Service
 
 _ANNOTATIONS: Mapping[str, Value] = {
@@ -53,6 +53,8 @@ def api_result(owner: ApiValue, name: str, interfaces: Interfaces) -> Value:
             return action.result
         case "Goal", "request", Action() as action:
             return action.goal
+        case "GoalResult", "status", _:
+            return STATUS
         case "Clock", "stamp", _:
             return interfaces.message(_TIME) or ANYTHING
     annotation = members(owner.class_name)[name].annotation

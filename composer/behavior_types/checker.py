@@ -16,7 +16,7 @@ from composer.behavior_types.arguments import api_signature, signature_of
 from composer.behavior_types.attributes import attribute_problem
 from composer.behavior_types.bindings import nodes_of
 from composer.behavior_types.expressions import FunctionTypes
-from composer.behavior_types.fitting import value_problem
+from composer.behavior_types.fitting import argument_problem, value_problem
 from composer.behavior_types.handlers import handler_arguments
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.operations import (
@@ -39,6 +39,7 @@ from composer.behavior_types.values import (
     Parameters,
     Pending,
     Ports,
+    Self,
     Value,
 )
 from composer.diagnostics import suggestion
@@ -238,6 +239,13 @@ class _FunctionChecker:
                 yield from self._pending(value)
             return
         owner = self.scope.type_of(target.value)
+        if isinstance(owner, Self):
+            expected = self.types.annotation(target.attr)
+            wrong = argument_problem(value, self.scope.type_of(value), expected)
+            if wrong is not None:
+                problem = f"attribute '{target.attr}': {wrong}"
+                yield CodeProblem(Kind.VALUE, problem, self._span(value))
+            return
         message = owner if isinstance(owner, Message) else None
         field = message.field(target.attr) if message is not None else None
         if field is not None:

@@ -209,7 +209,10 @@ class FunctionTypes:
                 return ApiValue(_PORT_CLASSES[kind], port) if found else ANYTHING
             case Parameters():
                 parameter = self.owner.node.parameter(name)
-                return ANYTHING if parameter is None else parameter_type(parameter.type.value)
+                if parameter is None:
+                    return ANYTHING
+                choices = parameter.choices.value if parameter.choices is not None else ()
+                return parameter_type(parameter.type.value, choices)
             case ApiValue():
                 return api_member(owner, name, self.owner.interfaces)
             case InterfaceClass(definition=definition):

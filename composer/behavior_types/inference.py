@@ -82,6 +82,13 @@ class BehaviorTypes:
             self._known[name] = self._attribute(name)
         return self._known[name]
 
+    def annotation(self, name: str) -> Value:
+        """Return the type that an annotation gives to ``self.<name>``, ANYTHING without one."""
+        for scope, binding in self._assigned.get(name, ()):
+            if binding.how is How.ANNOTATION:
+                return scope.bound(binding)
+        return ANYTHING
+
     def _attribute(self, name: str) -> Value:
         method = self.source.method(name)
         if method is not None and method.node is not None:

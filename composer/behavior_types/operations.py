@@ -26,7 +26,7 @@ from composer.behavior_types.values import (
     Ports,
     Value,
 )
-from composer.field_types import described
+from composer.field_types import Word, described
 from composer.interfaces import FieldType, Message
 
 
@@ -112,6 +112,12 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
             if isinstance(found, Message) or (is_scalar(found) and found != _TEXT):
                 message = f"{described(found)} has no length"  # type: ignore[arg-type]
                 yield CodeProblem(Kind.VALUE, message, span_of(argument, source))
+        case ast.Compare(left=left, ops=[ast.Eq() | ast.NotEq()], comparators=[right]):
+            for word, other in ((scope.type_of(left), right), (scope.type_of(right), left)):
+                constant = other.value if isinstance(other, ast.Constant) else None
+                never = word.problem(constant) if isinstance(word, Word) else None
+                if never is not None:
+                    yield CodeProblem(Kind.VALUE, never[0], span_of(other, source), never[1])
         case ast.Expr(value=value):
             yield from _unused(value, scope)
         case ast.Await(value=ast.Call(func=function)):

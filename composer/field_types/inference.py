@@ -20,6 +20,7 @@ from composer.field_types.types import (
     PathProblem,
     Scope,
     ValueType,
+    Word,
     described,
     is_array,
     is_bool,
@@ -185,7 +186,18 @@ def _comparison(node: ast.Compare, inference: Inference) -> ValueType:
             if not isinstance(operator, ast.Eq | ast.NotEq):
                 message = f"{described(left)} and {described(right)} cannot be ordered"
             _report(right_node, inference, message)
+    if isinstance(node.ops[0], ast.Eq | ast.NotEq):
+        for (_, word), (other, _) in (sides, sides[::-1]):
+            _word(word, other, inference)
     return BOOL
+
+
+def _word(type_: ValueType, other: ast.expr, inference: Inference) -> None:
+    """Check a constant that a string with few possible values is compared with."""
+    if isinstance(type_, Word) and isinstance(other, ast.Constant):
+        problem = type_.problem(other.value)
+        if problem is not None:
+            _report(other, inference, problem[0], problem[1])
 
 
 def _comparable(node: ast.expr, inference: Inference) -> ValueType:
@@ -209,6 +221,8 @@ def _membership(node: ast.Compare, inference: Inference) -> None:
         kinds = {_kind(_element_type(element, inference)) for element in container.elts}
         if _kind(item) and _kind(item) not in kinds:
             _report(node.left, inference, f"{described(item)} is never in this list")
+        for element in container.elts:
+            _word(item, element, inference)
         return
     found = _infer(container, inference)
     if found is ANYTHING or is_string(found) or is_array(found):

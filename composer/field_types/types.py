@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import takewhile
 from typing import TypeAlias
 
-from composer.diagnostics import suggestion
+from composer.diagnostics import shown, suggestion
 from composer.expressions import map_key
 from composer.fast_dataclass import dataclass
 from composer.interfaces import (
@@ -31,6 +31,23 @@ BOOL = FieldType("bool")
 INTEGER = FieldType("int64")
 NUMBER = FieldType("float64")
 STRING = FieldType("string")
+
+
+@dataclass(frozen=True, slots=True)
+class Word(FieldType):
+    """A string that is one of a few ``words``."""
+
+    words: tuple[str, ...] = ()
+
+    def problem(self, text: object) -> tuple[str, str | None] | None:
+        """Return why the value is never equal to ``text``, and a hint; None if it may be."""
+        if not isinstance(text, str) or text in self.words:
+            return None
+        return f"the value is never '{shown(text)}'", suggestion(text, self.words)
+
+
+#: How an action ends.
+STATUS = Word("string", words=("succeeded", "canceled", "aborted"))
 
 ValueType: TypeAlias = "FieldType | Message | Mapping[str, ValueType] | Anything"
 Scope: TypeAlias = Mapping[str, ValueType]
@@ -73,8 +90,10 @@ class PathProblem:
     hint: str | None = None
 
 
-def parameter_type(declared: str) -> ValueType:
-    """Return the type of a parameter declared as ``declared``."""
+def parameter_type(declared: str, choices: Iterable[Plain] = ()) -> ValueType:
+    """Return the type of a parameter declared as ``declared``, one of ``choices`` if given."""
+    if declared == "string" and choices:
+        return Word("string", words=tuple(str(choice) for choice in choices))
     return _PARAMETER_TYPES.get(declared, ANYTHING)
 
 

@@ -73,20 +73,25 @@ def _number(constant: Constant, field: str, message: Message) -> Iterator[Diagno
     listed = ", ".join(names[:_SHOWN]) + (", ..." if len(names) > _SHOWN else "")
     yield Diagnostic(
         RULE,
-        f"{message.name} has no constant {field.upper()}_* with the value {value}",
+        f"{message.name} has no constant for '{field}' with the value {value}",
         constant.span,
         hint=f"valid here: {listed}",
     )
 
 
 def _enumerators(message: Message, field: str) -> Mapping[str, int]:
-    """Return the constants that are named after the field: STATUS_IDLE for ``status``."""
+    """Return the constants that are named after the field: STATUS_IDLE for ``status``.
+
+    Without any, they are all constants of the message if only this field has their type.
+    """
     prefix = f"{field.upper()}_"
-    return {
-        constant.name: constant.value
-        for constant in message.constants
-        if constant.name.startswith(prefix) and isinstance(constant.value, int)
-    }
+    numbers = [item for item in message.constants if isinstance(item.value, int)]
+    found = [item for item in numbers if item.name.startswith(prefix)]
+    types = {item.type for item in message.constants}
+    alike = [item.name for item in message.fields if item.type in types]
+    if not found and len(numbers) > 1 and len(types) == 1 and alike == [field]:
+        found = numbers
+    return {item.name: item.value for item in found if isinstance(item.value, int)}
 
 
 def _is_combination(value: int, known: set[int]) -> bool:
