@@ -20,7 +20,7 @@ from composer.interfaces.sources import (
     find_packages,
     installed_prefixes,
 )
-from composer.source import shown_path
+from composer.source import SourceFile, Span, shown_path
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +31,15 @@ class InvalidDefinition:
     path: str
     line: int
     message: str
+    text: str = ""
+
+    @property
+    def span(self) -> Span:
+        """The line that is wrong."""
+        source = SourceFile(shown_path(Path(self.path)), self.text)
+        line = source.line(self.line)
+        content = line.strip()
+        return Span(source, self.line, line.find(content) + 1, max(len(content), 1))
 
     def __str__(self) -> str:
         return f"the definition of '{self.name}' cannot be read: {self.message}"
@@ -145,6 +154,7 @@ class Interfaces:
 
     def _look_up(self, name: str) -> Interface | InvalidDefinition | None:
         if name not in self._found:
+            self._found[name] = None  # in case it contains itself
             self._found[name] = self._read(name)
         return self._found[name]
 
@@ -166,17 +176,25 @@ class Interfaces:
     ) -> InvalidDefinition | None:
         """Return an error if a field of a project's interface has a type that does not exist.
 
-        Types of unknown packages are not errors: their definitions may be installed elsewhere.
+        So is one in the definition of that type. Types of unknown packages are not errors: their
+        definitions may be installed elsewhere.
         """
         if isinstance(interface, InvalidDefinition) or not self._is_of_project(interface.name):
             return None
         for field in (field for part in parts(interface).values() for field in part.fields):
-            if field.type.is_primitive or self._may_exist(field.type.name):
+            if field.type.is_primitive:
+                continue
+            if self._may_exist(field.type.name):
+                nested = self.problem(field.type.name)
+                if nested is not None:
+                    return nested
                 continue
             written = re.search(rf"(?m)^.*\s{re.escape(field.name)}\b", definition.text)
             line = definition.text.count("\n", 0, written.start()) + 1 if written else 1
             message = f"field '{field.name}' has the unknown type '{shown(field.type.name)}'"
-            return InvalidDefinition(interface.name, definition.path, line, message)
+            return InvalidDefinition(
+                interface.name, definition.path, line, message, definition.text
+            )
         return None
 
     def _may_exist(self, name: str) -> bool:
@@ -193,7 +211,7 @@ def _parse(name: str, definition: Definition) -> Interface | InvalidDefinition:
             return read_description(name, definition.text)
         return parse_definition(name, definition.text)
     except DefinitionError as error:
-        return InvalidDefinition(name, definition.path, error.line, error.message)
+        return InvalidDefinition(name, definition.path, error.line, error.message, definition.text)
     except ValueError as error:
         return InvalidDefinition(name, definition.path, 1, str(error))
 

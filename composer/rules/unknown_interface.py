@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.interfaces import InvalidDefinition
 from composer.interfaces.index import similar_interface
 from composer.model import Port
 
@@ -44,7 +45,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 continue
             problem = context.interfaces.problem(name.value)
             if problem is not None:
-                yield Diagnostic(RULE, str(problem), name.span, hint=f"see {problem.place}")
+                yield _invalid(context, port, problem)
                 continue
             key = (name.value, port.kind.channel.interface_folder)
             if key not in hints:
@@ -55,6 +56,15 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 name.span,
                 hint=hints[key],
             )
+
+
+def _invalid(context: Context, port: Port, problem: InvalidDefinition) -> Diagnostic:
+    """Report an error in a definition: in its file, if that is one of the project."""
+    used = port.interface.span
+    if context.interfaces.source_folder(problem.name) is None or not problem.path:
+        return Diagnostic(RULE, str(problem), used, hint=f"see {problem.place}")
+    label = Label(used, f"'{port.name}' has this type")
+    return Diagnostic(RULE, str(problem), problem.span, (label,))
 
 
 def _word(port: Port) -> str:

@@ -6,15 +6,15 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.references import matched_ports, own_name
-from composer.diagnostics import Diagnostic, Rule, Severity, register
-from composer.model import Node, Remapping
+from composer.diagnostics import Diagnostic, Rule, Severity, register, shown
+from composer.model import Node, Port, Remapping
 
 RULE = register(
     Rule(
         code="RC241",
         name="unused-remapping",
         severity=Severity.WARNING,
-        summary="A remapping has no effect, because a connection renames the port.",
+        summary="A remapping, or the name of a port, has no effect because of a connection.",
         why=(
             "The name in a connection takes precedence over a remapping, so the port does not "
             "have the name that the remapping suggests."
@@ -49,6 +49,25 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for node in context.system.nodes:
         for remapping in node.remappings:
             yield from _remapping(node, remapping)
+        for port in node.ports if not node.remappings else ():
+            yield from _port(node, port)
+
+
+def _port(node: Node, port: Port) -> Iterator[Diagnostic]:
+    """Report the name of a port of an inline node that its connection, too, gives a name."""
+    name = port.ros_name
+    is_inline = name.span.file == node.name.span.file and name.span != port.name.span
+    if not is_inline or is_unresolved(name.value) or is_unresolved(port.full_name):
+        return
+    if own_name(node, name.value) != port.full_name:
+        word = port.kind.channel.value
+        yield Diagnostic(
+            RULE,
+            f"{word} '{shown(name.value)}' has no effect: the connection gives "
+            f"'{node.name}.{port.name}' the name '{port.full_name}'",
+            name.span,
+            hint=f"remove '{word}' here, or the port from the connection",
+        )
 
 
 def _remapping(node: Node, remapping: Remapping) -> Iterator[Diagnostic]:

@@ -242,6 +242,7 @@ def test_packages_that_are_not_on_pypi_are_known_without_ros(name: str) -> None:
         ({"msg_Demo": "# a\nbool on\nOthr other\n"}, "field 'other' has the unknown type", 3),
         ({"msg_Demo": "std_msgs/Heder header\n"}, "field 'header' has the unknown type", 1),
         ({"msg_Demo": "bool on\nint33 x\n"}, "'int33' is neither a primitive type", 2),
+        ({"msg_Demo": "Other other\n", "msg_Other": "Demo demo\n"}, None, 0),
         ({"msg_Demo": "bool on\nOther other\n", "msg_Other": ""}, None, 0),
         ({"msg_Demo": "elsewhere_msgs/Other other\n"}, None, 0),
     ],
@@ -257,6 +258,14 @@ def test_wrong_types_of_fields_are_found(
     if problem is not None and message is not None:
         assert problem.message.startswith(message)
         assert problem.place.endswith(f"demo/msg/Demo.msg:{line}")
+
+
+def test_an_error_in_the_type_of_a_field_is_found_where_it_is(tmp_path: Path) -> None:
+    package(tmp_path / "demo", "demo_msgs", msg_Demo="Other other", msg_Other="bool on\nint33 x")
+    problem = Interfaces.load([tmp_path]).problem("demo_msgs/msg/Demo")
+    assert problem is not None
+    assert problem.place.endswith("demo/msg/Other.msg:2")
+    assert (problem.span.line, problem.span.column, problem.span.length) == (2, 1, 7)
 
 
 @pytest.mark.parametrize(

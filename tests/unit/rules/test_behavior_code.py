@@ -22,6 +22,7 @@ nodes:
     parameters:
       speed: {type: double, default: 1.0}
       names: {type: string_array, default: [a]}
+      mode: {type: string, default: fast, choices: [slow, fast]}
       wheel.radius: {type: double, default: 0.1}
     publishers:
       text: {type: std_msgs/msg/String, qos: command, external: true}
@@ -228,6 +229,12 @@ MISTAKES = [
     ("odometry", "self.paths = {}\nfor p in self.paths.value():\n    p", "unknown-attribute",
      "value", None),
     ("odometry", "self.declared", "unknown-attribute", "declared", None),
+    ("odometry", "self.point = [1.0, 2.0]", "invalid-value", "[1.0, 2.0]", None),
+    ("odometry", "if self.parameters.mode == 'fsat':\n    pass", "invalid-value", "'fsat'", "'fast'"),
+    ("configure", "sent = await self.action_clients.turn.send_goal(Navigate.Goal())\n"
+     "ended = await sent.result()\nif ended.status == 'success':\n    pass", "invalid-value",
+     "'success'", None),
+    ("odometry", "total += 1", "undefined-name", "total", None),
     # calls
     ("odometry", "self.scale()", "call-arguments", "self.scale", None),
     ("odometry", "self.scale(1.0, 'a', 2)", "call-arguments", "2", None),
@@ -307,6 +314,8 @@ RIGHT = [
     ("odometry", "'%s and %d' % (self.count, 5)\n'a' * 3\n[0] * 3"),
     ("odometry", "Mode.FAST.name, Mode['FAST'].value, Mode.parse('a')"),
     ("odometry", "Statistics().scores.append(1.0)\nself.statistics.mean() * 2"),
+    ("odometry", "total = 1\ntotal += 1"),
+    ("odometry", "if self.parameters.mode == 'slow' or self.parameters.mode != 'fast':\n    pass"),
     ("odometry", "self.statistics.extra = 1\nself.statistics.extra"),
     ("odometry", "Point(x=self.parameters.speed, y=float('1'))"),
     ("odometry", "message.__class__.__name__"),
