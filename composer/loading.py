@@ -26,6 +26,7 @@ from composer.node_types import NodeTypes, interface_folders
 from composer.project import SETTINGS_FILE, Project
 from composer.project.rule_selection import apply_rule_settings, check_rule_settings
 from composer.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
+from composer.resolve.parameter_files.rules import PARAMETER_SUBSTITUTION
 from composer.rules import Context, all_checks, run_checks
 from composer.rules.unused_ignore import without_ignored
 from composer.rules.unused_node_type import unused_node_types
@@ -201,7 +202,11 @@ def _run_pipeline(
 
     # Rules: check the model.
     if system is not None:
-        errors = tuple(item.primary for item in diagnostics if item.severity is Severity.ERROR)
+        errors = tuple(
+            item.primary
+            for item in diagnostics
+            if item.severity is Severity.ERROR or item.rule is PARAMETER_SUBSTITUTION
+        )
         context = Context(
             system,
             definitions.interfaces,
@@ -324,9 +329,17 @@ def _identity(diagnostic: Diagnostic) -> _Identity:
     return (diagnostic.rule.code, str(diagnostic.primary))
 
 
+def _lacks_node_types(result: LoadResult) -> bool:
+    """Return whether a system may use node types that are not in its model."""
+    rules = {diagnostic.rule.name for diagnostic in result.diagnostics}
+    return result.system is None or not rules.isdisjoint(("unknown-node-type", "unknown-base"))
+
+
 def project_diagnostics(results: Collection[LoadResult]) -> list[Diagnostic]:
     """Return the diagnostics that need several files, such as unused node types."""
     systems = [result.system for result in results if result.system is not None]
+    if any(_lacks_node_types(result) for result in results):
+        return []
     settings = {result.source.path: result.project.settings for result in results}
     diagnostics: list[Diagnostic] = []
     for diagnostic in unused_node_types(systems):

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
-from composer.analysis.behaviors import distinct_behaviors, handlers
+from composer.analysis.behaviors import GENERAL_HANDLERS, distinct_behaviors, handlers
 from composer.analysis.context import Context
 from composer.behavior_source import BehaviorSource, Function, Module
 from composer.behavior_source.receivers import lacks_self
@@ -85,6 +85,10 @@ def _missing_arguments(node: Node, source: BehaviorSource) -> Iterator[str]:
         method = source.method(handler.name)
         if method is not None and not method.accepts(len(handler.arguments)):
             yield from handler.arguments
+    for name, arguments in GENERAL_HANDLERS.items():
+        method = source.method(name)
+        if method is not None and not method.accepts(len(arguments)):
+            yield from arguments
 
 
 def _lacking_self(module: Module) -> Iterator[Function]:

@@ -59,15 +59,19 @@ class IncludeResolver:
         expanded, found = expand(tree, arguments)
         if self._stack:
             self.limits.add(measure(expanded).values, self._stack[-1].span)
+        found += check_schema(expanded, SYSTEM)
         self.diagnostics += found
-        self.diagnostics += check_schema(expanded, SYSTEM)
         includes = expanded.get(INCLUDE)
+        if any(_is_in_section(item.primary, INCLUDE, expanded) for item in found):
+            self.is_partial = True
         parts = [
             part
             for item in (includes.items if isinstance(includes, Sequence) else ())
             if (part := self._part(item, file)) is not None
         ]
-        return self._expand_wildcards(join_parts(expanded, parts, self.diagnostics))
+        # The copies of an include with an error may have the same names because of it.
+        conflicts: list[Diagnostic] = [] if self.is_partial else self.diagnostics
+        return self._expand_wildcards(join_parts(expanded, parts, conflicts))
 
     def _part(self, item: Tree, includer: SystemFile) -> Part | None:
         include = read_include(item, self.diagnostics)
@@ -153,3 +157,14 @@ def _cycle(frames: list[_Frame]) -> Diagnostic:
 def system_file(tree: Mapping, source: SourceFile, folder: Path) -> SystemFile:
     """Return the file of the including system."""
     return SystemFile(folder / Path(source.path).name, source, tree)
+
+
+def _is_in_section(span: Span, name: str, tree: Mapping) -> bool:
+    """Return whether a span is in the section ``name`` of a file."""
+    starts = sorted(entry.key.span.line for entry in tree if entry.key.span.file == span.file)
+    section = tree.entry(name)
+    if section is None or section.key.span.file != span.file:
+        return False
+    start = section.key.span.line
+    end = next((line for line in starts if line > start), span.line + 1)
+    return start <= span.line < end

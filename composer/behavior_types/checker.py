@@ -56,13 +56,22 @@ _OF_AWAITABLES = frozenset({"add_done_callback", "cancel", "close", "done", "exc
 def behavior_problems(
     node: Node, source: BehaviorSource, interfaces: Interfaces
 ) -> Iterator[CodeProblem]:
-    """Yield the problems in the behavior of a node, in methods of its own project."""
+    """Yield the problems in the behavior of a node, in methods of its own project.
+
+    A missing attribute is reported once, where it is first used.
+    """
     types = BehaviorTypes(node, source, interfaces)
+    missing: set[str] = set()
     for checker in _checkers(types, source):
         try:
-            yield from list(checker.problems())
+            problems = list(checker.problems())
         except RecursionError:  # too deeply nested to be checked
             continue
+        for problem in problems:
+            if problem.kind is not Kind.ATTRIBUTE or problem.message not in missing:
+                yield problem
+            if problem.kind is Kind.ATTRIBUTE:
+                missing.add(problem.message)
 
 
 def _checkers(types: BehaviorTypes, source: BehaviorSource) -> Iterator[_FunctionChecker]:
@@ -96,8 +105,11 @@ class _FunctionChecker:
 
     def problems(self) -> Iterator[CodeProblem]:
         """Yield the problems of the function."""
-        yield from self._annotations()
-        yield from self._returned()
+        wrong = next(self._annotations(), None)
+        if wrong is not None:
+            yield wrong
+        else:
+            yield from self._returned()
         for annotation in annotations_of(self.function):
             for node in ast.walk(annotation):
                 if isinstance(node, ast.Attribute):

@@ -6,7 +6,17 @@ from collections.abc import Iterable
 from typing import TypeVar
 
 from composer.fast_dataclass import dataclass
-from composer.model import Chain, ChannelKind, Connection, Delivery, Endpoint, Isolation, Port, Qos
+from composer.model import (
+    Chain,
+    ChannelKind,
+    Connection,
+    Delivery,
+    Endpoint,
+    Isolation,
+    Port,
+    PortKind,
+    Qos,
+)
 from composer.names import join
 from composer.resolve.qos import QosTable, implicit_qos
 from composer.resolve.tree_values import choice, entries, is_opaque, key, number, text, texts
@@ -30,6 +40,7 @@ class PortConnection:
     qos: Qos | None
     delivery: Delivery | None = None
     isolation: Isolation | None = None
+    from_source: bool | None = None  # of a topic: whether the port is listed in 'from'
 
 
 PortConnections = dict[tuple[str, str], list[PortConnection]]
@@ -46,15 +57,18 @@ def read_connections(
         if connection is None:
             continue
         declared.append(connection)
-        port_connection = PortConnection(
+        given = (
             connection.kind,
             full_name(connection.name.value, namespace),
             _profile(item, connection.kind, qos),
             connection.delivery.value if connection.delivery else None,
             connection.isolation.value if connection.isolation else None,
         )
-        for end in (*connection.sources, *connection.sinks):
-            port_connections.setdefault((end.node, end.port), []).append(port_connection)
+        is_topic = connection.kind is ChannelKind.TOPIC
+        for is_source, ends in ((True, connection.sources), (False, connection.sinks)):
+            port_connection = PortConnection(*given, is_source if is_topic else None)
+            for end in ends:
+                port_connections.setdefault((end.node, end.port), []).append(port_connection)
     return tuple(declared), port_connections
 
 
@@ -64,9 +78,15 @@ def full_name(name: str, namespace: str) -> str:
 
 
 def connection_of(port: Port, port_connections: Iterable[PortConnection]) -> PortConnection | None:
-    """Return the first connection of the port's kind, merged with others of the same name."""
+    """Return the first connection of the port's kind, merged with others of the same name.
+
+    A publisher in 'to' is not connected, nor is a subscription in 'from'.
+    """
+    is_source = port.kind is PortKind.PUBLISHER
     matching = [
-        connection for connection in port_connections if connection.kind is port.kind.channel
+        connection
+        for connection in port_connections
+        if connection.kind is port.kind.channel and connection.from_source in (None, is_source)
     ]
     if not matching:
         return None

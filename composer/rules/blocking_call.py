@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterator
 
 from composer.analysis.behaviors import GENERAL_HANDLERS, behaviors, calls_of, handlers
@@ -82,7 +83,7 @@ def _handler(
     """Report each call once, for the first handler that reaches it."""
     method = source.method(name)
     for call in calls_of(source, method) if method is not None else ():
-        if _blocks(call) and call.span not in seen:
+        if _blocks(call) and call.span not in seen and _is_imported(source, call):
             seen.add(call.span)
             yield Diagnostic(
                 RULE,
@@ -91,6 +92,15 @@ def _handler(
                 (Label(place, "called here"),),
                 _hint(call),
             )
+
+
+def _is_imported(source: BehaviorSource, call: Call) -> bool:
+    """Return whether a name is imported; one that is not defined is reported by another rule."""
+    head = call.name.partition(".")[0]
+    if head not in sys.stdlib_module_names:
+        return True
+    imports = re.compile(rf"\b(import|from)\b.*\b{head}\b")
+    return any(imports.search(module.source.text) for module in source.own_modules)
 
 
 def _blocks(call: Call) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, nearest, register
 
 RULE = register(
     Rule(
@@ -35,8 +35,11 @@ def check(context: Context) -> Iterator[Diagnostic]:
     if context.system.node_type:
         return
     for node in context.system.nodes:
+        unknown = [item.name.value for item in node.unknown if item.section == "parameters"]
         for parameter in node.parameters:
             if parameter.value is None:
+                if nearest(parameter.name.value, unknown) is not None:
+                    continue  # it is probably set, with a misspelled name
                 yield Diagnostic(
                     RULE,
                     f"node '{node.name}' needs a value for parameter '{parameter.name}'",

@@ -75,18 +75,23 @@ def _by_profile(endpoints: Iterable[PortOfNode]) -> Groups:
 def _direction(channel: Channel, offering: Groups, requesting: Groups) -> Iterator[Diagnostic]:
     for offered, offers in offering.items():
         for requested, requests in requesting.items():
-            for problem in incompatibilities(offered, requested):
-                yield _diagnostic(channel, problem, offers, requests)
+            problems = list(incompatibilities(offered, requested))
+            if problems:
+                yield _diagnostic(channel, problems, offers, requests)
 
 
 def _diagnostic(
     channel: Channel,
-    problem: Incompatibility,
+    problems: list[Incompatibility],
     offers: list[PortOfNode],
     requests: list[PortOfNode],
 ) -> Diagnostic:
     request, offer = requests[0], offers[0]
+    problem = problems[0]
     policy = problem.policy
+    requested = " and ".join(f"{item.policy} {item.requested}" for item in problems)
+    offered = " and ".join(item.offered for item in problems)
+    hints = (f"offer {item.requested}, or request {item.offered}" for item in problems)
     labels = [
         Label(
             endpoint.port.qos.policy_span(policy),
@@ -103,9 +108,9 @@ def _diagnostic(
     ]
     return Diagnostic(
         RULE,
-        f"{request.port.kind} '{port_name(request)}' requests {policy} {problem.requested} on "
-        f"'{channel.name}', but {offer.port.kind} '{port_name(offer)}' offers {problem.offered}",
+        f"{request.port.kind} '{port_name(request)}' requests {requested} on "
+        f"'{channel.name}', but {offer.port.kind} '{port_name(offer)}' offers {offered}",
         request.port.qos.policy_span(policy),
         tuple(labels),
-        f"offer {problem.requested}, or request {problem.offered}",
+        "; ".join(hints),
     )

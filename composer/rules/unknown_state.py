@@ -9,7 +9,7 @@ from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.expressions import expression_sites
 from composer.analysis.reactions import reactions
 from composer.analysis.spans import part_of_path
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, suggestion
 from composer.model import Node
 from composer.source import Span
 
@@ -38,6 +38,10 @@ nodes:
 )
 
 
+#: Maximum number of further uses of a variable to show.
+_SHOWN = 3
+
+
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the state that reactions set and expressions read."""
     errors = context.once(earlier_errors)
@@ -45,12 +49,19 @@ def check(context: Context) -> Iterator[Diagnostic]:
         node.name.value: frozenset(name.value for name, _ in node.state)
         for node in context.system.nodes
     }
+    unknown: dict[tuple[str, str], list[Span]] = {}
+    nodes = {}
     for node, name, span in _uses(context):
         of_node = node.name.value
         if name not in known[of_node] and not errors.may_declare(of_node, "state"):
-            names = [declared.value for declared, _ in node.state]
-            hint = suggestion(name, names) or f"declare it: 'state: {{{name}: 0}}'"
-            yield Diagnostic(RULE, f"the node does not declare state '{name}'", span, hint=hint)
+            nodes[of_node] = node
+            unknown.setdefault((of_node, name), []).append(span)
+    for (of_node, name), spans in unknown.items():
+        first, *others = sorted(spans, key=lambda span: (span.file.path, span.line, span.column))
+        names = [declared.value for declared, _ in nodes[of_node].state]
+        hint = suggestion(name, names) or f"declare it: 'state: {{{name}: 0}}'"
+        labels = tuple(Label(span, "also here") for span in others[:_SHOWN])
+        yield Diagnostic(RULE, f"the node does not declare state '{name}'", first, labels, hint)
 
 
 def _uses(context: Context) -> Iterator[tuple[Node, str, Span]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Label, nearest, shown
@@ -93,11 +93,20 @@ class _MisspelledKeys:
 
     keys: set[tuple[Path, str]]
     deciding: set[Path]  # where the intended key determines which other keys are valid
+    missing: dict[Path, str]  # the one required key that is missing where one key is unknown
 
     @classmethod
-    def among(cls, errors: Iterable[_SchemaError]) -> _MisspelledKeys:
+    def among(cls, errors: Sequence[_SchemaError]) -> _MisspelledKeys:
         keys = set()
         deciding = set()
+        unknown = [item for item in errors if item.validator == "additionalProperties"]
+        single = {item.path for item in unknown if len(item.unknown) == 1}
+        missing = {
+            item.path: names[0]
+            for item in errors
+            if item.validator == "required" and item.path in single
+            if len(names := [name for name in item.required if name not in item.instance]) == 1
+        }
         for error in errors:
             if error.validator != "additionalProperties":
                 continue
@@ -105,7 +114,7 @@ class _MisspelledKeys:
             keys |= {(error.path, str(key)) for key in found}
             if error.schema.get("title") in _DECIDED and found & _DECIDING:
                 deciding.add(error.path)
-        return cls(keys, deciding)
+        return cls(keys, deciding, missing)
 
     def covers(self, error: _SchemaError) -> bool:
         """Return whether ``error`` may only follow from a misspelled key."""
@@ -157,10 +166,15 @@ def _unknown_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[
             continue
         message = f"'{shown(name)}' is not a key of {error.owner}"
         hint = advice(name, error.schema.get("title", ""), unused)
+        needed = misspelled.missing.get(error.path)
+        if needed is not None and f"'{needed}'" not in str(hint):
+            hint = f"it needs the key '{needed}'"
         yield Diagnostic(rules.UNKNOWN_KEY, message, entries[name].key.span, hint=hint)
 
 
 def _missing_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
+    if error.path in misspelled.missing:
+        return
     for name in error.required:
         if name not in error.instance and (error.path, name) not in misspelled.keys:
             message = f"{error.owner} needs the key '{name}'"

@@ -34,7 +34,7 @@ BEHAVIOR = """\
 from composer.behavior import Behavior
 class Sensor(Behavior):
     def on_tick(self):
-        self.publishers.output.publish({})
+        self.publishers.output.publish(None)
 """
 SYSTEM = """\
 system: s

@@ -230,7 +230,8 @@ MISTAKES = [
      "value", None),
     ("odometry", "self.declared", "unknown-attribute", "declared", None),
     ("odometry", "self.point = [1.0, 2.0]", "invalid-value", "[1.0, 2.0]", None),
-    ("odometry", "if self.parameters.mode == 'fsat':\n    pass", "invalid-value", "'fsat'", "'fast'"),
+    ("odometry", "if self.parameters.mode == 'fsat':\n    pass", "invalid-value", "'fsat'",
+     "'fast'"),
     ("configure", "sent = await self.action_clients.turn.send_goal(Navigate.Goal())\n"
      "ended = await sent.result()\nif ended.status == 'success':\n    pass", "invalid-value",
      "'success'", None),
