@@ -182,7 +182,7 @@ def test_an_invalid_interface_definition_is_reported_with_its_location(folder: P
         assert done.code == 1
         text = done.out + done.err
         assert "the definition of 'arm/msg/Grip' cannot be read: 'flaot64' is" in text
-        assert f"see {definition}:2" in text
+        assert f"{definition}:2" in text
 
 
 def test_a_folder_without_systems_is_a_usage_error(folder: Path) -> None:
