@@ -1,4 +1,4 @@
-"""Sends requests of a size that no tool sends to the parameter services of a node.
+"""Sends requests of a size that no tool sends to the standard services of a node.
 
 Prints ``ready``, then a line of JSON for each request: the service and what it responded. With
 ``forever`` as second argument, it starts again after the last one.
@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import rclpy
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters,
@@ -21,6 +23,7 @@ from rcl_interfaces.srv import (
     SetParameters,
     SetParametersAtomically,
 )
+from type_description_interfaces.srv import GetTypeDescription
 
 NAMES = 100_000
 PARAMETERS = 20_000
@@ -43,6 +46,9 @@ def requests() -> Iterator[tuple[Any, str, dict[str, Any]]]:
     yield SetParametersAtomically, "set_parameters_atomically", {"parameters": changes}
     for value in (array, text):
         yield SetParameters, "set_parameters", {"parameters": [Parameter(name="x", value=value)]}
+    long = "x" * DOUBLES
+    yield ChangeState, "change_state", {"transition": Transition(label=long)}
+    yield GetTypeDescription, "get_type_description", {"type_name": long, "type_hash": long}
 
 
 def outcome(response: Any) -> str:
@@ -50,6 +56,10 @@ def outcome(response: Any) -> str:
         return "; ".join(result.reason for result in response.results)
     if isinstance(response, SetParametersAtomically.Response):
         return str(response.result.reason)
+    if isinstance(response, ChangeState.Response):
+        return str(response.success)
+    if isinstance(response, GetTypeDescription.Response):
+        return str(response.failure_reason)
     if isinstance(response, ListParameters.Response):
         return str(len(response.result.names))
     return str(len(next(getattr(response, name) for name in response.get_fields_and_field_types())))
