@@ -69,7 +69,7 @@ test-fast: $(STAMPS)/composer $(STAMPS)/dev
 
 # Problems that appear only after hundreds of starts, shutdowns and transitions.
 soak: $(READY) $(STAMPS)/dev
-	@echo "==> pytest -m soak (half an hour)"
+	@echo "==> pytest -m soak (a quarter of an hour)"
 	@$(BIN)/python -m pytest --soak -m soak
 	@$(BIN)/python -m pytest --hypothesis-profile thorough --timeout 600 tests/properties
 
