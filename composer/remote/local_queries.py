@@ -6,8 +6,10 @@ graph then, which also produces the errors.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 
 from composer.fast_dataclass import dataclass
 from composer.names import is_hidden
@@ -25,9 +27,24 @@ from composer.runtime.process.query_socket import (
 )
 from composer.runtime.ros.parameter_description import ParameterDescription
 
+P = ParamSpec("P")
+T = TypeVar("T")
+
 _STATE_SERVICE, _STATE_TYPE = "/get_state", "lifecycle_msgs/srv/GetState"
 _LIST_SERVICE, _LIST_TYPE = "/list_parameters", "rcl_interfaces/srv/ListParameters"
 _MANAGER_SERVICE = "/manager/is_active"
+
+
+def _none_for_other_versions(function: Callable[P, T | None]) -> Callable[P, T | None]:
+    """Return None if an answer has another shape: the system may be of another version."""
+
+    @wraps(function)
+    def call(*arguments: P.args, **options: P.kwargs) -> T | None:
+        with suppress(ValueError, KeyError, TypeError, AttributeError):
+            return function(*arguments, **options)
+        return None
+
+    return call
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +67,7 @@ class LocalParameters:
         return tuple(self.described[name][0] for name in names)
 
 
+@_none_for_other_versions
 def local_node(name: str, timeout_s: float, *, hidden: bool) -> dict[str, Any] | None:
     """Return the endpoints of a node, by the names of the fields of NodeInfo."""
     full_name = _find(name, timeout_s)
@@ -65,6 +83,7 @@ def local_node(name: str, timeout_s: float, *, hidden: bool) -> dict[str, Any] |
     }
 
 
+@_none_for_other_versions
 def local_parameters(name: str, timeout_s: float) -> LocalParameters | None:
     """Return the parameters of a node of a system on this computer."""
     full_name = _find(name, timeout_s)
@@ -73,6 +92,7 @@ def local_parameters(name: str, timeout_s: float) -> LocalParameters | None:
     return _ask_parameters([full_name], timeout_s).get(full_name)
 
 
+@_none_for_other_versions
 def all_local_parameters(timeout_s: float, *, hidden: bool) -> list[LocalParameters] | None:
     """Return the parameters of all nodes in the graph, if systems on this computer have them all.
 
@@ -88,12 +108,14 @@ def all_local_parameters(timeout_s: float, *, hidden: bool) -> list[LocalParamet
     return [known[node] for node in sorted(known) if hidden or not is_hidden(node)]
 
 
+@_none_for_other_versions
 def local_report(name: str, timeout_s: float) -> SystemReport | None:
     """Return the report of a running system, by its full name or the last part."""
     systems = [system for system in local_systems() if f"/{system}".endswith(f"/{name}")]
     return _ask_report(systems[0], timeout_s) if len(systems) == 1 else None
 
 
+@_none_for_other_versions
 def local_reports(timeout_s: float) -> dict[str, SystemReport] | None:
     """Return the reports of all systems, if no others and no other lifecycle nodes run."""
     view = local_view(timeout_s)
@@ -112,6 +134,7 @@ def local_reports(timeout_s: float) -> dict[str, SystemReport] | None:
     return found if complete else None
 
 
+@_none_for_other_versions
 def local_states(timeout_s: float) -> dict[str, str] | None:
     """Return the state of each lifecycle node, if systems on this computer have them all."""
     reports = local_reports(timeout_s)
@@ -121,6 +144,7 @@ def local_states(timeout_s: float) -> dict[str, str] | None:
     return dict(sorted(states.items()))
 
 
+@_none_for_other_versions
 def local_state(name: str, timeout_s: float) -> str | None:
     """Return the state of a node of a system on this computer."""
     full_name = _find(name, timeout_s)
