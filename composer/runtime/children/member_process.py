@@ -250,17 +250,19 @@ class MemberProcess:
         await sleep(self._context.loop, _POLL_S)
 
     def _on_report(self, taken: tuple[Any, Any]) -> None:
-        now_s = monotonic()
+        system, *nodes = taken[0].status or [None]
+        if system is None or _values(system).get("activity") == "starting":
+            return  # it has no nodes yet, and would refuse requests
         life = self._life
         if life is None:  # started elsewhere
             if self._is_ending:
                 return
             life = self._life = _Life()
         was_silent = not life.states
-        life.reported_s = now_s
-        for status in taken[0].status[1:]:
+        life.reported_s = monotonic()
+        for status in nodes:
             name = status.name.partition(": ")[2]
-            values = {item.key: item.value for item in status.values}
+            values = _values(status)
             life.states[name] = MemberState(values.get("state", ""), values.get("held_down", ""))
         for name, reported in life.states.items():
             member = self._members.get(name)
@@ -297,6 +299,10 @@ class MemberProcess:
         if logger == _COMPOSE and level is LogLevel.INFO:
             return
         self._context.write_log(level, logger or self._process.name.value, printable(message))
+
+
+def _values(status: Any) -> dict[str, str]:
+    return {item.key: item.value for item in status.values}
 
 
 def _how(child: Child) -> str:

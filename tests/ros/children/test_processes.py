@@ -74,7 +74,11 @@ def split(folder: Path, text: str = TEXT) -> Iterator[RunningSystem]:
     path.write_text(text, encoding="utf-8")
     options = HostOptions(stop_within_s=6.0, member_command=command_of(path))
     with running(text, folder, options=options, detector=DETECTOR) as system:
-        yield system
+        try:
+            yield system
+        except AssertionError as error:
+            error.add_note("the system reported:\n" + "\n".join(map(str, system.events)))
+            raise
 
 
 def pid_of(system: RunningSystem, node: str) -> int:
@@ -200,3 +204,26 @@ def wait_for_failure(system: RunningSystem) -> NodeFailed:
     wait_until(lambda: system.reported(NodeFailed), "the failure")
     wait_until(lambda: system.node("detector").state == "inactive", "the pause")
     return system.reported(NodeFailed)[0]
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(1800)
+def test_any_process_is_killed_fifty_times(tmp_path: Path) -> None:
+    """Recovery by policy; nothing is left, and nothing runs twice."""
+    text = TEXT.replace("max_attempts: 5", "max_attempts: 1000")
+    text = text.replace("backoff_ms: 100}", "backoff_ms: 100, max_attempts: 1000}")
+    pids: set[int] = set()
+    with split(tmp_path, text) as system:
+        for round_ in range(50):
+            name = ("camera", "detector")[round_ % 2]
+            pid = pid_of(system, name)
+            pids |= {pid_of(system, "camera"), pid_of(system, "detector")}
+            os.kill(pid, signal.SIGKILL)
+            count = round_ + 1
+            wait_until(lambda n=count: len(system.reported(Restarted)) >= n, "the restart")
+            wait_until(lambda: states(system) == {"active"}, f"all nodes in round {count}")
+            running_now = {pid_of(system, "camera"), pid_of(system, "detector")}
+            pids |= running_now
+            wait_until(lambda now=running_now: set(filter(alive, pids)) == now, "no double")
+        assert system.stop().exit_code == 0
+    wait_until(lambda: not any(map(alive, pids)), "the end of the processes")
