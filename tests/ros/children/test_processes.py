@@ -101,6 +101,10 @@ def alive(pid: int) -> bool:
     return Path("/proc", str(pid)).exists()
 
 
+def all_alive(pids: set[int]) -> set[int]:
+    return set(filter(alive, pids))
+
+
 def test_up_in_order_data_flows_and_down(tmp_path: Path, peer: Peer) -> None:
     with split(tmp_path) as system:
         active = [text for text in system.states() if text.endswith(" active")]
@@ -121,7 +125,7 @@ def test_up_in_order_data_flows_and_down(tmp_path: Path, peer: Peer) -> None:
         wait_until(lambda: system.node("detector").state == "active", "the state")
         assert system.stop().exit_code == 0
         assert not system.reported(NodeFailed)
-    wait_until(lambda: not any(map(alive, pids)), "the end of the processes")
+    wait_until(lambda: not all_alive(set(pids)), "the end of the processes")
 
 
 def test_a_killed_process_is_a_failure_of_its_nodes(tmp_path: Path) -> None:
@@ -224,6 +228,6 @@ def test_any_process_is_killed_fifty_times(tmp_path: Path) -> None:
             wait_until(lambda: states(system) == {"active"}, f"all nodes in round {count}")
             running_now = {pid_of(system, "camera"), pid_of(system, "detector")}
             pids |= running_now
-            wait_until(lambda now=running_now: set(filter(alive, pids)) == now, "no double")
+            wait_until(lambda now=running_now, known=pids: all_alive(known) == now, "no double")
         assert system.stop().exit_code == 0
-    wait_until(lambda: not any(map(alive, pids)), "the end of the processes")
+    wait_until(lambda: not all_alive(pids), "the end of the processes")
