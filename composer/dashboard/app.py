@@ -41,6 +41,12 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
     """Return the application."""
     connections: set[Connection] = set()
 
+    async def index(_: HttpRequest) -> Response:
+        # A connection follows: join the ROS graph while the page is being loaded.
+        dashboard.ros.enter()
+        dashboard.ros.leave()
+        return _content("index.html")
+
     async def websocket(socket: WebSocket) -> None:
         await socket.accept()
         if len(connections) >= MAX_CONNECTIONS:
@@ -55,9 +61,9 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
             connections.discard(connection)
 
     routes = [
-        Route("/", _index),
-        *(Route(f"/{view}", _index) for view in _VIEWS),
-        *(Route(f"/{view}/{{rest:path}}", _index) for view in _VIEWS),
+        Route("/", index),
+        *(Route(f"/{view}", index) for view in _VIEWS),
+        *(Route(f"/{view}/{{rest:path}}", index) for view in _VIEWS),
         Route("/page/graph/{name}", _graph_file),
         Route("/page/{path:path}", _file),
         Route("/theme.css", _theme),
@@ -123,10 +129,6 @@ class AccessCheck:
             headers = {"Location": location, "Set-Cookie": self._access.cookie}
             return Response(status_code=303, headers=headers)
         return None
-
-
-async def _index(_: HttpRequest) -> Response:
-    return _content("index.html")
 
 
 async def _file(request: HttpRequest) -> Response:

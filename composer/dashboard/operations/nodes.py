@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
 _READ_S = 5.0
 _CHANGE_S = 20.0
+#: As long as the transitions of a node may take by default, with a margin.
+_RESTART_S = 30.0
 
 
 def node(values: Values, dashboard: Dashboard) -> Prepared:
@@ -137,21 +139,43 @@ def transition(values: Values, dashboard: Dashboard) -> Prepared:
 
 
 def restart(values: Values, dashboard: Dashboard) -> Prepared:
-    """Take a node down to unconfigured and back to active; dependents follow."""
+    """Restart a node: by the manager of its system, or else by its transitions."""
     del dashboard
     name = values.text("node")
 
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
         from composer.remote.lifecycle_batch import LifecycleBatch, LifecycleRequest
 
+        message = _restart_by_manager(ros, deadline, name)
+        if message is not None:
+            return {"outcomes": [], "message": message}
         outcomes: list[dict[str, Any]] = []
         for state in ("unconfigured", "active"):
             request = LifecycleRequest(None, state)
             batch = LifecycleBatch(ros.session, deadline, [name], request)
             outcomes += _completed(batch.run(dependents=True))
-        return {"outcomes": outcomes}
+        return {"outcomes": outcomes, "message": ""}
 
-    return run, _CHANGE_S
+    return run, _RESTART_S
+
+
+def _restart_by_manager(ros: RosGraphSide, deadline: Deadline, name: str) -> str | None:
+    """Restart a node of a system; return the message of the manager, None if it has no manager."""
+    from composer.remote.managed_nodes import find_managed_nodes
+    from composer.remote.name_matching import NotFoundError
+    from composer.remote.systems import Systems
+
+    systems = Systems(ros.session, deadline)
+    try:
+        ((system, nodes),) = find_managed_nodes(ros.session, deadline, systems, [name]).items()
+        success, message = systems.restart(system, nodes)
+    except NotFoundError:
+        return None
+    finally:
+        systems.close()
+    if not success:
+        raise RequestError("rejected", message)
+    return message
 
 
 def command(values: Values, dashboard: Dashboard) -> Prepared:

@@ -173,7 +173,8 @@ def until(condition: Callable[[], bool]) -> None:
 
 def test_nothing_happens_without_a_browser(ros_domain_id: int) -> None:
     with dashboard() as server:
-        assert get(server.address).status == 200
+        assert get(server.address, "/page/main.js").status == 200
+        assert get(server.address, Cookie="").status == 401
         threads = Path(f"/proc/{server.process.pid}/task")
         assert count_participants(ros_domain_id) == 0
         before = len(list(threads.iterdir()))
