@@ -29,7 +29,7 @@ ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION
 endif
 
-.PHONY: help run test test-fast soak check lint format generate docs bench profile fuzz dist test-wheel requirements clean
+.PHONY: help run test test-fast soak check lint format generate pictures docs bench profile fuzz dist test-wheel requirements clean
 .NOTPARALLEL:
 
 help:
@@ -41,6 +41,7 @@ help:
 	@echo "make lint          run lint, type and layer checks only"
 	@echo "make format        format the Python code"
 	@echo "make generate      write everything that is generated: schemas, reference pages, pictures"
+	@echo "make pictures      take the pictures of the dashboard in docs/pictures; needs Chromium"
 	@echo "make docs          build the documentation as a site in build/site"
 	@echo "make bench         run the benchmarks"
 	@echo "make profile       profile $(SYSTEM) for $(PROFILE_SECONDS) seconds (SYSTEM=... PROFILE_SECONDS=...)"
@@ -94,6 +95,10 @@ generate: $(READY)
 	@$(BIN)/python tools/write_language.py
 	@$(BIN)/python tools/write_rules.py
 	@$(BIN)/python tools/draw_pictures.py
+
+# Not part of generate: no two versions of Chromium draw the same pixels.
+pictures: $(READY) $(STAMPS)/dev
+	@$(BIN)/python tools/draw_dashboard.py
 
 docs: $(STAMPS)/dev
 	@$(BIN)/mkdocs build --quiet --strict

@@ -18,6 +18,7 @@ PUBLISHED = (
     ".pre-commit-hooks.yaml",
     "LICENSE",
     "README.md",
+    "THIRD_PARTY.md",
     "composer",
     "interfaces",
     "nodes",

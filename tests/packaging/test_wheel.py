@@ -23,9 +23,16 @@ def test_the_wheel_contains_all_shared_files_and_no_others(wheel: Path) -> None:
         "composer/share/systems/pipeline.yaml",
         "composer/graph/formats/html/main.js",
         "composer/graph/formats/html/page.css",
+        "composer/dashboard/page/index.html",
+        "composer/dashboard/page/views/graph.js",
+        "composer/dashboard/page/vendor/uplot/uPlot.esm.js",
     ):
         assert path in names
     assert [name for name in names if name.endswith("/licenses/LICENSE")]
+    assert [name for name in names if name.endswith("/licenses/THIRD_PARTY.md")]
+    assert [
+        name for name in names if name.endswith("vendor/uplot/LICENSE") and "/licenses/" in name
+    ]
     assert [name for name in names if "__pycache__" in name or name.startswith("tests/")] == []
 
 

@@ -1,0 +1,114 @@
+"""Take the pictures of docs/guides/dashboard.md: the real page, of a running systems/pipeline.yaml.
+
+Needs ROS, Chromium and playwright, so it is not part of ``make generate``: ``make pictures``.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from playwright.sync_api import sync_playwright
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+ROOT = Path(__file__).parents[1]
+FOLDER = ROOT / "docs" / "pictures"
+SYSTEM = "systems/pipeline.yaml"
+COMPOSE = Path(sys.executable).with_name("compose")
+_PLOTTED_S = 9.0
+_PLANNER = "/planning/planner"
+_POSITION = "/sensor_data:pose.pose.position"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A view of the page, and what must be visible before the picture is taken."""
+
+    name: str
+    path: str
+    ready: str
+    width: int = 1280
+    height: int = 720
+    dark: bool = False
+    prepare: Callable[[Page, float], None] | None = None
+
+
+def _plot(page: Page, plotted_s: float) -> None:
+    page.get_by_label("Time shown").select_option("10")
+    page.wait_for_timeout(plotted_s * 1000)
+
+
+def _refuse(page: Page, _: float) -> None:
+    page.locator("[data-name=max_velocity] input[type=text]").fill("50")
+    page.keyboard.press("Enter")
+    page.locator(".outcome[data-tone=bad]").wait_for()
+
+
+PICTURES = (
+    Picture("dashboard-graph.png", "/graph", '[data-label]:has-text("Hz")', height=440),
+    Picture("dashboard-details.png", f"/graph{_PLANNER}", ".detail .source"),
+    Picture("dashboard-nodes.png", f"/nodes{_PLANNER}", ".small", dark=True),
+    Picture(
+        "dashboard-plot.png",
+        f"/topics/sensor_data?tab=plot&series={_POSITION}.x+{_POSITION}.y",
+        ".legend",
+        prepare=_plot,
+    ),
+    Picture(
+        "dashboard-parameters.png",
+        f"/parameters{_PLANNER}",
+        ".parameter",
+        height=420,
+        prepare=_refuse,
+    ),
+    Picture("dashboard-phone.png", "/graph", '[data-label]:has-text("Hz")', width=360, height=720),
+)
+
+
+def take(browser: Browser, url: str, folder: Path, plotted_s: float = _PLOTTED_S) -> None:
+    """Write all pictures of the dashboard at ``url``, which has the token."""
+    for picture in PICTURES:
+        context = browser.new_context(
+            viewport={"width": picture.width, "height": picture.height},
+            color_scheme="dark" if picture.dark else "light",
+        )
+        page = context.new_page()
+        page.goto(url)
+        page.goto(url.partition("/?")[0] + picture.path)
+        page.locator(picture.ready).first.wait_for()
+        if picture.prepare is not None:
+            picture.prepare(page, plotted_s)
+        page.screenshot(path=folder / picture.name)
+        context.close()
+
+
+def main() -> None:
+    """Run the system and a dashboard, and take the pictures."""
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    with ExitStack() as stack:
+        for arguments in (["run", SYSTEM], ["dashboard", SYSTEM, "--port", "0"]):
+            process = subprocess.Popen(
+                [COMPOSE, *arguments], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True
+            )
+            stack.callback(process.wait, 20)
+            stack.callback(process.terminate)
+        if process.stdout is None or not (url := process.stdout.readline().strip()):
+            raise SystemExit("the dashboard did not start")
+        playwright = stack.enter_context(sync_playwright())
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        stack.callback(browser.close)
+        take(browser, url, FOLDER)
+
+
+if __name__ == "__main__":
+    main()
