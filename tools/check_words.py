@@ -29,7 +29,15 @@ SCOPE = (
         "Makefile",
     ),
 )
-EXCLUDED = ("*.json", "*.png", "*.svg", "*.xml", "*node_modules*", "LICENSE", "tools/banned_words.txt")
+EXCLUDED = (
+    "*.json",
+    "*.png",
+    "*.svg",
+    "*.xml",
+    "*node_modules*",
+    "LICENSE",
+    "tools/banned_words.txt",
+)
 
 #: Put between the words of CamelCase before the search.
 SEAM = "\0"

@@ -37,6 +37,4 @@ def opened(browser: Browser, address: Address, **options: Any) -> Iterator[Page]
         own = (address.origin, f"ws://{address.host}/ws", f"blob:{address.origin}")
         assert [url for url in requests if not url.startswith(own)] == []
     finally:
-        page.screenshot(path="fail.png")
-        print("COMPL", complaints)
         context.close()
