@@ -33,6 +33,7 @@ from composer.runtime.hosting.qos_events import PendingQosEvents
 from composer.runtime.hosting.services import ClientPort, HostedService
 from composer.runtime.hosting.subscriptions import HostedSubscription
 from composer.runtime.hosting.timers import HostedGuardCondition, HostedTimerPort
+from composer.runtime.ros.messages import load_type_support
 
 #: Arguments of ``Node.__init__`` that have no effect on a hosted node or are taken over.
 _REFUSED = {
@@ -128,6 +129,7 @@ class AdoptedNode(Node):
         **options: Any,
     ) -> Publisher:
         """Create a publisher, as rclpy."""
+        load_type_support(msg_type)
         events = PendingQosEvents(event_callbacks)
         publisher = super().create_publisher(
             msg_type,
@@ -151,6 +153,7 @@ class AdoptedNode(Node):
         **options: Any,
     ) -> Subscription:
         """Create a subscription, as rclpy."""
+        load_type_support(msg_type)
         events = PendingQosEvents(event_callbacks)
         subscription = super().create_subscription(
             msg_type,
@@ -165,15 +168,17 @@ class AdoptedNode(Node):
         )
         return subscription
 
-    def create_service(self, *arguments: Any, **options: Any) -> Service:
+    def create_service(self, srv_type: Any, *arguments: Any, **options: Any) -> Service:
         """Create a service, as rclpy."""
-        service = super().create_service(*arguments, **options)
+        load_type_support(srv_type)
+        service = super().create_service(srv_type, *arguments, **options)
         self._begin(service, lambda instance: HostedService(instance, service))
         return service
 
-    def create_client(self, *arguments: Any, **options: Any) -> Any:
+    def create_client(self, srv_type: Any, *arguments: Any, **options: Any) -> Any:
         """Create a client, as rclpy."""
-        client = super().create_client(*arguments, **options)
+        load_type_support(srv_type)
+        client = super().create_client(srv_type, *arguments, **options)
         self._begin(client, lambda instance: ClientPort(instance, client))
         return client
 

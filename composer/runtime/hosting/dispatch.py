@@ -28,6 +28,7 @@ from composer.runtime.hosting.adopted_node import (
 from composer.runtime.hosting.errors import HostingError
 from composer.runtime.hosting.instance import Instance
 from composer.runtime.hosting.user_code import current_instance, on_thread_start
+from composer.runtime.ros.messages import load_type_support
 
 _SECOND_NODE = (
     "the class creates a second node, {name}; declare it as a node of the system,"
@@ -87,6 +88,7 @@ def _install_action(kind: Any, role: PortKind) -> None:
         if not isinstance(node, AdoptedNode):
             create(self, node, action_type, name, *args, **options)
             return
+        load_type_support(action_type)
         full_name = action_name(node, role, name)
         create(self, node, action_type, full_name, *args, **options)
         node.adopt_action(self, full_name)

@@ -106,8 +106,7 @@ class HostedNode(LocalNode):
         self._instance, self._entities = instance, instance.entities
         vars(self._ros)["_composer_instance"] = instance
         self._shared = SharedState(self._ros)
-        target = node_class(self._hosted.reference)
-        await self._in_thread(instance, partial(self._construct, target, instance), "constructor")
+        await self._in_thread(instance, partial(self._construct, instance), "constructor")
         self._report_ports(instance.ports)
 
     async def _call_user(self, transition: str) -> None:
@@ -135,7 +134,8 @@ class HostedNode(LocalNode):
         if answer != TransitionCallbackReturn.SUCCESS:
             raise WrongReturn(f"{name} returned {answer!r}, not a TransitionCallbackReturn")
 
-    def _construct(self, target: Any, instance: Instance) -> None:
+    def _construct(self, instance: Instance) -> None:
+        target: Any = node_class(self._hosted.reference)
         arguments = {name.value: value for name, value in self._hosted.arguments}
         kind = adopted(target)
         node: Any = kind.__new__(kind, **arguments)

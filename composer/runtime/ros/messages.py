@@ -82,6 +82,12 @@ class MessageError(Exception):
         self.hint = hint
 
 
+def load_type_support(interface: Any) -> None:
+    """Load the type support of a message, service or action class. Thread-safe."""
+    with _LOADING:
+        check_for_type_support(interface)
+
+
 @cache
 def interface_class(name: str) -> Any:
     """Return the class of ``package/folder/Name``, ready for use on any thread.
@@ -100,8 +106,7 @@ def interface_class(name: str) -> Any:
         )
     try:
         message_class = getattr(import_module(f"{package}.{folder}"), class_name)
-        with _LOADING:
-            check_for_type_support(message_class)
+        load_type_support(message_class)
     except _NOT_INSTALLED as error:
         raise MessageError(f"interface '{name}' is not installed for Python: {error}") from error
     return message_class

@@ -151,6 +151,29 @@ def test_a_thread_that_outlives_its_instance_is_an_error(tmp_path: Path) -> None
         node_classes.Stubborn.release.set()
 
 
+def test_nodes_change_their_states_at_the_same_time(tmp_path: Path) -> None:
+    kinds = ("Talker", "Listener", "Counter", "Navigator", "Sender", "Spinner", "Matcher", "Poller")
+    entries = "".join(
+        f"\n      n{index}: {{class: '{CLASSES}:{kind}', namespace: g{index}}}"
+        for index, kind in enumerate(kinds)
+    )
+    with running(
+        f"""
+    system: crowd
+    nodes:{entries}
+    """,
+        tmp_path,
+    ) as system:
+        nodes = [system.node(f"n{index}") for index in range(len(kinds))]
+        for _ in range(5):
+            for transition in ("deactivate", "cleanup", "configure", "activate"):
+                done = [node.loop.run_task(node.lifecycle.change(transition)) for node in nodes]
+                wait_until(lambda done=done: all(future.done() for future in done), transition)
+                assert all(future.result().success for future in done)
+        assert not any(node.statistics.errors for node in nodes)
+        assert "Error" not in system.log_text()
+
+
 def test_many_lives_leave_nothing_behind(tmp_path: Path) -> None:
     text = f"""
     system: lives
