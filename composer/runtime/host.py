@@ -313,7 +313,8 @@ class Host:
 
     def _update_status(self) -> None:
         nodes = tuple(self._node_set.nodes.items())
-        self._status.measure({name: node.statistics for name, node in nodes})
+        statistics = {name: node.statistics for name, node in nodes}
+        self._status.measure(statistics, self._node_set.reported_figures())
         self._status.update_states({name: node.state for name, node in nodes})
         excess = None if self._options.process is None else memory_excess(self._options.process)
         if excess is not None and not self._main_queue.stopping:

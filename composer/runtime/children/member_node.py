@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from time import monotonic
+from typing import Any
 
 from composer.model import Node
 from composer.runtime.children.member_process import (
@@ -58,6 +60,12 @@ class MemberNode(OutsideNode):
     def pid(self) -> int | None:
         """The id of its process, if that was started here."""
         return self._process.pid
+
+    @property
+    def figures(self) -> Mapping[str, Any]:
+        """Its rates and counters, by the names of the fields of ``NodeStatus``."""
+        reported = self._process.state(self.full_name)
+        return {} if reported is None else reported.figures
 
     def destroy(self) -> None:
         """Do nothing: the node belongs to its process."""

@@ -7,7 +7,7 @@ belongs to another computer, it is awaited instead of started.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -26,6 +26,7 @@ from composer.runtime.executors.exceptions import printable
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
+from composer.runtime.metrics.numbers import finite
 from composer.runtime.node.outcome import FINALIZED
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.ros.manager_protocol import CHANGE_STATE, NAME, STATE_QOS, STATE_TOPIC
@@ -48,10 +49,14 @@ class ProcessUnavailable(Exception):
 
 @dataclass(frozen=True, slots=True)
 class MemberState:
-    """The state of a node as its process reports it, and why it is held down, if it has failed."""
+    """A node as its process reports it: its state, and why it is held down, if it has failed.
+
+    ``figures`` are rates and counters, by the names of the fields of ``NodeStatus``.
+    """
 
     state: str
     held_down: str
+    figures: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Member(Protocol):
@@ -263,7 +268,9 @@ class MemberProcess:
         for status in nodes:
             name = status.name.partition(": ")[2]
             values = _values(status)
-            life.states[name] = MemberState(values.get("state", ""), values.get("held_down", ""))
+            life.states[name] = MemberState(
+                values.get("state", ""), values.get("held_down", ""), _figures(values)
+            )
         for name, reported in life.states.items():
             member = self._members.get(name)
             if member is not None:
@@ -303,6 +310,16 @@ class MemberProcess:
 
 def _values(status: Any) -> dict[str, str]:
     return {item.key: item.value for item in status.values}
+
+
+def _figures(values: Mapping[str, str]) -> Mapping[str, Any]:
+    """Return the rates and counters in a report; none if it is not of this version."""
+    try:
+        numbers = {name: finite(values[name]) for name in ("sent_hz", "received_hz", "busy")}
+        counts = {name: int(values[name]) for name in ("errors", "overruns", "queue_drops")}
+    except (KeyError, ValueError):
+        return {}
+    return {**numbers, **counts, "slowest": values.get("slowest", "")}
 
 
 def _how(child: Child) -> str:

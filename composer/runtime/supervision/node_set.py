@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from composer.behavior import CallCancelled
 from composer.model import (
@@ -161,6 +162,11 @@ class NodeSet:
             for node in tuple(self.nodes.values())
             for callback in tuple(node.statistics.callbacks.values())
         )
+
+    def reported_figures(self) -> Mapping[str, Mapping[str, Any]]:
+        """Return the rates and counters that other processes report for their nodes."""
+        nodes = tuple(self.nodes.items())
+        return {name: node.figures for name, node in nodes if isinstance(node, MemberNode)}
 
     def summaries(self) -> tuple[NodeSummary, ...]:
         """Return the states and the counters of all nodes."""

@@ -9,7 +9,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from composer.model import PrimaryState, System
 from composer.model.dependencies import needed_states
@@ -127,6 +127,7 @@ class Status:
         self._changed: Callable[[], None] = lambda: None
         self._statistics: Mapping[str, Statistics] = {}
         self._counters: dict[str, _Counters] = {}
+        self._reported: Mapping[str, Mapping[str, Any]] = {}
         self._counters_before: dict[str, _Counters] = {}
         now_s = time.time()
         models = {node.name.value: node for node in system.nodes}
@@ -211,11 +212,19 @@ class Status:
             self._nodes[name] = replace(node, restarts=node.restarts + 1)
         self._changed()
 
-    def measure(self, statistics: Mapping[str, Statistics]) -> None:
-        """Read the counters of the nodes; rates are those between the last two calls."""
+    def measure(
+        self,
+        statistics: Mapping[str, Statistics],
+        reported: Mapping[str, Mapping[str, Any]] | None = None,
+    ) -> None:
+        """Read the counters of the nodes; rates are those between the last two calls.
+
+        ``reported`` are the figures of nodes of other processes, instead of counters.
+        """
         now_s = time.monotonic()
         with self._lock:
             self._statistics = statistics
+            self._reported = reported or {}
             self._counters_before = self._counters
             self._counters = {
                 name: _Counters(now_s, counters.sent, counters.received, counters.busy_s)
@@ -223,6 +232,8 @@ class Status:
             }
 
     def _with_counters(self, name: str, node: NodeStatus) -> NodeStatus:
+        if name in self._reported:
+            return replace(node, **self._reported[name])
         counters = self._statistics.get(name)
         if counters is None:
             return node

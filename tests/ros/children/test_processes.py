@@ -116,6 +116,9 @@ def test_up_in_order_data_flows_and_down(tmp_path: Path, peer: Peer) -> None:
         environment = Path("/proc", str(pids[0]), "environ").read_bytes()
         assert b"ROLE=sensing\0" in environment
 
+        reported = system.host._status.snapshot  # with the rates that the processes report
+        wait_until(lambda: all(node.sent_hz > 1 for node in reported().nodes[:2]), "the rates")
+
         # The nodes have their own services; what other tools do with them is followed.
         state = peer.call(GetState, "/lab/detector/get_state").current_state.label
         assert state == "active"
