@@ -35,6 +35,15 @@ class Run:
         return self.folder.name
 
     @property
+    def is_of_part(self) -> bool:
+        """Whether the run is that of a process of a system, whose log has these lines as well."""
+        try:
+            about = json.loads((self.folder / _ABOUT).read_text(encoding="utf-8"))
+            return about.get("part") is True
+        except (OSError, ValueError, AttributeError):
+            return False
+
+    @property
     def started(self) -> datetime:
         """When the run started, in the local time zone."""
         text, _, _ = self.name.rpartition("-")
@@ -60,10 +69,11 @@ class Run:
 class RunFolder:
     """The folder of a run that starts now, locked as long as the process runs."""
 
-    def __init__(self, logs: Path, system: str) -> None:
+    def __init__(self, logs: Path, system: str, *, part: bool = False) -> None:
         """Create a folder below ``logs``, and remove the oldest runs of the system.
 
-        ``system`` is the full name of the system. Raises OSError.
+        ``system`` is the full name of the system, or of a process of it if it is a ``part``. Raises
+        OSError.
         """
         parent = logs / FOLDER / _folder_name(system)
         parent.mkdir(parents=True, exist_ok=True)
@@ -72,7 +82,7 @@ class RunFolder:
         self.path.mkdir()
         # Not inherited by processes that user code forks, as a lock of flock() would be.
         self._about = (self.path / _ABOUT).open("x", encoding="utf-8")
-        about = {"system": system, "host": socket.gethostname(), "pid": os.getpid()}
+        about = {"system": system, "host": socket.gethostname(), "pid": os.getpid(), "part": part}
         self._about.write(f"{json.dumps(about)}\n")
         self._about.flush()
         with suppress(OSError):  # a file system without locks: the run does not look running
@@ -88,14 +98,16 @@ class RunFolder:
 def find_runs(logs: Path, system: str | None = None) -> list[Run]:
     """Return the runs below ``logs`` in the order of their start.
 
-    ``system`` selects those of the systems with that full name or last part.
+    ``system`` selects those of the systems with that full name or last part; by default, all but
+    those of processes that are parts of systems.
     """
     runs = []
     with suppress(OSError):
         for folder in (logs / FOLDER).iterdir():
             name = "/" + folder.name.replace(".", "/")
             if system is None or name == system or name.endswith(f"/{system}"):
-                runs += _runs_in(folder, name)
+                found = _runs_in(folder, name)
+                runs += found if system else [run for run in found if not run.is_of_part]
     return sorted(runs, key=lambda run: run.name)
 
 

@@ -331,7 +331,9 @@ def _run(system: System, plan: Plan, options: HostOptions, dashboard: list[str] 
 
     with ExitStack() as stack:
         stack.enter_context(queued_output())
-        log = stack.enter_context(run_log(join(system.namespace, system.name.value)))
+        is_part = "/" in system.name.value  # a process of a system: robot/perception
+        name = join(system.namespace, system.name.value)
+        log = stack.enter_context(run_log(name, part=is_part))
         address = None if dashboard is None else stack.enter_context(shown_address(dashboard))
         progress = Progress(sys.stderr, console_format(), address)
 

@@ -22,9 +22,10 @@ class RunLog:
     folder, the run has no log, and a warning says so.
     """
 
-    def __init__(self, system: str) -> None:
-        """``system`` is the full name of the system."""
+    def __init__(self, system: str, *, part: bool = False) -> None:
+        """``system`` is the full name of the system, or of a process of it, a ``part``."""
         self._system = system
+        self._part = part
         self._folder: RunFolder | None = None
         self._queue: OutputQueue | None = None
         self._is_started = False
@@ -50,7 +51,7 @@ class RunLog:
         logs = log_folder(os.environ)
         problem = "neither ROS_LOG_DIR nor HOME is set"
         try:
-            self._folder = None if logs is None else RunFolder(logs, self._system)
+            self._folder = None if logs is None else RunFolder(logs, self._system, part=self._part)
         except OSError as error:
             problem = f"{error.strerror}: '{error.filename}'"
         if self._folder is None:
@@ -60,9 +61,9 @@ class RunLog:
 
 
 @contextmanager
-def run_log(system: str) -> Iterator[RunLog]:
+def run_log(system: str, *, part: bool = False) -> Iterator[RunLog]:
     """Keep the log of a run within the block."""
-    log = RunLog(system)
+    log = RunLog(system, part=part)
     try:
         yield log
     finally:

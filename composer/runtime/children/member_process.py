@@ -28,6 +28,7 @@ from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.metrics.numbers import finite
 from composer.runtime.node.outcome import FINALIZED
+from composer.runtime.process.environment import CONSOLE_FORMAT
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.ros.manager_protocol import CHANGE_STATE, NAME, STATE_QOS, STATE_TOPIC
 
@@ -233,7 +234,9 @@ class MemberProcess:
     async def _start_child(self) -> _Life:
         environment = {name.value: value for name, value in self._process.environment}
         words = (*self._context.command, "--process", self._process.name.value)
-        command = Command(words, {"PYTHONUNBUFFERED": "1", **environment})
+        # Its lines are parsed, whatever format those of this process have.
+        usual = {"PYTHONUNBUFFERED": "1", "RCUTILS_CONSOLE_OUTPUT_FORMAT": CONSOLE_FORMAT}
+        command = Command(words, {**usual, **environment})
         self._is_ending = False
         try:
             child = self._context.children.start(command, self._log)

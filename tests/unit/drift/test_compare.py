@@ -206,3 +206,16 @@ def test_endpoints_for_tools_are_recognized(kind: PortKind, name: str, type_name
     assert ObservedEndpoint(kind, name, type_name).is_for_tools
     assert not ObservedEndpoint(kind, name, "example_interfaces/msg/Other").is_for_tools
     assert not ObservedEndpoint(kind, f"{name}_more", type_name).is_for_tools
+
+
+def test_ports_of_other_programs_are_compared_only_if_some_are_declared() -> None:
+    driver = ObservedNode("/driver", (BILL,))
+    text = "system: shop\nnodes: {driver: {executable: {command: [driver]}PORTS}}\n"
+    without = system_of(text.replace("PORTS", ""))
+    assert compare(without, Snapshot((driver,))) == ()
+    ports = ", services: {ask: {type: std_srvs/srv/Trigger}}"
+    with_ports = system_of(text.replace("PORTS", ports))
+    assert [drift.kind for drift in compare(with_ports, Snapshot((driver,)))] == [
+        DriftKind.MISSING_ENDPOINT,
+        DriftKind.EXTRA_ENDPOINT,
+    ]

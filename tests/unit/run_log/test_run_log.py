@@ -121,6 +121,14 @@ def test_runs_are_found_by_system_in_order_and_the_oldest_removed(tmp_path: Path
     assert find_runs(tmp_path / "nothing") == []
 
 
+def test_runs_of_parts_of_systems_are_found_only_by_name(tmp_path: Path) -> None:
+    whole, part = RunFolder(tmp_path, "/split"), RunFolder(tmp_path, "/split/hearing", part=True)
+    assert [run.folder for run in find_runs(tmp_path)] == [whole.path]
+    assert [run.folder for run in find_runs(tmp_path, "/split/hearing")] == [part.path]
+    whole.close()
+    part.close()
+
+
 WRITER = """
 import sys
 from pathlib import Path
