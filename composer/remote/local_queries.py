@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
@@ -15,6 +16,7 @@ from composer.fast_dataclass import dataclass
 from composer.names import is_hidden
 from composer.remote.local_graph import RESPONSE_S, local_view
 from composer.remote.system_reports import InvalidReportError, SystemReport, system_report
+from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.process.query_socket import (
     NODE,
@@ -109,19 +111,22 @@ def all_local_parameters(timeout_s: float, *, hidden: bool) -> list[LocalParamet
 
 
 @_none_for_other_versions
-def local_report(name: str, timeout_s: float) -> SystemReport | None:
+def local_report(name: str, timeout_s: float, *, callbacks: bool = False) -> SystemReport | None:
     """Return the report of a running system, by its full name or the last part."""
     systems = [system for system in local_systems() if f"/{system}".endswith(f"/{name}")]
-    return _ask_report(systems[0], timeout_s) if len(systems) == 1 else None
+    return _ask_report(systems[0], timeout_s, callbacks=callbacks) if len(systems) == 1 else None
 
 
 @_none_for_other_versions
-def local_reports(timeout_s: float) -> dict[str, SystemReport] | None:
+def local_reports(timeout_s: float, *, callbacks: bool = False) -> dict[str, SystemReport] | None:
     """Return the reports of all systems, if no others and no other lifecycle nodes run."""
     view = local_view(timeout_s)
     if view is None:
         return None
-    reports = {system: _ask_report(system, timeout_s) for system in sorted(local_systems())}
+    reports = {
+        system: _ask_report(system, timeout_s, callbacks=callbacks)
+        for system in sorted(local_systems())
+    }
     found = {system: report for system, report in reports.items() if report is not None}
     managers = {
         name.removesuffix(_MANAGER_SERVICE)
@@ -155,12 +160,19 @@ def local_state(name: str, timeout_s: float) -> str | None:
     return next((node.state for node in nodes if node.node == full_name), None)
 
 
-def _ask_report(system: str, timeout_s: float) -> SystemReport | None:
-    answer = ask(system, STATUS, None, min(RESPONSE_S, timeout_s))
+def _ask_report(system: str, timeout_s: float, *, callbacks: bool = False) -> SystemReport | None:
+    answer = ask(system, STATUS, callbacks, min(RESPONSE_S, timeout_s))
+    if answer is None:
+        return None
     try:
-        return None if answer is None else system_report(system, answer)
+        report = system_report(system, answer["status"])
     except InvalidReportError:
         return None
+    return replace(
+        report,
+        callbacks=tuple(CallbackFigures(**figures) for figures in answer["callbacks"]),
+        chains=tuple(ChainFigures(**figures) for figures in answer["chains"]),
+    )
 
 
 def _ask_parameters(nodes: list[str] | None, timeout_s: float) -> dict[str, LocalParameters]:

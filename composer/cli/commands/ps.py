@@ -44,21 +44,19 @@ def ps(
     'compose top' shows as a table.
     """
     name = None if system is None else running_system_name(system)
-    if json:
-        write(_as_json(*_discover(name, timeout, callbacks=True)))
-    else:
-        write(_as_text(*(_ask(name, timeout) or _discover(name, timeout, callbacks=False))))
+    listed = _ask(name, timeout, callbacks=json) or _discover(name, timeout, callbacks=json)
+    write(_as_json(*listed) if json else _as_text(*listed))
 
 
-def _ask(name: str | None, timeout: float) -> _Listed | None:
-    """Return what runs if the systems on this computer know that, without callback timings."""
+def _ask(name: str | None, timeout: float, *, callbacks: bool) -> _Listed | None:
+    """Return what runs if the systems on this computer know that."""
     require_ros("compose ps")
     from composer.remote.local_queries import local_report, local_reports
 
     if name is None:
-        reports = local_reports(timeout)
+        reports = local_reports(timeout, callbacks=callbacks)
         return None if reports is None else (reports, {})
-    report = local_report(name, timeout)
+    report = local_report(name, timeout, callbacks=callbacks)
     return None if report is None else ({report.name: report}, {})
 
 

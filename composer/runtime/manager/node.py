@@ -157,7 +157,11 @@ class ManagerNode:
             ProxyLifecycleService(self._node, self._loop, host.nodes, self._publish)
         self._graph = GraphObserver(self._node, self._state.topic_name)
         queries = ManagerQueries(
-            self._loop, self._graph, store, self._status_message, lambda: host.nodes().keys()
+            self._loop,
+            self._graph,
+            store,
+            self._status_message,
+            figures=lambda: (host.callbacks(), host.chains()),
         )
         self._query_socket = QuerySocket(namespace, queries.answers(), self._on_query_error)
         self._loop.start()

@@ -98,6 +98,10 @@ class ProxyParameterStore(NodeParameterStore):
                 result.names += [full_parameter_name(name, parameter) for parameter in names]
         return result
 
+    def nodes(self) -> list[str]:
+        """Return the full names of the manager and the nodes whose parameters are known."""
+        return [self.manager, *filter(self.has, self._nodes())]
+
     def has(self, name: str) -> bool:
         """Return whether these are the parameters of a node, by its full name."""
         return name == self.manager or self._local(name) is not None

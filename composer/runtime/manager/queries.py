@@ -6,7 +6,7 @@ See :mod:`composer.runtime.process.query_socket`, on whose thread the methods ar
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 from functools import partial
 from typing import Any
@@ -17,6 +17,7 @@ from rcl_interfaces.msg import ParameterValue
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.proxy_services import ProxyParameterStore
+from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.parameter_services import count_items, in_slices
 from composer.runtime.process.query_socket import GRAPH, NODE, NODES, PARAMETERS, STATUS, Answer
 from composer.runtime.ros.manager_protocol import full_parameter_name
@@ -39,14 +40,14 @@ class ManagerQueries:
         graph: GraphObserver,
         parameters: ProxyParameterStore,
         status: Callable[[], DiagnosticArray],
-        nodes: Callable[[], Collection[str]],
+        figures: Callable[[], tuple[Iterable[CallbackFigures], Iterable[ChainFigures]]],
     ) -> None:
-        """``nodes()`` returns the full names of the system's nodes."""
+        """``figures()`` returns the timings of callbacks and chains."""
         self._loop = loop
         self._graph = graph
         self._parameters = parameters
         self._status = status
-        self._nodes = nodes
+        self._figures = figures
 
     def answers(self) -> Mapping[str, Answer]:
         """Return the queries by name."""
@@ -54,16 +55,25 @@ class ManagerQueries:
             GRAPH: lambda _: self._graph.view(),
             NODES: lambda _: self._graph.nodes(),
             NODE: lambda name: self._graph.node(str(name)),
-            STATUS: lambda _: self._system_status(),
+            STATUS: lambda callbacks: self._system_status(callbacks=bool(callbacks)),
             PARAMETERS: self._node_parameters,
         }
 
-    def _system_status(self) -> list[Any]:
-        """Return the name, the message and the values of the system and of each node."""
-        return [
+    def _system_status(self, *, callbacks: bool) -> dict[str, list[Any]]:
+        """Return the name, the message and the values of the system and of each node.
+
+        With ``callbacks``, add the timings of callbacks and chains.
+        """
+        statuses = [
             [item.name, item.message, {value.key: value.value for value in item.values}]
             for item in self._status().status
         ]
+        timed, chains = self._figures() if callbacks else ((), ())
+        return {
+            "status": statuses,
+            "callbacks": list(map(asdict, timed)),
+            "chains": list(map(asdict, chains)),
+        }
 
     def _node_parameters(self, requested: Any) -> dict[str, list[Any]] | None:
         """Return descriptions and values of the parameters of the system's nodes and manager.
@@ -71,11 +81,8 @@ class ManagerQueries:
         ``requested`` are full names of nodes, None for all. Other nodes are left out, and so are
         those of other processes, which have parameter services of their own.
         """
-        known = (self._parameters.manager, *self._nodes())
         names = [
-            name
-            for name in known
-            if self._parameters.has(name) and (requested is None or name in requested)
+            name for name in self._parameters.nodes() if requested is None or name in requested
         ]
         done = threading.Event()
         future = self._loop.run_task(self._collect(names))

@@ -17,7 +17,12 @@ from std_msgs.msg import String
 
 from composer.remote.graph_names import GraphNames
 from composer.remote.local_graph import local_names
-from composer.remote.local_queries import local_node, local_parameters, local_reports
+from composer.remote.local_queries import (
+    local_node,
+    local_parameters,
+    local_report,
+    local_reports,
+)
 from composer.remote.session import Deadline, Session
 from composer.runtime.process.query_socket import KINDS
 from tests.ros.support.commands import PATIENCE_S, compose, hand_written, listed, output_of, running
@@ -68,8 +73,13 @@ def test_a_running_system_answers_as_the_graph_does(
     assert local_node("planner", PATIENCE_S, hidden=False)
     with ThreadPoolExecutor(4) as pool:
         from_system = list(pool.map(lambda words: compose(*words), ANSWERED))
+        timed = local_report("pipeline", PATIENCE_S, callbacks=True)
         monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))  # as if the system ran elsewhere
         from_graph = list(pool.map(lambda words: compose(*words), ANSWERED))
+        (system,) = json.loads(output_of("ps", "--json"))["systems"]
+    expected_callbacks = {item["name"] for node in system["nodes"] for item in node["callbacks"]}
+    assert timed is not None
+    assert {item.name for item in timed.callbacks} == expected_callbacks
     hide = partial(re.sub, r"\d+\.?\d* *", "0 ")  # rates, durations and the width of columns
     for words, found, expected in zip(ANSWERED, from_system, from_graph, strict=True):
         assert hide(found.stdout) == hide(expected.stdout), words
