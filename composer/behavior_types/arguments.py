@@ -9,6 +9,7 @@ from functools import cache
 
 from composer import behavior
 from composer.behavior_source import Function
+from composer.behavior_types.values import OwnClass
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
 
@@ -64,7 +65,7 @@ class Signature:
         return f"'{self.name}' takes {takes}, not {len(call.args)}", first, None
 
 
-def signature_of(function: Function, *, is_bound: bool) -> Signature | None:
+def signature_of(function: Function, *, is_bound: bool, name: str = "") -> Signature | None:
     """Return the parameters of a function; None if a decorator may change them.
 
     If ``is_bound``, its first parameter is the object.
@@ -82,7 +83,7 @@ def signature_of(function: Function, *, is_bound: bool) -> Signature | None:
     ]
     first = 1 if is_bound else 0
     return Signature(
-        function.name,
+        name or function.name,
         tuple(positional[first:]),
         tuple(argument.arg for argument in arguments.kwonlyargs),
         frozenset(required) - frozenset(positional[:first]),
@@ -90,6 +91,20 @@ def signature_of(function: Function, *, is_bound: bool) -> Signature | None:
         arguments.vararg is not None,
         arguments.kwarg is not None,
     )
+
+
+def constructor(own: OwnClass) -> Signature | None:
+    """Return the parameters of the constructor of a class without bases and decorators."""
+    definition = own.definition
+    if definition.node.bases or definition.node.decorator_list or definition.node.keywords:
+        return None
+    methods = {method.name: method.node for method in definition.methods}
+    if "__new__" in methods:
+        return None
+    found = methods.get("__init__")
+    if "__init__" not in methods:
+        return Signature(definition.name, (), (), frozenset())
+    return signature_of(found, is_bound=True, name=definition.name) if found is not None else None
 
 
 @cache

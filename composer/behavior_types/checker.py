@@ -12,7 +12,7 @@ from composer.behavior_source.spans import attribute_span, span_of, start_span
 from composer.behavior_source.syntax import name_span
 from composer.behavior_types.annotations import annotated
 from composer.behavior_types.api_values import api_parameters
-from composer.behavior_types.arguments import api_signature, signature_of
+from composer.behavior_types.arguments import api_signature, constructor, signature_of
 from composer.behavior_types.attributes import attribute_problem
 from composer.behavior_types.bindings import nodes_of
 from composer.behavior_types.expressions import FunctionTypes
@@ -27,6 +27,7 @@ from composer.behavior_types.operations import (
     uncallable,
 )
 from composer.behavior_types.problems import CodeProblem, Kind
+from composer.behavior_types.self_attributes import misspelled_attributes
 from composer.behavior_types.stored_calls import used_without_await
 from composer.behavior_types.values import (
     ApiMethod,
@@ -35,6 +36,7 @@ from composer.behavior_types.values import (
     CollectionMethod,
     InterfaceClass,
     ModuleFunction,
+    OwnClass,
     OwnMethod,
     Parameters,
     Pending,
@@ -72,6 +74,7 @@ def behavior_problems(
                 yield problem
             if problem.kind is Kind.ATTRIBUTE:
                 missing.add(problem.message)
+    yield from misspelled_attributes(source)
 
 
 def _checkers(types: BehaviorTypes, source: BehaviorSource) -> Iterator[_FunctionChecker]:
@@ -184,6 +187,10 @@ class _FunctionChecker:
                     yield from self._own_call(node, method.node, home, is_bound=True)
             case ModuleFunction(node=function, home=home, is_bound=is_bound):
                 yield from self._own_call(node, function, home, is_bound=is_bound)
+            case OwnClass() as own:
+                parameters = constructor(own)
+                if parameters is not None:
+                    yield from call_problems(node, parameters, self.scope)
             case CollectionMethod() | Collection():
                 pass
             case other:

@@ -12,7 +12,7 @@ from composer.behavior_source.method_body import dotted
 from composer.behavior_types.annotations import annotated
 from composer.behavior_types.api_values import api_member, api_result, class_member
 from composer.behavior_types.bindings import Binding, Bindings, How, nodes_of
-from composer.behavior_types.names import full_name, function_named, interface_name
+from composer.behavior_types.names import constant_named, full_name, function_named, interface_name
 from composer.behavior_types.operators import (
     binary,
     builtin_call,
@@ -189,6 +189,9 @@ class FunctionTypes:
         function = function_named(name, self.home)
         if function is not None:
             return ModuleFunction(function, self.home)
+        constant = constant_named(name, self.home)
+        if constant is not None:
+            return _constant(constant.value)
         return class_named(name, self.home) or self._global(name)
 
     def _global(self, dotted_name: str) -> Value:

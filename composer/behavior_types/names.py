@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from functools import lru_cache
 
 from composer.behavior_source import Module
 from composer.behavior_source.method_body import Function, dotted
+from composer.behavior_source.traversal import walk
 from composer.behavior_types.api import API_CLASSES
 
 _API_MODULE = "composer.behavior"
@@ -57,6 +59,33 @@ def _functions(module: Module) -> dict[str, Function | None]:
         if isinstance(item, Function):
             found[item.name] = None if item.name in found else item
     return found
+
+
+def constant_named(name: str, module: Module) -> ast.Constant | None:
+    """Return the constant that a module assigns to a name once, and that nothing changes."""
+    return _constants(module).get(name)
+
+
+@lru_cache(maxsize=128)
+def _constants(module: Module) -> dict[str, ast.Constant]:
+    values: dict[str, ast.Constant] = {}
+    for statement in module.tree.body:
+        if isinstance(statement, ast.Assign) and isinstance(statement.value, ast.Constant):
+            for target in statement.targets:
+                if isinstance(target, ast.Name):
+                    values[target.id] = statement.value
+    if not values:
+        return values
+    nodes = list(walk(module.tree.body))
+    changed = {name for node in nodes if isinstance(node, ast.Global) for name in node.names}
+    stored = Counter(
+        node.id
+        for node in nodes
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)
+    )
+    return {
+        name: value for name, value in values.items() if stored[name] == 1 and name not in changed
+    }
 
 
 def own_name(node: ast.expr, module: Module) -> str:

@@ -113,6 +113,8 @@ def builtin_call(name: str, arguments: Sequence[Value]) -> Value:
     module, _, function = name.rpartition(".")
     if module == "math":
         return _math(function)
+    if name == "range":
+        return Collection(range, INTEGER)
     if name in _COLLECTIONS:
         source = arguments[0] if len(arguments) == 1 else ANYTHING
         of_dict = isinstance(source, Collection) and source.python is dict

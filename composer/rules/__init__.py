@@ -42,6 +42,12 @@ def run_checks(context: Context) -> list[Diagnostic]:
 
 def _without_follow_ups(found: list[Diagnostic], context: Context) -> list[Diagnostic]:
     """Leave out what is only reported because a connection has an error: ports lack its name."""
+    wrong = {location(item.primary) for item in found if item.rule.name == "wrong-port-kind"}
+    found = [
+        item
+        for item in found
+        if item.rule.name != "port-connected-twice" or location(item.primary) not in wrong
+    ]
     causes = [item.primary for item in found if item.rule.name in _CAUSES]
     ends = (
         end.text.span

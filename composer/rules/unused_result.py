@@ -14,10 +14,11 @@ RULE = register(
         code="RC453",
         name="unused-result",
         severity=Severity.WARNING,
-        summary="A comparison or a function is a statement of its own, without effect.",
+        summary="A comparison, a function or a new attribute of a behavior is not used.",
         why=(
             "'self.count == 0' compares and forgets the result: assign with '='. 'self.report' "
-            "names a method without calling it."
+            "names a method without calling it. An attribute that is set, never read, and named "
+            "almost like another one is probably misspelled."
         ),
         bad="""\
 # file: system.yaml

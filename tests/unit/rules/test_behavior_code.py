@@ -55,6 +55,14 @@ from std_srvs.srv import Trigger
 from composer.behavior import Behavior, CallError, Goal, SentGoal
 
 
+NANOSECONDS = 1_000_000_000
+
+
+class Reference:
+    def __init__(self, path, limit):
+        self.path = path, limit
+
+
 class Mode(Enum):
     FAST = 1
 
@@ -251,6 +259,11 @@ MISTAKES = [
     # statements without effect
     ("odometry", "self.count == 1", "unused-result", "self.count == 1", "'='"),
     ("odometry", "self._text", "unused-result", "self._text", "()"),
+    ("odometry", "self.staistics = self.statistics", "unused-result", "staistics", "'statistics'"),
+    # values of modules, ranges and constructors
+    ("function", "for i in range(3):\n    Point(x=i)", "invalid-value", "i", None),
+    ("function", "Time(sec=NANOSECONDS / 2)", "invalid-value", "NANOSECONDS / 2", None),
+    ("odometry", "Reference(1)", "call-arguments", "Reference", None),
     # asyncio
     ("configure", "await asyncio.sleep(1.0)", "asyncio-call", "asyncio.sleep", "self.clock.sleep"),
     # annotations
@@ -316,6 +329,8 @@ RIGHT = [
     ("odometry", "Mode.FAST.name, Mode['FAST'].value, Mode.parse('a')"),
     ("odometry", "Statistics().scores.append(1.0)\nself.statistics.mean() * 2"),
     ("odometry", "total = 1\ntotal += 1"),
+    ("odometry", "self.others = self.wheel1 = 1\nself.wheel2 = self.wheel1"),
+    ("odometry", "Reference(1, limit=2), Reference(*[1, 2])"),
     ("odometry", "if self.parameters.mode == 'slow' or self.parameters.mode != 'fast':\n    pass"),
     ("odometry", "self.statistics.extra = 1\nself.statistics.extra"),
     ("odometry", "Point(x=self.parameters.speed, y=float('1'))"),
