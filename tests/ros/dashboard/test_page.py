@@ -13,10 +13,12 @@ import pytest
 from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import Int32
 
+from tests.ros.dashboard.conftest import FILE
 from tests.ros.support.commands import hand_written, output_of
-from tests.ros.support.dashboard import Dashboard
+from tests.ros.support.dashboard import Dashboard, dashboard
 from tests.ros.support.in_process import Peer, wait_until
 from tests.ros.support.pages import opened
+from tests.ros.support.system_process import REPOSITORY
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
@@ -267,3 +269,25 @@ def test_no_view_is_wider_than_the_screen(width: int, browser: Browser, server: 
                 .map(element => element.outerHTML.slice(0, 80))"""
             )
             assert cut == [], path
+
+
+def test_a_lost_connection_is_made_again_and_read_only_has_no_buttons(
+    browser: Browser, server: Dashboard, tmp_path: Path
+) -> None:
+    token = tmp_path / "token"
+    token.write_text("0123456789" * 5, encoding="utf-8")
+    token.chmod(0o600)
+    page = browser.new_context().new_page()
+    with dashboard(FILE, "--token-file", str(token), cwd=REPOSITORY) as first:
+        page.goto(f"{first.address.origin}/nodes{PLANNER}?token={first.address.token}")
+        page.locator("button[data-transition=deactivate]").wait_for()
+        port = str(first.address.port)
+    expect_text(page.locator("#banner:visible"), "Not connected")
+    again = ("--port", port, "--token-file", str(token), "--read-only")
+    with dashboard(FILE, *again, cwd=REPOSITORY):
+        page.locator("#banner").wait_for(state="hidden")
+        page.locator(".badge:visible").wait_for()
+        expect_text(detail(page).locator(".state"), "active")
+        page.locator("button[data-transition]").first.wait_for(state="detached")
+        page.locator("#bar [data-command]").first.wait_for(state="detached")
+    page.context.close()

@@ -59,8 +59,10 @@ export function createPlot(connection, { onremove }) {
     series = wanted;
     problem.hidden = true;
     const params = { series };
-    if (series.length === 0) end();
-    else if (subscription) subscription.update(params);
+    if (series.length === 0) {
+      subscription?.end();
+      subscription = null;
+    } else if (subscription) subscription.update(params);
     else subscription = connection.subscribe("plot", params, receive, { onerror: fail });
     build();
   }
@@ -178,6 +180,10 @@ export function createPlot(connection, { onremove }) {
   function end() {
     subscription?.end();
     subscription = null;
+    resized.disconnect();
+    removeEventListener("themechange", build);
+    chart?.destroy();
+    chart = null;
   }
 
   const resized = new ResizeObserver(() => {
