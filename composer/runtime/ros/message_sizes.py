@@ -31,12 +31,13 @@ _PARTS = {
 
 
 def sends_large_messages(system: System) -> bool:
-    """Say whether a port of the system sends messages that may be large.
+    """Say whether a port of a node in the process of the system sends messages that may be large.
 
     They have an array of numbers that is unbounded or too large for one datagram, such as
     images, point clouds and maps.
     """
-    return any(_sends_large(port) for node in system.nodes for port in node.ports)
+    nodes = (node for node in system.nodes if node.in_process)
+    return any(_sends_large(port) for node in nodes for port in node.ports)
 
 
 def _sends_large(port: Port) -> bool:

@@ -39,6 +39,7 @@ def test_messages(name: str, large: bool) -> None:
         ("clients: {a: {type: nav_msgs/srv/SetMap}}", True),
         ("action_servers: {a: {type: tf2_msgs/action/LookupTransform}}", False),
         ("publishers: {a: {type: unknown_msgs/msg/Image}}", False),
+        ("executable: {command: [cam]}, publishers: {a: {type: sensor_msgs/msg/Image}}", False),
     ],
 )
 def test_what_a_system_sends(port: str, large: bool, tmp_path: Path) -> None:
