@@ -22,7 +22,7 @@ def endpoints(system: System) -> Iterator[Endpoint]:
 
 def own_name(node: Node, name: str) -> str:
     """Return the full name of ``name`` in ``node`` before remapping."""
-    return expand_name(name, node.name.value, node.namespace.value)
+    return expand_name(name, node.ros_name.value, node.namespace.value)
 
 
 def matched_ports(node: Node, remapping: Remapping) -> Iterator[Port]:

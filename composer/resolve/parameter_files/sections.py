@@ -140,8 +140,10 @@ class _Search:
 def _name_without_prefix(node: Node) -> str | None:
     """Return the full name without the prefixes of includes, or None if there are none.
 
-    The text of the key in its file has no prefix.
+    The text of the key in its file has no prefix. A prefix does not change a name of its own.
     """
+    if node.own_name is not None:
+        return None
     span = node.name.span
     text = span.file.line(span.line)[span.column - 1 :][: span.length].strip("'\"")
     if not text or text == node.name.value or not node.name.value.endswith(text):
