@@ -50,6 +50,8 @@ class Detector(Behavior):
     def on_image(self, message):
         while self.parameters.mood == "hang":
             time.sleep(0.01)
+        if self.parameters.mood == "block":
+            time.sleep(60.0)  # cannot be interrupted
         found = self.publishers.found
         found.publish(found.message_type(data=f"found {message.data}"))
 """
@@ -154,6 +156,16 @@ def test_a_failed_node_of_another_process_is_restarted(tmp_path: Path, peer: Pee
         failed = wait_for_restart(system, "/lab/detector")
         assert "took longer than 300 ms" in failed.reason
         assert pid_of(system, "detector") == process
+
+
+def test_a_process_with_a_blocked_node_is_started_again(tmp_path: Path, peer: Peer) -> None:
+    with split(tmp_path) as system:
+        process = pid_of(system, "detector")
+        assert peer.set_parameter("/lab/detector", "mood", "block") == ""
+        failed = wait_for_restart(system, "/lab/detector")
+        assert "on_image" in failed.reason
+        assert pid_of(system, "detector") != process
+        assert not alive(process)
 
 
 def test_a_bring_up_over_processes_is_rolled_back(tmp_path: Path) -> None:
