@@ -6,30 +6,25 @@ nothing else is affected.
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Coroutine
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+from starlette.websockets import WebSocket
 
 from composer.dashboard.channels import CHANNELS
 from composer.dashboard.channels.goal import GoalFeed
+from composer.dashboard.client import MAX_PENDING, Client
 from composer.dashboard.context import Dashboard
 from composer.dashboard.errors import BadRequestError, RequestError
 from composer.dashboard.feeds import Feed, Receiver
 from composer.dashboard.messages import ClientRequest, Values, parse_request, to_json
 from composer.dashboard.operations import OPERATIONS
-from composer.dashboard.outbox import Outbox, Update
+from composer.dashboard.outbox import Outbox
 from composer.diagnostics import nearest
 
 _MAX_SUBSCRIPTIONS = 64
-_MAX_PENDING = 16
-#: A program that sends only malformed messages is disconnected.
-_MAX_MALFORMED = 20
-_POLICY_VIOLATION, _GOING_AWAY = 1008, 1001
 #: Operations of the connection itself.
 _OWN = ("subscribe", "unsubscribe", "update", "cancel", "ping")
 
@@ -42,72 +37,32 @@ class _Subscription:
     feed: Feed
 
 
-class Connection:
+class Connection(Client):
     """The connection of one browser."""
 
     def __init__(self, dashboard: Dashboard, socket: WebSocket) -> None:
-        self._dashboard = dashboard
-        self._socket = socket
-        self._outbox = Outbox()
-        self._loop = asyncio.get_running_loop()
+        super().__init__(dashboard, socket, Outbox())
         self._subscriptions: dict[int, _Subscription] = {}
         self._next_subscription = 1
-        self._pending: set[asyncio.Task[None]] = set()
-        self._is_open = True
 
-    async def run(self) -> None:
-        """Serve the browser until it leaves."""
+    def _begin(self) -> None:
         self._outbox.reply(to_json({"hello": self._dashboard.hello}))
-        sender = asyncio.create_task(self._send())
-        self._dashboard.ros.enter()
+
+    def _end(self) -> None:
+        for subscription in tuple(self._subscriptions):
+            self._unsubscribe(subscription)
+
+    def _take(self, message: str | bytes) -> bool:
+        identifier: int | str | None = None
         try:
-            await self._receive()
-        except WebSocketDisconnect:
-            pass
-        finally:
-            self._is_open = False
-            for subscription in tuple(self._subscriptions):
-                self._unsubscribe(subscription)
-            for task in (sender, *self._pending):
-                task.cancel()
-            self._dashboard.ros.leave()
-
-    async def close(self) -> None:
-        """Say that the server ends."""
-        if self._socket.application_state is WebSocketState.CONNECTED:
-            await self._socket.close(_GOING_AWAY, "the dashboard has ended")
-
-    async def _send(self) -> None:
-        try:
-            while True:
-                message = await self._outbox.next()
-                if isinstance(message, bytes):
-                    await self._socket.send_bytes(message)
-                else:
-                    await self._socket.send_text(message)
-        except (WebSocketDisconnect, RuntimeError):
-            pass  # the browser has left; so does the receiver notice
-
-    async def _receive(self) -> None:
-        malformed = 0
-        while True:
-            message = await self._socket.receive()
-            if message["type"] == "websocket.disconnect":
-                return
-            identifier: int | str | None = None
-            try:
-                text = message.get("text")
-                if text is None:
-                    raise BadRequestError("messages must be text, this one is binary")
-                request = parse_request(text)
-                identifier, malformed = request.id, 0
-                self._start(request)
-            except RequestError as error:
-                malformed += identifier is None
-                self._outbox.reply(to_json({"id": identifier, "error": error.as_data()}))
-            if malformed >= _MAX_MALFORMED or self._outbox.is_full_of_replies:
-                await self._socket.close(_POLICY_VIOLATION, "too many requests without sense")
-                return
+            if isinstance(message, bytes):
+                raise BadRequestError("messages must be text, this one is binary")
+            request = parse_request(message)
+            identifier = request.id
+            self._start(request)
+        except RequestError as error:
+            self._outbox.reply(to_json({"id": identifier, "error": error.as_data()}))
+        return identifier is not None
 
     def _start(self, request: ClientRequest) -> None:
         """Answer a request at once, or start the task that does. Raises RequestError."""
@@ -123,8 +78,8 @@ class Connection:
             raise BadRequestError(f"there is no operation '{request.op:.80}'", hint)
         if operation.changes:
             self._check_may_change(request.op)
-        if len(self._pending) >= _MAX_PENDING:
-            raise RequestError("busy", f"{_MAX_PENDING} of your requests are running already")
+        if len(self._pending) >= MAX_PENDING:
+            raise RequestError("busy", f"{MAX_PENDING} of your requests are running already")
         call, timeout_s = operation.prepare(values, self._dashboard)
         values.end()
         self._spawn(self._call(request, self._dashboard.ros.call(call, timeout_s)))
@@ -132,11 +87,6 @@ class Connection:
     def _check_may_change(self, what: str) -> None:
         if self._dashboard.options.read_only:
             raise RequestError("read_only", f"'{what}' is not possible: the dashboard is read-only")
-
-    def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> None:
-        task = self._loop.create_task(coroutine)
-        self._pending.add(task)
-        task.add_done_callback(self._pending.discard)
 
     async def _call(self, request: ClientRequest, call: Coroutine[Any, Any, Any]) -> None:
         try:
@@ -216,13 +166,7 @@ class Connection:
         key = f"{channel} {to_json(parameters)}"
         if not feed.is_shared:
             key = f"{key} {id(self)} {number}"
-
-        def receive(update: Update) -> None:
-            """Take an update on the thread of feeds."""
-            if self._is_open:
-                with suppress(RuntimeError):  # the server ends
-                    self._loop.call_soon_threadsafe(self._outbox.put, number, update)
-
+        receive = self._receiver(lambda update: self._outbox.put(number, update))
         self._dashboard.feeds.add(key, feed, receive)
         return _Subscription(channel, key, receive, feed)
 

@@ -58,7 +58,13 @@ class RunningFeed:
         self.due_s = 0.0
         self.last: Update | None = None
         self.is_started = False
+        self.is_urgent = False
         self.last_error = ""
+
+    @property
+    def next_s(self) -> float:
+        """When the feed is to be polled (seconds, time.monotonic)."""
+        return 0.0 if self.is_urgent else self.due_s
 
 
 #: Takes the updates of a feed, on any thread.
@@ -97,6 +103,14 @@ class Feeds:
                 self._closing.append(self._running.pop(key))
                 self._changed.notify()
 
+    def poll_soon(self, key: str) -> None:
+        """Poll the running feed with this key at once, because there is something to do."""
+        with self._changed:
+            running = self._running.get(key)
+            if running is not None:
+                running.is_urgent = True
+                self._changed.notify()
+
     def stop(self) -> None:
         """Make :meth:`run` return."""
         with self._changed:
@@ -123,16 +137,17 @@ class Feeds:
         """Wait until something is to do, for a second at most; return what to close and poll."""
         with self._changed:
             now_s = time.monotonic()
-            next_s = min((item.due_s for item in self._running.values()), default=now_s + 1.0)
+            next_s = min((item.next_s for item in self._running.values()), default=now_s + 1.0)
             if not self._closing and next_s > now_s:
                 self._changed.wait(min(next_s - now_s, 1.0))
                 now_s = time.monotonic()
             closing, self._closing = self._closing, []
-            return closing, [item for item in self._running.values() if item.due_s <= now_s]
+            return closing, [item for item in self._running.values() if item.next_s <= now_s]
 
     def _poll(self, running: RunningFeed, ros: RosGraphSide) -> None:
         from composer.remote.session import RosError
 
+        running.is_urgent = False
         try:
             if not running.is_started:
                 running.due_s = time.monotonic()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -30,7 +31,8 @@ class Update:
     """An update of a channel: JSON text, or a binary payload with its ``header`` of JSON text.
 
     ``count`` is the number of messages in it; ``dropped`` the messages before it that the channel
-    left out because of its rate limit. ``ended`` says that no update follows.
+    left out because of its rate limit. ``ended`` says that no update follows. ``at_ns`` is when a
+    binary payload arrived, in nanoseconds since 1970.
     """
 
     data: str | bytes
@@ -39,6 +41,7 @@ class Update:
     header: str = ""
     is_error: bool = False
     ended: bool = False
+    at_ns: int = 0
 
     @property
     def size(self) -> int:
@@ -47,7 +50,7 @@ class Update:
 
 
 @dataclass(slots=True)
-class _Waiting:
+class Waiting:
     """The updates that wait for one subscription."""
 
     channel: str
@@ -57,12 +60,20 @@ class _Waiting:
     dropped: int = 0
 
 
+#: Returns an update of a subscription as it is sent.
+Compose = Callable[[int, Waiting, Update], "str | bytes"]
+
+
 class Outbox:
     """Everything that waits for one browser. Use it on the thread of the event loop only."""
 
-    def __init__(self) -> None:
-        self._subscriptions: dict[int, _Waiting] = {}
-        self._replies: deque[str] = deque()
+    def __init__(self, compose: Compose | None = None, max_batches: int = MAX_BATCHES) -> None:
+        """Send updates as ``compose`` returns them, by default in the protocol of the page."""
+        self._compose = compose or _message
+        self._max_batches = max_batches
+        self._subscriptions: dict[int, Waiting] = {}
+        self._replies: deque[str | bytes] = deque()
+        self._reply_size = 0
         self._due: dict[int, None] = {}  # subscriptions with updates, in the order of their turns
         self._size = 0
         self._ready = asyncio.Event()
@@ -75,11 +86,16 @@ class Outbox:
     @property
     def is_full_of_replies(self) -> bool:
         """Whether the browser sends requests without reading the replies."""
-        return len(self._replies) >= MAX_REPLIES
+        return len(self._replies) >= MAX_REPLIES or self._reply_size >= MAX_BYTES
+
+    def dropped(self, subscription: int) -> int:
+        """Return how many messages of a subscription were dropped."""
+        waiting = self._subscriptions.get(subscription)
+        return 0 if waiting is None else waiting.dropped
 
     def open(self, subscription: int, channel: str, delivery: Delivery) -> None:
         """Accept updates for a new subscription."""
-        self._subscriptions[subscription] = _Waiting(channel, delivery)
+        self._subscriptions[subscription] = Waiting(channel, delivery)
 
     def close(self, subscription: int) -> None:
         """Discard what waits for a subscription, and accept nothing more for it."""
@@ -88,10 +104,11 @@ class Outbox:
         if waiting is not None:
             self._size -= sum(update.size for update in waiting.updates)
 
-    def reply(self, text: str) -> None:
+    def reply(self, message: str | bytes) -> None:
         """Add the response to a request; responses are sent before updates."""
-        self._replies.append(text)
-        self._size += len(text)
+        self._replies.append(message)
+        self._size += len(message)
+        self._reply_size += len(message)
         self._ready.set()
 
     def put(self, subscription: int, update: Update) -> None:
@@ -100,7 +117,7 @@ class Outbox:
         if waiting is None:
             return
         waiting.dropped += update.dropped
-        limit = 1 if waiting.delivery is Delivery.LATEST else MAX_BATCHES
+        limit = 1 if waiting.delivery is Delivery.LATEST else self._max_batches
         while waiting.updates and len(waiting.updates) >= limit:
             self._drop_oldest(waiting)
         while waiting.updates and self._size + update.size > MAX_BYTES:
@@ -119,9 +136,10 @@ class Outbox:
             self._ready.clear()
             await self._ready.wait()
         if self._replies:
-            text = self._replies.popleft()
-            self._size -= len(text)
-            return text
+            reply = self._replies.popleft()
+            self._size -= len(reply)
+            self._reply_size -= len(reply)
+            return reply
         subscription = next(iter(self._due))
         del self._due[subscription]
         waiting = self._subscriptions[subscription]
@@ -129,15 +147,15 @@ class Outbox:
         self._size -= update.size
         if waiting.updates:
             self._due[subscription] = None  # at the end: every subscription gets its turn
-        return _message(subscription, waiting, update)
+        return self._compose(subscription, waiting, update)
 
-    def _drop_oldest(self, waiting: _Waiting) -> None:
+    def _drop_oldest(self, waiting: Waiting) -> None:
         update = waiting.updates.popleft()
         waiting.dropped += update.count
         self._size -= update.size
 
 
-def _message(subscription: int, waiting: _Waiting, update: Update) -> str | bytes:
+def _message(subscription: int, waiting: Waiting, update: Update) -> str | bytes:
     """Return an update as it is sent."""
     sequence, waiting.sequence = waiting.sequence, waiting.sequence + 1
     head = f'"sub":{subscription},"seq":{sequence},"dropped":{waiting.dropped}'

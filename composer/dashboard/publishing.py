@@ -38,9 +38,9 @@ class Outgoing:
         message_class = class_of(self.type_name)
         values = ros.forms.from_json(self._values, self.type_name, "message")
         self._message = build_message(values, message_class, "the message")
-        topic = full_name("topic", self.topic)
+        topic = self.topic = full_name("topic", self.topic)
         self._publisher = ros.session.node.create_publisher(
-            message_class, topic, rclpy_profile(self._profile(topic))
+            message_class, topic, rclpy_profile(self._profile())
         )
 
     @property
@@ -50,8 +50,8 @@ class Outgoing:
 
     def expected(self) -> int:
         """Return the number of known subscriptions that the publisher will match."""
-        profile = self._profile(self.topic)
-        ends = self._subscriptions(self.topic)
+        profile = self._profile()
+        ends = _subscriptions(self._ros, self.topic)
         return sum(end.qos is None or not incompatibilities(profile, end.qos) for end in ends)
 
     def publish(self) -> None:
@@ -70,19 +70,22 @@ class Outgoing:
             self._ros.session.node.destroy_publisher(self._publisher)
             self._publisher = None
 
-    def _profile(self, topic: str) -> QosProfile:
-        """Return the requested profile; by default latched if a subscription requests that."""
-        if self._qos is not None:
-            return PRESETS[self._qos]
-        is_latched = any(
-            end.qos is not None and end.qos.durability is Durability.TRANSIENT_LOCAL
-            for end in self._subscriptions(topic)
-        )
-        return PRESETS["state" if is_latched else "command"]
+    def _profile(self) -> QosProfile:
+        return suitable_profile(self._ros, self.topic) if self._qos is None else PRESETS[self._qos]
 
-    def _subscriptions(self, topic: str) -> list[ObservedEndpoint]:
-        ends = self._ros.observed.known().of_topics.get(topic, [])
-        return [end for _, end in ends if end.kind is PortKind.SUBSCRIPTION]
+
+def suitable_profile(ros: RosGraphSide, topic: str) -> QosProfile:
+    """Return a profile for a publisher: latched if a subscription to the topic requests that."""
+    is_latched = any(
+        end.qos is not None and end.qos.durability is Durability.TRANSIENT_LOCAL
+        for end in _subscriptions(ros, topic)
+    )
+    return PRESETS["state" if is_latched else "command"]
+
+
+def _subscriptions(ros: RosGraphSide, topic: str) -> list[ObservedEndpoint]:
+    ends = ros.observed.known().of_topics.get(topic, [])
+    return [end for _, end in ends if end.kind is PortKind.SUBSCRIPTION]
 
 
 def read_outgoing(values: Values) -> Outgoing:

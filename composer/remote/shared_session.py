@@ -83,12 +83,14 @@ class SharedSession(Session):
 class Sample:
     """A message, or its serialized bytes, with its source timestamp in seconds since 1970.
 
-    ``number`` is the sequence number that its publisher gave it, 0 if unknown.
+    ``number`` is the sequence number that its publisher gave it, 0 if unknown; ``received_ns`` when
+    it arrived, in nanoseconds since 1970.
     """
 
     content: Any
     at_s: float
     number: int
+    received_ns: int
 
 
 class SampledTopic:
@@ -114,6 +116,7 @@ class SampledTopic:
                         content,
                         (info["source_timestamp"] or time.time_ns()) * 1e-9,
                         int(info["publication_sequence_number"] or 0),
+                        int(info["received_timestamp"] or time.time_ns()),
                     )
                 )
         return samples

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Self, TypeAlias
 
 from lifecycle_msgs.srv import GetState
@@ -50,11 +50,7 @@ class GraphObserver:
         graph = session.graph
         ends = dict(session.wait_until_settled(lambda: endpoints(graph), deadline))
         counts = Counter(_names(graph))
-        services = {
-            node: {end.name: end.type for end in found if end.kind is PortKind.SERVICE}
-            for node, found in ends.items()
-            if not is_hidden(node)
-        }
+        services = _services(ends)
         self._proxies.discover(self._response_deadline(deadline))
         states = self._states(services, deadline) | self._proxy_states()
         parameters = self._parameters(services, deadline)
@@ -70,6 +66,13 @@ class GraphObserver:
                 for name in sorted(ends)
             )
         )
+
+    def parameters(
+        self, ends: Mapping[str, Sequence[ObservedEndpoint]], deadline: Deadline
+    ) -> dict[str, dict[str, Plain] | None]:
+        """Return the parameters of nodes with these endpoints, None without a response."""
+        self._proxies.discover(self._response_deadline(deadline))
+        return self._parameters(_services(ends), deadline)
 
     def rates(self, deadline: Deadline, measure_s: float) -> dict[str, float]:
         """Return the message rate of each topic in Hz, measured for ``measure_s``.
@@ -151,6 +154,15 @@ class GraphObserver:
 
     def _response_deadline(self, deadline: Deadline) -> Deadline:
         return Deadline(min(_RESPONSE_S, deadline.left_s))
+
+
+def _services(ends: Mapping[str, Sequence[ObservedEndpoint]]) -> dict[str, dict[str, str]]:
+    """Return the services of each node that is not hidden, with their types."""
+    return {
+        node: {end.name: end.type for end in found if end.kind is PortKind.SERVICE}
+        for node, found in ends.items()
+        if not is_hidden(node)
+    }
 
 
 def _offering(services: dict[str, dict[str, str]], last: str, type_name: str) -> dict[str, str]:

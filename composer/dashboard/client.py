@@ -1,0 +1,110 @@
+"""One program that is connected by a WebSocket: receives its messages, sends what waits for it.
+
+Whatever it sends, it gets an error with a reason, and nothing else is affected.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+
+from composer.dashboard.context import Dashboard
+from composer.dashboard.feeds import Receiver
+from composer.dashboard.outbox import Outbox, Update
+
+MAX_PENDING = 16
+#: A program that sends only malformed messages is disconnected.
+_MAX_MALFORMED = 20
+POLICY_VIOLATION, _GOING_AWAY = 1008, 1001
+
+
+class Client(ABC):
+    """The connection of one program. Its protocol is that of the subclass."""
+
+    def __init__(self, dashboard: Dashboard, socket: WebSocket, outbox: Outbox) -> None:
+        self._dashboard = dashboard
+        self._socket = socket
+        self._outbox = outbox
+        self._loop = asyncio.get_running_loop()
+        self._pending: set[asyncio.Task[None]] = set()
+        self._is_open = True
+
+    async def run(self) -> None:
+        """Serve the program until it leaves."""
+        sender = asyncio.create_task(self._send())
+        self._dashboard.ros.enter()
+        try:
+            self._begin()
+            await self._receive()
+        except WebSocketDisconnect:
+            pass
+        finally:
+            self._is_open = False
+            self._end()
+            for task in (sender, *self._pending):
+                task.cancel()
+            self._dashboard.ros.leave()
+
+    async def close(self) -> None:
+        """Say that the server ends."""
+        await self._close(_GOING_AWAY, "the dashboard has ended")
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Send the first message."""
+
+    @abstractmethod
+    def _take(self, message: str | bytes) -> bool:
+        """Start what a message requests, or answer with an error; return whether it is valid."""
+
+    @abstractmethod
+    def _end(self) -> None:
+        """End all subscriptions."""
+
+    async def _close(self, code: int, reason: str) -> None:
+        if self._socket.application_state is WebSocketState.CONNECTED:
+            await self._socket.close(code, reason)
+
+    async def _send(self) -> None:
+        try:
+            while True:
+                message = await self._outbox.next()
+                if isinstance(message, bytes):
+                    await self._socket.send_bytes(message)
+                else:
+                    await self._socket.send_text(message)
+        except (WebSocketDisconnect, RuntimeError):
+            pass  # the program has left; so does the receiver notice
+
+    async def _receive(self) -> None:
+        malformed = 0
+        while True:
+            message = await self._socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            text = message.get("text")
+            is_valid = self._take(message.get("bytes") or b"" if text is None else text)
+            malformed = 0 if is_valid else malformed + 1
+            if malformed >= _MAX_MALFORMED or self._outbox.is_full_of_replies:
+                await self._close(POLICY_VIOLATION, "too many requests without sense")
+                return
+
+    def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> None:
+        task = self._loop.create_task(coroutine)
+        self._pending.add(task)
+        task.add_done_callback(self._pending.discard)
+
+    def _receiver(self, take: Callable[[Update], None]) -> Receiver:
+        """Return a receiver for the thread of feeds; ``take`` gets the updates on this thread."""
+
+        def receive(update: Update) -> None:
+            if self._is_open:
+                with suppress(RuntimeError):  # the server ends
+                    self._loop.call_soon_threadsafe(take, update)
+
+        return receive
