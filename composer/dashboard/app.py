@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import mimetypes
 from collections.abc import Awaitable, Callable, MutableMapping
+from functools import partial
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
@@ -18,8 +19,11 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from composer.dashboard.access import Refusal, Request
+from composer.dashboard.client import Client
 from composer.dashboard.connection import Connection
 from composer.dashboard.context import Dashboard
+from composer.dashboard.foxglove.connection import FoxgloveConnection, FoxgloveServer
+from composer.dashboard.foxglove.frames import SUBPROTOCOLS
 
 Scope = MutableMapping[str, Any]
 AsgiReceive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -35,11 +39,16 @@ _PAGE = files("composer.dashboard") / "page"
 #: Scripts and styles that the page shares with the pages of ``compose graph``.
 _GRAPH_FILES = files("composer.graph.formats.html")
 _MAX_PATH = 200
+_WITHOUT_FOXGLOVE = Refusal(404, "the dashboard was started with --no-foxglove")
+_NO_SUBPROTOCOL = Refusal(
+    400, f"the WebSocket must have the subprotocol {' or '.join(SUBPROTOCOLS)}"
+)
 
 
 def make_app(dashboard: Dashboard) -> AccessCheck:
     """Return the application."""
-    connections: set[Connection] = set()
+    connections: set[Client] = set()
+    foxglove_server = FoxgloveServer.of(dashboard)
 
     async def index(_: HttpRequest) -> Response:
         # A connection follows: join the ROS graph while the page is being loaded.
@@ -47,13 +56,28 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
         dashboard.ros.leave()
         return _content("index.html")
 
-    async def websocket(socket: WebSocket) -> None:
+    async def page(socket: WebSocket) -> None:
         await socket.accept()
+        await serve(socket, partial(Connection, dashboard))
+
+    async def foxglove(socket: WebSocket) -> None:
+        if not dashboard.options.foxglove:
+            await socket.send_denial_response(_refusal_page(_WITHOUT_FOXGLOVE))
+            return
+        offered = socket.scope["subprotocols"]
+        chosen = next((name for name in SUBPROTOCOLS if name in offered), None)
+        if chosen is None:
+            await socket.send_denial_response(_refusal_page(_NO_SUBPROTOCOL))
+            return
+        await socket.accept(chosen)
+        await serve(socket, partial(FoxgloveConnection, foxglove_server))
+
+    async def serve(socket: WebSocket, connect: Callable[[WebSocket], Client]) -> None:
         if len(connections) >= MAX_CONNECTIONS:
             reason = f"{MAX_CONNECTIONS} connections are open already"
             await socket.close(_TRY_AGAIN_LATER, reason)
             return
-        connection = Connection(dashboard, socket)
+        connection = connect(socket)
         connections.add(connection)
         try:
             await connection.run()
@@ -67,7 +91,8 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
         Route("/page/graph/{name}", _graph_file),
         Route("/page/{path:path}", _file),
         Route("/theme.css", _theme),
-        WebSocketRoute("/ws", websocket),
+        WebSocketRoute("/ws", page),
+        WebSocketRoute("/foxglove", foxglove),
     ]
     app = Starlette(routes=routes)
     app.router.redirect_slashes = False
@@ -77,7 +102,7 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
 class AccessCheck:
     """Lets only allowed requests pass to the application, and sets the headers of all responses."""
 
-    def __init__(self, app: Starlette, dashboard: Dashboard, connections: set[Connection]) -> None:
+    def __init__(self, app: Starlette, dashboard: Dashboard, connections: set[Client]) -> None:
         self._app = app
         self._access = dashboard.access
         self._connections = connections

@@ -9,6 +9,7 @@ from composer.dashboard.access import Access
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feeds
 from composer.dashboard.ros_side import RosSide
+from composer.interfaces import Interfaces
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,4 +30,5 @@ class Dashboard:
     declared: Declared | None
     ros: RosSide
     feeds: Feeds
+    interfaces: Interfaces
     hello: dict[str, Any] = field(default_factory=dict)

@@ -54,13 +54,15 @@ def run_dashboard(
     listening = listen(address.host, address.port)
     port = int(listening.getsockname()[1])
     feeds = Feeds()
-    ros = RosSide(feeds, Forms(Interfaces.load(interface_folders(Project.at(Path.cwd())))))
+    interfaces = Interfaces.load(interface_folders(Project.at(Path.cwd())))
+    ros = RosSide(feeds, Forms(interfaces))
     dashboard = Dashboard(
         options=options,
         access=Access(token, address.host, port),
         declared=declared,
         ros=ros,
         feeds=feeds,
+        interfaces=interfaces,
         hello={
             "protocol": PROTOCOL_VERSION,
             "version": tool_version(),
@@ -78,6 +80,11 @@ def run_dashboard(
         serve(make_app(dashboard), listening, lambda: on_ready(url))
     finally:
         ros.close(_LEAVES_WITHIN_S)
+
+
+def foxglove_url(url: str) -> str:
+    """Return the address for Foxglove, given that of the page."""
+    return url.replace("http://", "ws://", 1).replace("/?", "/foxglove?", 1)
 
 
 def _title(options: Options, declared: Declared | None) -> str:

@@ -104,7 +104,8 @@ def dashboard(
 ) -> None:
     """Show and control running systems in the browser.
 
-    Prints the address of the page, with a token that is new for each start. Press Ctrl-C to stop.
+    Prints the address of the page, and that for Foxglove and Lichtblick, with a token that is new
+    for each start. Press Ctrl-C to stop.
     The dashboard shows the whole ROS graph. With the file of a system, it also shows source lines,
     the plan, and the differences between the file and the running system.
 
@@ -117,13 +118,15 @@ def dashboard(
     from composer.dashboard.access import InvalidTokenFileError
     from composer.dashboard.context import Options
     from composer.dashboard.server import PortInUseError
-    from composer.dashboard.start import Address, NotPrivateError, run_dashboard
+    from composer.dashboard.start import Address, NotPrivateError, foxglove_url, run_dashboard
 
     def on_ready(url: str) -> None:
         if descriptor is not None:
             report_address(descriptor, url)
             return
         write(url)
+        if foxglove:
+            write(f"Foxglove and Lichtblick: {foxglove_url(url)}")
         if open_browser:
             import webbrowser
 

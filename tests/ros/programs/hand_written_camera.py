@@ -1,5 +1,7 @@
 """A plain rclpy node that publishes images: /camera (rgb8, 640 x 480) at 30 Hz.
 
+It also publishes a simulated time on /clock, which begins at 1000 s.
+
 Prints ``ready`` at the start.
 """
 
@@ -12,6 +14,7 @@ import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage, Image
 
 WIDTH, HEIGHT = 640, 480
@@ -31,9 +34,14 @@ class Camera(Node):
         )
         self.image = Image(width=WIDTH, height=HEIGHT, encoding="rgb8", step=WIDTH * 3)
         self.image.data = array("B", bytes((10, 20, 30)) * (WIDTH * HEIGHT))
+        self.clocks = self.create_publisher(Clock, "/clock", 10)
+        self.time = Clock()
+        self.time.clock.sec = 1000
         self.create_timer(1 / 30, self.tick)
 
     def tick(self) -> None:
+        self.time.clock.sec += 1
+        self.clocks.publish(self.time)
         self.images.publish(self.image)
         self.compressed.publish(CompressedImage(format="png", data=PNG))
 

@@ -1,0 +1,100 @@
+"""Definitions of messages as clients read them: a message and everything in it, in one text."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+from composer.interfaces import TEXTS, Field, FieldType, Interfaces, Message, Service
+from composer.tree import Plain
+
+_SEPARATOR = "=" * 80
+
+
+class Schemas:
+    """Makes schemas from the definitions of interfaces; each is made once."""
+
+    def __init__(self, interfaces: Interfaces) -> None:
+        self._interfaces = interfaces
+        self._messages: dict[str, str | None] = {}
+        self._services: dict[str, tuple[str, str] | None] = {}
+
+    def message(self, name: str) -> str | None:
+        """Return the schema of a message; None if a definition is not known."""
+        if name not in self._messages:
+            found = self._interfaces.message(name)
+            self._messages[name] = None if found is None else self._text(found)
+        return self._messages[name]
+
+    def service(self, name: str) -> tuple[str, str] | None:
+        """Return the schemas of the request and the response of a service, or None."""
+        if name not in self._services:
+            self._services[name] = self._service(name)
+        return self._services[name]
+
+    def _service(self, name: str) -> tuple[str, str] | None:
+        found = self._interfaces.find(name)
+        if not isinstance(found, Service):
+            return None
+        request, response = self._text(found.request), self._text(found.response)
+        return None if request is None or response is None else (request, response)
+
+    def _text(self, message: Message) -> str | None:
+        inner: dict[str, Message] = {}
+        pending = [message]
+        while pending:
+            for field in pending.pop().fields:
+                name = field.type.name
+                if field.type.is_primitive or name in inner:
+                    continue
+                found = self._interfaces.message(name)
+                if found is None:
+                    return None
+                inner[name] = found
+                pending.append(found)
+        parts = [_definition(message)]
+        parts += [f"MSG: {_short(name)}\n{_definition(found)}" for name, found in inner.items()]
+        return f"{_SEPARATOR}\n".join(parts)
+
+
+def _definition(message: Message) -> str:
+    return "".join(f"{line}\n" for line in _lines(message))
+
+
+def _lines(message: Message) -> Iterator[str]:
+    # With full names: clients look for a relative one in all packages.
+    for constant in message.constants:
+        yield f"{constant.type} {constant.name}={_constant(constant.value)}"
+    for field in message.fields:
+        yield f"{_type(field.type)} {field.name}{_default(field)}"
+
+
+def _type(type_: FieldType) -> str:
+    return str(type_) if type_.is_primitive else str(type_).replace(type_.name, _short(type_.name))
+
+
+def _short(name: str) -> str:
+    """Return ``package/Name`` for ``package/msg/Name``."""
+    package, _, last = name.split("/")
+    return f"{package}/{last}"
+
+
+def _constant(value: Plain) -> str:
+    return value if isinstance(value, str) else _literal(value)
+
+
+def _default(field: Field) -> str:
+    if field.default is None:
+        return ""
+    is_text = field.type.name in TEXTS and not field.type.is_array
+    return f" {json.dumps(field.default)}" if is_text else f" {_literal(field.default)}"
+
+
+def _literal(value: Plain) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_item, value))}]"
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _item(value: Plain) -> str:
+    return json.dumps(value) if isinstance(value, str) else _literal(value)

@@ -1,0 +1,251 @@
+"""Whatever a client of the Foxglove protocol sends or does not read, everything else continues."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
+
+from composer.dashboard.foxglove.frames import SUBPROTOCOLS
+from tests.ros.support.commands import hand_written
+from tests.ros.support.dashboard import PATIENCE_S, Address, Dashboard, browser, dashboard
+
+MESSAGE, SERVICE = b"\x01", b"\x02"
+
+
+@pytest.fixture(scope="module")
+def server(shared_domain_id: int) -> Iterator[Dashboard]:
+    with (
+        hand_written("hand_written_camera.py"),
+        hand_written("hand_written_talker.py"),
+        dashboard() as running,
+    ):
+        yield running
+
+
+class Raw:
+    """A client that sends what it wants."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.frames: list[bytes] = []
+        self.channels: dict[str, dict[str, Any]] = {}
+        self.services: dict[str, dict[str, Any]] = {}
+        self.capabilities: list[str] = []
+        self.said: list[str] = []
+        self.failures: list[dict[str, Any]] = []
+
+    def send(self, content: Any) -> None:
+        self.socket.send(content if isinstance(content, str | bytes) else json.dumps(content))
+
+    def wait(self, condition: Callable[[], Any]) -> None:
+        while not condition():
+            message = self.socket.recv(timeout=PATIENCE_S)
+            if isinstance(message, bytes):
+                self.frames.append(message)
+                continue
+            content = json.loads(message)
+            self.channels |= {item["topic"]: item for item in content.get("channels", [])}
+            self.services |= {item["name"]: item for item in content.get("services", [])}
+            self.capabilities = content.get("capabilities", self.capabilities)
+            if content["op"] == "status":
+                self.said.append(content["message"])
+            elif content["op"] == "serviceCallFailure":
+                self.failures.append(content)
+
+    def refused(self, content: Any) -> str:
+        """Return the reason why a message is refused."""
+        count = len(self.said)
+        self.send(content)
+        self.wait(lambda: len(self.said) > count)
+        return self.said[count]
+
+    def subscribe(self, topic: str, identifier: int = 0) -> None:
+        self.wait(lambda: topic in self.channels)
+        wanted = [{"id": identifier, "channelId": self.channels[topic]["id"]}]
+        self.send({"op": "subscribe", "subscriptions": wanted})
+
+    def is_served(self) -> bool:
+        """Wait for a message of a topic."""
+        self.subscribe("/lab/count", 999)
+        self.wait(lambda: any(frame[1:5] == struct.pack("<I", 999) for frame in self.frames))
+        return True
+
+
+@contextmanager
+def raw(address: Address, **options: Any) -> Iterator[Raw]:
+    values = {"subprotocols": [Subprotocol(name) for name in SUBPROTOCOLS], **options}
+    url = f"ws://{address.host}/foxglove?token={address.token}"
+    with connect(url, compression=None, max_size=None, **values) as socket:
+        yield Raw(socket)
+
+
+def status_of(address: Address, query: str, **options: Any) -> int:
+    with pytest.raises(InvalidStatus) as caught:
+        connect(f"ws://{address.host}/foxglove{query}", **options)
+    return caught.value.response.status_code
+
+
+def test_only_with_the_token_and_a_known_protocol(server: Dashboard) -> None:
+    address, names = server.address, [Subprotocol("foxglove.sdk.v1")]
+    token = f"?token={address.token}"
+    assert status_of(address, "", subprotocols=names) == 403
+    assert status_of(address, "?token=wrong", subprotocols=names) in (401, 403)
+    evil: Any = "https://app.example"
+    cookie = {"Cookie": address.cookie}
+    assert status_of(address, "", origin=evil, subprotocols=names, additional_headers=cookie) == 403
+    assert status_of(address, token) == 400
+    assert status_of(address, token, subprotocols=[Subprotocol("foxglove.websocket.v9")]) == 400
+    # A page of another site may connect if its user has given it the token.
+    with raw(address, origin=evil) as client:
+        assert client.is_served()
+
+
+def test_simulated_time(server: Dashboard) -> None:
+    with raw(server.address) as client:
+        client.wait(lambda: "time" in client.capabilities)
+        client.wait(lambda: len(client.frames) > 5)
+    times = [struct.unpack("<BQ", frame) for frame in client.frames]
+    assert {opcode for opcode, _ in times} == {2}
+    seconds = [time_ns / 1e9 for _, time_ns in times]
+    assert seconds == sorted(seconds)
+    assert 1000 < seconds[0] < 100_000
+
+
+def test_it_can_be_switched_off(shared_domain_id: int) -> None:
+    with dashboard("--no-foxglove") as server:
+        token = f"?token={server.address.token}"
+        assert (
+            status_of(server.address, token, subprotocols=[Subprotocol("foxglove.sdk.v1")]) == 404
+        )
+
+
+def test_malformed_messages_are_answered_with_a_reason(server: Dashboard) -> None:
+    with raw(server.address) as client:
+        client.wait(lambda: "/lab/count" in client.channels and "/lab/add" in client.services)
+        for content in ("", "{", "[]", "null", '{"op": 1}', "[" * 5000, "\x00", "9" * 5000):
+            assert client.refused(content)
+        assert "did you mean 'subscribe'" in client.refused({"op": "subscrib"})
+        for content in (
+            {"op": "subscribe", "subscriptions": 1},
+            {"op": "subscribe", "subscriptions": [1]},
+            {"op": "subscribe", "subscriptions": [{"id": -1, "channelId": 1}]},
+            {"op": "subscribe", "subscriptions": [{"id": 1e9, "channelId": 1}]},
+            {"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 2**40}]},
+            {"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 99999}]},
+            {"op": "unsubscribe", "subscriptionIds": [7]},
+            {"op": "unadvertise", "channelIds": ["x"]},
+            {"op": "getParameters", "parameterNames": {}},
+            {"op": "getParameters", "parameterNames": [], "id": 5},
+            {"op": "getParameters", "parameterNames": ["", "a b.c", "/lab/talker.no"]},
+            {"op": "setParameters", "parameters": [1]},
+            {"op": "setParameters", "parameters": [{"name": "x"}]},
+            {"op": "setParameters", "parameters": [{"name": "/a.b", "value": {}}]},
+            {"op": "setParameters", "parameters": [{"name": "/a.b", "value": 2**70}]},
+            {
+                "op": "setParameters",
+                "parameters": [{"name": "/lab/talker.speed", "value": [1, "x"]}],
+            },
+            {"op": "setParameters", "parameters": [{"name": "/lab/talker.speed", "value": "x"}]},
+            {"op": "setParameters", "parameters": [{"name": "/lab/talker.speed", "value": 99}]},
+            {
+                "op": "setParameters",
+                "parameters": [{"name": "/a.b", "value": "!", "type": "byte_array"}],
+            },
+            {"op": "advertise", "channels": [{"id": 1, "topic": "/a", "encoding": "json"}]},
+            _advertise(2, "/a", "x", encoding="json"),
+            _advertise(3, "/a", "os/msg/System"),
+            _advertise(4, "a b", "std_msgs/msg/String"),
+            _advertise(5, "/a", "std_srvs/srv/SetBool"),
+            b"",
+            b"\x07abc",
+            b"\x01ab",
+            b"\x01" + bytes(4),
+            SERVICE + bytes(3),
+            SERVICE + struct.pack("<III", 1, 1, 2**31) + b"cdr",
+        ):
+            assert client.refused(content), content
+        assert client.is_served()
+
+
+def _advertise(identifier: int, topic: str, name: str, encoding: str = "cdr") -> dict[str, Any]:
+    channel = {"id": identifier, "topic": topic, "encoding": encoding, "schemaName": name}
+    return {"op": "advertise", "channels": [channel]}
+
+
+def test_malformed_cdr_is_refused(server: Dashboard) -> None:
+    with raw(server.address) as client:
+        client.wait(lambda: "/lab/add" in client.services)
+        client.send(_advertise(1, "/lab/in", "std_msgs/msg/String"))
+        for data in (b"", b"\x00", b"\xff" * 100, b"\x00\x01\x00\x00" + b"\xff" * 50):
+            assert "are not a message std_msgs/msg/String" in client.refused(
+                MESSAGE + struct.pack("<I", 1) + data
+            )
+        number = client.services["/lab/add"]["id"]
+        for call, (service, encoding, data) in enumerate(
+            ((number, b"cdr", b""), (number, b"json", b"{}"), (99999, b"cdr", b"\0\1\0\0\1"))
+        ):
+            head = struct.pack("<III", service, call, len(encoding))
+            client.send(SERVICE + head + encoding + data)
+            client.wait(lambda call=call: len(client.failures) > call)
+        assert [item["callId"] for item in client.failures] == [0, 1, 2]
+        assert client.is_served()
+
+
+def code_of(client: Raw) -> int | None:
+    """Wait until the server closes a connection; return the code, if it could send one."""
+    try:
+        while True:
+            client.socket.recv(timeout=PATIENCE_S)
+    except ConnectionClosed as end:
+        return None if end.rcvd is None else end.rcvd.code
+
+
+def test_nonsense_and_large_messages_end_only_their_connection(server: Dashboard) -> None:
+    before_mb = server.memory_mb()
+    with raw(server.address) as other:
+        with raw(server.address) as client:
+            for number in range(20):
+                client.send(b"\x07" if number % 2 else "nonsense")
+            assert code_of(client) == 1008
+        for size in (2_000_000, 100_000_000):
+            with raw(server.address) as client:
+                client.wait(lambda client=client: client.channels)
+                with suppress(ConnectionClosed):
+                    client.send(b"\x01" * size)
+                assert code_of(client) in (1009, None)
+        assert other.is_served()
+    assert server.memory_mb() < before_mb + 30
+
+
+def test_clients_that_never_read_cost_no_memory(server: Dashboard) -> None:
+    with ExitStack() as stack, raw(server.address) as other:
+        for _ in range(4):
+            stalled = stack.enter_context(raw(server.address, max_queue=1, close_timeout=0))
+            for number in range(5):
+                stalled.subscribe("/camera", number)
+            stalled.subscribe("/lab/count", 10)
+            stalled.send({"op": "subscribeParameterUpdates", "parameterNames": []})
+        other.subscribe("/camera")
+        other.wait(lambda: other.frames)
+        before_mb = server.memory_mb()
+        received = len(other.frames)
+        other.wait(lambda: len(other.frames) > received + 150)  # five seconds of images
+        assert server.memory_mb() < before_mb + 80
+        assert other.is_served()
+        with browser(server.address) as page:
+            assert page.ok("ping")
+    # A client that requests without reading is disconnected.
+    with raw(server.address, max_queue=1, close_timeout=0) as client:
+        client.wait(lambda: client.channels)
+        with suppress(ConnectionClosed):
+            for _ in range(200_000):
+                client.send({"op": "unsubscribe", "subscriptionIds": [7]})
+        assert code_of(client) in (1008, None)
