@@ -122,7 +122,7 @@ class FoxgloveConnection(Link):
 
     def _send_info(self) -> None:
         """Say what is possible; sent again, with the same session, it only replaces that."""
-        self.tell(
+        self.post(
             {
                 "op": "serverInfo",
                 "name": f"ros2-composer: {self._dashboard.hello.get('title', '')}",
@@ -156,9 +156,9 @@ class FoxgloveConnection(Link):
         gone, new = changes(before.channels, self._known.channels)
         self._subscriptions.end(gone)
         if gone:
-            self.tell({"op": "unadvertise", "channelIds": gone})
+            self.post({"op": "unadvertise", "channelIds": gone})
         if new:
-            self.tell({"op": "advertise", "channels": [item.as_data() for item in new]})
+            self.post({"op": "advertise", "channels": [item.as_data() for item in new]})
         for type_name, user in self._known.unknown.items():
             if type_name not in self._unknown:
                 self._unknown.add(type_name)
@@ -167,9 +167,9 @@ class FoxgloveConnection(Link):
     def _offer_services(self, before: Contents) -> None:
         gone, new = changes(before.services, self._known.services)
         if gone:
-            self.tell({"op": "unadvertiseServices", "serviceIds": gone})
+            self.post({"op": "unadvertiseServices", "serviceIds": gone})
         if new:
-            self.tell({"op": "advertiseServices", "services": [item.as_data() for item in new]})
+            self.post({"op": "advertiseServices", "services": [item.as_data() for item in new]})
 
     def _on_time(self, update: Update) -> None:
         if update.is_error:
@@ -188,7 +188,7 @@ class FoxgloveConnection(Link):
     def _send_graph(self, before: Contents) -> None:
         update = graph_update(before, self._known)
         if update is not None:
-            self.tell(update)
+            self.post(update)
 
 
 def _compose(subscription: int, _: Waiting, update: Update) -> bytes:

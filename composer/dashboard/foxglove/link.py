@@ -50,7 +50,7 @@ class Link(Client):
         if self.is_read_only:
             raise RequestError("read_only", f"{what} is not possible: the dashboard is read-only")
 
-    def tell(self, content: dict[str, Any] | bytes) -> None:
+    def post(self, content: dict[str, Any] | bytes) -> None:
         """Send something that must not get lost; a client that does not read is disconnected."""
         if not self._outbox.is_full_of_replies:
             self._outbox.reply(content if isinstance(content, bytes) else to_json(content))
@@ -60,7 +60,7 @@ class Link(Client):
 
     def say(self, level: int, message: str) -> None:
         """Send a message for the user of the client."""
-        self.tell(status(level, message))
+        self.post(status(level, message))
 
     def say_error(self, update: Update) -> None:
         """Send the error of a feed."""

@@ -37,12 +37,14 @@ class Subscriptions:
                 raise BadRequestError(f"there is no channel {wanted_channel}")
             if identifier in self._running:
                 raise BadRequestError(f"the subscription {identifier} exists already")
+            if any(known == channel.id for known, _ in self._running.values()):
+                raise BadRequestError(f"you have subscribed to '{channel.topic}' already")
             if len(self._running) >= _MAX_SUBSCRIPTIONS:
                 raise RequestError("too_many", f"{_MAX_SUBSCRIPTIONS} subscriptions are the limit")
             feed = TopicFeed(channel)
             self._link.outbox.open(identifier, channel.topic, feed.delivery)
             take = self._sender(identifier, channel.topic)
-            running = self._link.start(f"subscription {identifier}", feed, take)
+            running = self._link.start(f"channel {channel.id}", feed, take)
             self._running[identifier] = channel.id, running
 
     def unsubscribe(self, values: Values) -> None:
@@ -101,7 +103,7 @@ class Publications:
             feed = PublishedFeed(
                 wanted.text("topic"), wanted.text("schemaName"), wanted.text("encoding")
             )
-            running = self._link.start(f"channel {identifier}", feed, self._link.say_error)
+            running = self._link.start(f"publisher {identifier}", feed, self._link.say_error)
             self._running[identifier] = feed, running
 
     def unadvertise(self, values: Values) -> None:

@@ -34,7 +34,7 @@ def call_service(link: Link, call: ServiceCall, services: Mapping[int, OfferedSe
 
     def fail(error: RequestError) -> None:
         content = {"serviceId": call.service, "callId": call.call, "message": error_text(error)}
-        link.tell({"op": "serviceCallFailure", **content})
+        link.post({"op": "serviceCallFailure", **content})
 
     def run(ros: RosGraphSide, deadline: Deadline) -> bytes:
         from composer.remote.serialized import call_serialized
@@ -49,7 +49,7 @@ def call_service(link: Link, call: ServiceCall, services: Mapping[int, OfferedSe
         if call.encoding != CDR:
             raise BadRequestError(f"the encoding must be {CDR}, not '{call.encoding:.20}'")
         service = found
-        link.request(run, _CALL_S, lambda data: link.tell(service_response(call, data)), fail)
+        link.request(run, _CALL_S, lambda data: link.post(service_response(call, data)), fail)
     except RequestError as error:
         fail(error)
 
@@ -117,7 +117,7 @@ class Parameters:
                 self._link.say(ERROR, problem)
             content = {"op": "parameterValues", "parameters": found.parameters}
             if is_answered:
-                self._link.tell(content if identifier is None else content | {"id": identifier})
+                self._link.post(content if identifier is None else content | {"id": identifier})
 
         def fail(error: RequestError) -> None:
             self._link.say(ERROR, error_text(error))
@@ -132,4 +132,4 @@ class Parameters:
             item for item in json.loads(update.data) if self._has_all or item["name"] in self._names
         ]
         if changed:
-            self._link.tell({"op": "parameterValues", "parameters": changed})
+            self._link.post({"op": "parameterValues", "parameters": changed})

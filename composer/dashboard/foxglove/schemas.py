@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 
-from composer.interfaces import TEXTS, Field, FieldType, Interfaces, Message, Service
+from composer.interfaces import FieldType, Interfaces, Message, Service
 from composer.tree import Plain
 
 _SEPARATOR = "=" * 80
@@ -64,9 +64,10 @@ def _definition(message: Message) -> str:
 def _lines(message: Message) -> Iterator[str]:
     # With full names: clients look for a relative one in all packages.
     for constant in message.constants:
-        yield f"{constant.type} {constant.name}={_constant(constant.value)}"
+        yield f"{constant.type} {constant.name}={_literal(constant.value)}"
     for field in message.fields:
-        yield f"{_type(field.type)} {field.name}{_default(field)}"
+        default = "" if field.default is None else f" {_literal(field.default)}"
+        yield f"{_type(field.type)} {field.name}{default}"
 
 
 def _type(type_: FieldType) -> str:
@@ -79,22 +80,9 @@ def _short(name: str) -> str:
     return f"{package}/{last}"
 
 
-def _constant(value: Plain) -> str:
-    return value if isinstance(value, str) else _literal(value)
-
-
-def _default(field: Field) -> str:
-    if field.default is None:
-        return ""
-    is_text = field.type.name in TEXTS and not field.type.is_array
-    return f" {json.dumps(field.default)}" if is_text else f" {_literal(field.default)}"
-
-
 def _literal(value: Plain) -> str:
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_item, value))}]"
+        return f"[{', '.join(map(_literal, value))}]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
     return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def _item(value: Plain) -> str:
-    return json.dumps(value) if isinstance(value, str) else _literal(value)

@@ -29,18 +29,18 @@ _MAX_WAITING = 256
 
 
 class TopicFeed(Feed):
-    """The messages of a topic for one client, as bytes.
+    """The messages of a topic, as bytes.
 
-    Each client has a subscription of its own: latched messages arrive when it subscribes.
+    Of large messages, a client gets the latest, and all clients share one subscription. Of others,
+    each has a subscription of its own, so that it gets the latched messages.
     """
 
-    is_shared = False
     period_s = _POLL_S
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
-        # Of large messages, a slow client gets the latest.
-        self.delivery = Delivery.LATEST if channel.type in LARGE_TYPES else Delivery.QUEUE
+        self.is_shared = channel.type in LARGE_TYPES
+        self.delivery = Delivery.LATEST if self.is_shared else Delivery.QUEUE
         self._reader: TopicReader
 
     def start(self, ros: RosGraphSide) -> None:

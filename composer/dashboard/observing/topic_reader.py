@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from composer.dashboard.errors import RequestError
 from composer.dashboard.observing.meters import LARGE_TYPES
 from composer.model import PortKind
-from composer.qos import Reliability
+from composer.qos import Durability, Reliability
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide
@@ -97,13 +97,15 @@ class TopicReader:
     def _wanted_profile(self, publishers: list[ObservedEndpoint], type_name: str) -> QosProfile:
         """Return the strictest profile that all publishers satisfy.
 
-        Large messages are never requested reliably: a reader that is late would delay a publisher.
+        A stream of large messages is not requested reliably: a reader that is late would delay a
+        publisher. Latched ones, such as maps, only arrive if they are.
         """
         from composer.remote.topics import strictest_compatible_qos
 
         offers = [end.qos for end in publishers if end.qos is not None]
         profile = strictest_compatible_qos(offers, self._depth)
         if type_name in LARGE_TYPES:
-            depth = min(self._depth, _LARGE_DEPTH)
-            return replace(profile, depth=depth, reliability=Reliability.BEST_EFFORT)
+            profile = replace(profile, depth=min(self._depth, _LARGE_DEPTH))
+            if profile.durability is Durability.VOLATILE:
+                return replace(profile, reliability=Reliability.BEST_EFFORT)
         return profile

@@ -1,6 +1,6 @@
 """A plain rclpy node that publishes images: /camera (rgb8, 640 x 480) at 30 Hz.
 
-It also publishes a simulated time on /clock, which begins at 1000 s.
+It also publishes a simulated time on /clock, which begins at 1000 s, and once a latched /map.
 
 Prints ``ready`` at the start.
 """
@@ -11,9 +11,10 @@ import sys
 from array import array
 
 import rclpy
+from nav_msgs.msg import OccupancyGrid
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage, Image
 
@@ -34,6 +35,9 @@ class Camera(Node):
         )
         self.image = Image(width=WIDTH, height=HEIGHT, encoding="rgb8", step=WIDTH * 3)
         self.image.data = array("B", bytes((10, 20, 30)) * (WIDTH * HEIGHT))
+        kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.maps = self.create_publisher(OccupancyGrid, "/map", kept)
+        self.maps.publish(OccupancyGrid(data=[0, 100, -1]))
         self.clocks = self.create_publisher(Clock, "/clock", 10)
         self.time = Clock()
         self.time.clock.sec = 1000
