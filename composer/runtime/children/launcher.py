@@ -123,13 +123,20 @@ class Launcher:
                 return
             request = json.loads(packet)
             if "start" in request:
-                self._start(request, descriptors)
+                if not self._is_composer_gone():
+                    self._start(request, descriptors)
             elif request["end"] in self._children:
                 child = self._children[request["end"]]
                 child.end(request["terminate_s"], request["kill_s"])
         finally:
             for descriptor in descriptors:
                 os.close(descriptor)
+
+    def _is_composer_gone(self) -> bool:
+        """Return whether the socket is closed, also while there are requests left to read."""
+        poller = select.poll()
+        poller.register(self._connection, select.POLLHUP)
+        return any(event & select.POLLHUP for _, event in poller.poll(0))
 
     def _on_orphaned(self) -> None:
         self._is_orphan = True

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -13,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from composer.runtime.children import launcher
 from composer.runtime.children.child_processes import (
     Child,
     ChildProcesses,
@@ -184,11 +187,26 @@ def test_no_orphan_whatever_ends_the_composer(number: signal.Signals) -> None:
 def test_no_child_survives_the_launcher(children: ChildProcesses) -> None:
     child = start(children, "exec sleep 60", [])
     wait_until(child.started.done, "the start")
-    launcher = children._launcher
-    assert launcher is not None
-    launcher.kill()
+    process = children._launcher
+    assert process is not None
+    process.kill()
     wait_until(child.ended.done, "the end")
     wait_until(lambda: not Path("/proc", str(child.pid)).exists(), "the death of the child")
     again = start(children, "exit 0", [])  # by a new launcher
     wait_until(again.ended.done, "the end")
     assert again.ended.result() == 0
+
+
+def test_nothing_is_started_for_a_composer_that_is_gone(tmp_path: Path) -> None:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    started = tmp_path / "started"
+    request = {"start": 1, "command": ["touch", str(started)], "environment": {}, "folder": None}
+    with Path(os.devnull).open("wb") as output:
+        files = [output.fileno(), output.fileno()]
+        socket.send_fds(ours, [json.dumps(request).encode()], files)
+    ours.close()
+    with theirs:
+        command = [sys.executable, launcher.__file__, str(theirs.fileno()), str(tmp_path / "files")]
+        done = subprocess.run(command, pass_fds=[theirs.fileno()], timeout=PATIENCE_S, check=False)
+    assert done.returncode == 0
+    assert not started.exists()
