@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 #: A feed that fails is tried again after this time.
 _RETRY_S = 1.0
+_ALIGNED_S = 1.0
 _INTERNAL = "an internal error of the dashboard: see its output"
 
 
@@ -156,7 +158,7 @@ class Feeds:
             for update in running.feed.poll():
                 running.last_error = ""
                 self._send(running, update)
-            running.due_s = max(running.due_s + running.feed.period_s, time.monotonic())
+            running.due_s = _next_s(running.due_s, running.feed.period_s)
         except RequestError as error:
             self._fail(running, error)
         except RosError as error:
@@ -189,3 +191,14 @@ class Feeds:
             running.feed.close()
         except Exception:
             _LOG.exception("the channel %s could not be closed", running.key)
+
+
+def _next_s(due_s: float, period_s: float) -> float:
+    """Return when the next poll is due.
+
+    Slow feeds are polled at the same times, so that the thread wakes up once for all of them.
+    """
+    now_s = time.monotonic()
+    if period_s < _ALIGNED_S:
+        return max(due_s + period_s, now_s)
+    return (math.floor(now_s / period_s) + 1) * period_s
