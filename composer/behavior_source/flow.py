@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Sequence
 
-from composer.behavior_source.method_body import Function
+from composer.behavior_source.method_body import Function, dotted
 from composer.behavior_source.traversal import children, walk
 
 _SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
@@ -45,6 +45,31 @@ def reaches_end(function: Function) -> bool:
     if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in _own_nodes(function.body)):
         return False
     return _continues(function.body)
+
+
+def may_raise_at_end(function: Function) -> bool:
+    """Return whether ``function`` may never reach its end, because of a loop or a call there.
+
+    What other functions do is not known; the log is known to return.
+    """
+    pending = [function.body[-1]]
+    while pending:
+        match pending.pop():
+            case ast.For() | ast.AsyncFor() | ast.While():
+                return True
+            case ast.Expr(value=ast.Call() as call):
+                if not dotted(call.func).startswith("self.log."):
+                    return True
+            case ast.If(body=body, orelse=orelse):
+                pending += [body[-1], *orelse[-1:]]
+            case ast.With(body=body) | ast.AsyncWith(body=body):
+                pending.append(body[-1])
+            case ast.Try(body=body, handlers=handlers, orelse=orelse, finalbody=finalbody):
+                pending += [body[-1], *orelse[-1:], *finalbody[-1:]]
+                pending += [handler.body[-1] for handler in handlers]
+            case ast.Match(cases=cases):
+                pending += [case.body[-1] for case in cases]
+    return False
 
 
 def is_stub(function: Function) -> bool:

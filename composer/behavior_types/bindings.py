@@ -71,8 +71,9 @@ class Bindings:
 def bindings_of(function: Function, *, is_method: bool = True) -> Bindings:
     """Return the bindings in ``function`` and in the functions within it.
 
-    If ``is_method``, the first argument is the behavior.
+    If ``is_method``, the first argument is the behavior, except in a static method.
     """
+    is_method = is_method and not is_static(function)
     arguments = (*function.args.posonlyargs, *function.args.args)
     found = Bindings(receiver=arguments[0].arg if arguments and is_method else None)
     for argument in arguments[1:] if is_method else arguments:
@@ -84,6 +85,13 @@ def bindings_of(function: Function, *, is_method: bool = True) -> Bindings:
     for node in nodes_of(function):
         _bind(node, found)
     return found
+
+
+def is_static(function: Function) -> bool:
+    """Return whether a function is a static method, without the object as its first argument."""
+    return any(
+        isinstance(item, ast.Name) and item.id == "staticmethod" for item in function.decorator_list
+    )
 
 
 @lru_cache(maxsize=512)

@@ -6,7 +6,12 @@ import ast
 from collections.abc import Iterator
 
 from composer.behavior_source import BehaviorSource, Function, Module
-from composer.behavior_source.flow import is_stub, reaches_end, returned_values
+from composer.behavior_source.flow import (
+    is_stub,
+    may_raise_at_end,
+    reaches_end,
+    returned_values,
+)
 from composer.behavior_source.receivers import lacks_self
 from composer.behavior_source.spans import attribute_span, span_of, start_span
 from composer.behavior_source.syntax import name_span
@@ -283,6 +288,8 @@ class _FunctionChecker:
         expected = annotated(annotation, self.scope.home, self.types.node, self.types.interfaces)
         name = self.function.name
         if _allows_none(annotation) or name.startswith("accept_") or is_stub(self.function):
+            return
+        if may_raise_at_end(self.function):
             return
         if isinstance(expected, Message | FieldType):
             problem = f"'{name}' returns {described(expected)}, but may end without a 'return'"

@@ -10,10 +10,10 @@ from composer.behavior_source import BehaviorSource, Function
 from composer.behavior_source.spans import attribute_span
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.api import BEHAVIOR_ATTRIBUTES
-from composer.behavior_types.bindings import nodes_of
+from composer.behavior_types.bindings import is_static, nodes_of
 from composer.behavior_types.problems import CodeProblem, Kind
 
-_OF_OBJECTS = frozenset(dir(type("Plain", (), {})))
+_OF_OBJECTS = frozenset({*dir(type("Plain", (), {})), *dir(type)})
 
 
 def self_attributes(source: BehaviorSource, assigned: Iterable[str]) -> frozenset[str]:
@@ -61,7 +61,7 @@ def defined_names(statement: ast.stmt, *, declared: bool = False) -> Iterator[st
 
 def _escapes_from(function: Function) -> bool:
     positional = (*function.args.posonlyargs, *function.args.args)
-    if not positional:
+    if not positional or is_static(function):
         return False
     receiver = positional[0].arg
     uses = 0

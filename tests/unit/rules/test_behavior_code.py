@@ -118,6 +118,16 @@ class Code(Behavior):
     def keep_rates(self, rates: list[float]):
         self.kept = rates
 
+    @staticmethod
+    def first(names, other: str = ""):
+        if names is None:
+            names = []
+        return names.strip()
+
+    @classmethod
+    def title(cls):
+        return cls.__name__
+
     def _text(self) -> str:
         return "text"
 
@@ -329,6 +339,8 @@ RIGHT = [
     ("odometry", "Mode.FAST.name, Mode['FAST'].value, Mode.parse('a')"),
     ("odometry", "Statistics().scores.append(1.0)\nself.statistics.mean() * 2"),
     ("odometry", "total = 1\ntotal += 1"),
+    ("odometry", "def fail() -> int:\n    if message:\n        return 1\n    raise_error()\n"
+     "def raise_error():\n    raise ValueError\nfail()"),
     ("odometry", "self.others = self.wheel1 = 1\nself.wheel2 = self.wheel1"),
     ("odometry", "Reference(1, limit=2), Reference(*[1, 2])"),
     ("odometry", "if self.parameters.mode == 'slow' or self.parameters.mode != 'fast':\n    pass"),
