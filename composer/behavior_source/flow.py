@@ -55,8 +55,9 @@ def may_raise_at_end(function: Function) -> bool:
     pending = [function.body[-1]]
     while pending:
         match pending.pop():
-            case ast.For() | ast.AsyncFor() | ast.While():
-                return True
+            case ast.For(body=body) | ast.AsyncFor(body=body) | ast.While(body=body):
+                if any(isinstance(node, ast.Return) for node in _own_nodes(body)):
+                    return True
             case ast.Expr(value=ast.Call() as call):
                 if not dotted(call.func).startswith("self.log."):
                     return True
