@@ -26,7 +26,8 @@ MAX_MESSAGE = 1024 * 1024
 #: Connections, most of which are free again after the time that each has for a request.
 MAX_OPEN = 160
 REQUEST_WITHIN_S = 5.0
-_BACKLOG = 128
+#: Connections that are accepted at once, before those beyond the limit are ended.
+BACKLOG = 128
 _MAX_HEADERS = 16 * 1024
 #: A browser that has not answered a ping after this time is disconnected.
 _PING_S = 20.0
@@ -50,7 +51,7 @@ def listen(host: str, port: int | None) -> socket.socket:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listening.bind((host, candidate))
-            listening.listen(_BACKLOG)
+            listening.listen(BACKLOG)
         except OSError as error:
             listening.close()
             if port is None and error.errno == errno.EADDRINUSE:
@@ -72,6 +73,7 @@ def serve(app: AccessCheck, listening: socket.socket, on_ready: Callable[[], Non
         loop="asyncio",
         lifespan="off",
         interface="asgi3",
+        backlog=BACKLOG,
         ws_max_size=MAX_MESSAGE,
         ws_per_message_deflate=False,  # compression takes time and memory for each browser
         ws_ping_interval=_PING_S,
