@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.references import matched_ports, own_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register, shown
-from composer.model import Node, Port, Remapping
+from composer.model import ImplementationKind, Node, Port, Remapping
 
 RULE = register(
     Rule(
@@ -43,14 +43,18 @@ connections:
     )
 )
 
+_NAMES_IN_CODE = (ImplementationKind.CLASS, ImplementationKind.EXECUTABLE)
+
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the final names of remapped ports."""
     for node in context.system.nodes:
         for remapping in node.remappings:
             yield from _remapping(node, remapping)
-        for port in node.ports if not node.remappings else ():
-            yield from _port(node, port)
+        # In a class or a program, the name of a port is what the connection renames.
+        if not node.remappings and node.implementation not in _NAMES_IN_CODE:
+            for port in node.ports:
+                yield from _port(node, port)
 
 
 def _port(node: Node, port: Port) -> Iterator[Diagnostic]:
