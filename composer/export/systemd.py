@@ -38,7 +38,7 @@ WorkingDirectory={folder}
 KillMode=mixed
 KillSignal=SIGTERM
 TimeoutStopSec={stop_s}
-# Exit code 1: a node failed permanently. Errors in files (2) are not retried.
+# Exit code 1: errors in files, or a node failed permanently. 2: a usage error, not retried.
 Restart=on-failure
 RestartSec=2
 RestartPreventExitStatus=2
