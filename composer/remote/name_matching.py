@@ -87,7 +87,7 @@ def _matches(name: str, known: tuple[str, ...]) -> tuple[str, ...]:
 def _hint(kind: str, name: str, known: list[str]) -> str:
     if not known:
         return (
-            f"no {kind}s found: check that the system is running, and that ROS_DOMAIN_ID and"
+            f"no {kind} was found: check that the system is running, and that ROS_DOMAIN_ID and"
             " the discovery range are the same"
         )
     close = nearest(name, known)

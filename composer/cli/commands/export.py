@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 app = typer.Typer(
     help="""Write files with which other tools run a system.
 
-    They are functions of the system: export again after changes.
+    The files are derived from the system: export again after changes.
     """,
     epilog=examples(
         "compose export launch systems/robot.yaml -o launch/robot.launch.py",
@@ -45,7 +45,7 @@ Output = Annotated[
 def export() -> None:
     """Write files with which other tools run a system.
 
-    They are functions of the system: export again after changes.
+    The files are derived from the system: export again after changes.
     """
 
 

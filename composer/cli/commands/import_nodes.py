@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 app = typer.Typer(
     help="""Describe existing nodes in YAML.
 
-    The files that are written have their origin in comments, and are a start: edit them, then
-    compare them with what runs with 'compose diff'.
+    The result is a valid file to start from: edit it, and compare it with the running nodes with
+    'compose diff'.
     """,
     epilog=examples(
         "compose import live -o systems/robot.yaml                   the nodes that run now",
@@ -132,7 +132,8 @@ def import_class(
     creates with literal names are declared. What only running would show is listed. With
     --construct, the constructor runs, and all that it creates is declared.
 
-    The module is searched in this folder, in the project's node types and where Python finds it.
+    The module is searched for in this folder, among the node types of the project, and on
+    Python's module search path.
     """
     from composer.importing import write_node_type
     from composer.importing.python_class import ClassNotFound, describe_class
@@ -182,7 +183,7 @@ def import_launch(
 ) -> None:
     """Describe the nodes of a launch file as a system.
 
-    The file is evaluated with these arguments in a process of its own, as by 'ros2 launch', but
+    The file is evaluated with these arguments in a process of its own, like 'ros2 launch' does, but
     nothing is started: nodes become executables with their names, namespaces, parameters,
     remappings and environment. Includes, groups and conditions are resolved. Components, processes
     that are not nodes and event handlers are listed and left out.

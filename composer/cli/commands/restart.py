@@ -39,9 +39,9 @@ def restart(
     """Restart nodes of a running system.
 
     The nodes are deactivated and cleaned up, and brought up again to the states that they had; a
-    node that has failed or was shut down is started. The active nodes that depend on them are
-    deactivated before it and activated after it. Parameters keep their values, and YAML files are
-    not read again.
+    node that has failed or was shut down is started. Active nodes that depend on them are
+    deactivated first, and activated again afterwards. Parameters keep their values, and YAML files
+    are not read again.
 
     Exit code 1 if a node does not come up again.
     """
