@@ -71,6 +71,11 @@ class Interfaces:
         """
         return cls((*installed_prefixes(), Bundle()), find_packages(folders))
 
+    @classmethod
+    def installed(cls) -> Interfaces:
+        """Return the interfaces in installed packages, which can be used at run time."""
+        return cls(installed_prefixes())
+
     @property
     def _sources(self) -> tuple[InterfaceSource, ...]:
         return (self._project, *self._others)

@@ -65,10 +65,9 @@ def class_of(name: str, kind: str = "message") -> Any:
 
 
 def _similar(name: str, kind: str) -> str | None:
-    interfaces = Interfaces.load()
-    if interfaces.find(name) is not None:
+    if Interfaces.load().find(name) is not None:
         return None
-    return similar_interface(name, interfaces.names(_KINDS[kind].folder))
+    return similar_interface(name, Interfaces.installed().names(_KINDS[kind].folder))
 
 
 def compile_content(text: str, message_type: Any, what: str) -> Build:

@@ -79,6 +79,7 @@ STATE = {
     "state": "active", "desired": "active", "since": "1.0", "restarts": "0", "errors": "0",
     "last_error": "", "held_down": "", "sent_hz": "1.0", "received_hz": "1.0", "busy": "0.1",
     "slowest": "", "overruns": "0", "queue_drops": "0", "qos_events": "lost=1", "depends_on": "",
+    "sent": "", "received": "", "dropped": "",
 }  # fmt: skip
 
 
