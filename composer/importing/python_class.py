@@ -100,7 +100,7 @@ def _check(source: BehaviorSource, text: str) -> None:
     if not source.module_found:
         raise ClassNotFound(
             f"no Python module named '{module}'",
-            "it is searched in this folder, in the project's node types, and where Python finds it",
+            "it is searched for in this folder, in the project's node types, and on Python's path",
         )
     if not source.class_found:
         raise ClassNotFound(

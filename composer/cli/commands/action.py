@@ -33,7 +33,7 @@ app = typer.Typer(
     epilog=examples(
         "compose action list -t",
         "compose action info /navigate",
-        "compose action send-goal /navigate '{target: {x: 2.0}}' --feedback",
+        "compose action send-goal /navigate '{target: {x: 2.0}, max_velocity: 1.0}' --feedback",
     ),
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -182,7 +182,7 @@ def _print(kind: str, content: Any, json: bool, status: str | None = None) -> No
 
 _EPILOG = examples(
     "compose action send-goal /navigate '{target: {x: 2.0}, max_velocity: 1.0}' --feedback",
-    "compose action send-goal /navigate composer_interfaces/action/Navigate '{target: {x: 2.0}}'",
+    "compose action send-goal /navigate composer_interfaces/action/Navigate '{max_velocity: 1.0}'",
 )
 app.command("send-goal", epilog=_EPILOG)(send_goal)
 app.command("send_goal", epilog=_EPILOG, hidden=True)(send_goal)  # as ros2 spells it

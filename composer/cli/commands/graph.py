@@ -26,7 +26,7 @@ EPILOGS = {
         "compose graph pipeline -o pipeline.svg                write an image",
         "compose graph pipeline --view lifecycle -o order.png  draw the bring-up order",
         "compose graph pipeline -f dot | dot -Tpdf > p.pdf     use Graphviz",
-        "compose graph robot.yaml base.yaml -o both.svg        draw several systems together",
+        "compose graph pipeline robot -o both.svg               draw several systems together",
         "compose graph --live -o now.html                      draw the running ROS graph",
     )
 }

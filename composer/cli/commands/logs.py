@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 EPILOGS = {
     "logs": examples(
         "compose logs                                  the latest run",
-        "compose logs planner camera                   two nodes",
+        "compose logs planner motor_controller         two nodes",
         "compose logs -f --level warn                  follow warnings and errors",
         "compose logs --since 10m '/perception/*'      the last ten minutes",
         "compose logs --system pipeline --list         the runs of a system",

@@ -18,8 +18,8 @@ _TIMEOUT_S = 30.0
 EPILOGS = {
     "restart": examples(
         "compose restart planner",
-        "compose restart planner camera        several nodes",
-        "compose restart '/perception/*'       all nodes that match",
+        "compose restart planner motor_controller    several nodes",
+        "compose restart '/perception/*'             all nodes that match",
     )
 }
 
