@@ -143,9 +143,9 @@ class GoalState(StrEnum):
     "set",
     epilog=examples(
         "compose lifecycle set planner deactivate",
-        "compose lifecycle set planner motor_controller activate     several nodes",
-        "compose lifecycle set '/perception/*' deactivate             all nodes that match",
-        "compose lifecycle set planner --to active                    as many transitions as needed",
+        "compose lifecycle set planner motor_controller activate   several nodes",
+        "compose lifecycle set '/perception/*' deactivate           all nodes that match",
+        "compose lifecycle set planner --to active                  as many transitions as needed",
         "compose lifecycle set planner deactivate --dependents",
         "compose lifecycle set --system pipeline --to inactive",
     ),

@@ -35,7 +35,7 @@ def behavior_class(reference: BehaviorReference) -> type[Any]:
     found = getattr(module, reference.class_name, None)
     if not isinstance(found, type):
         raise BehaviorLoadError(
-            f"behavior '{reference.text}': {module.__file__} has no class '{reference.class_name}'"
+            f"cannot load '{reference.text}': {module.__file__} has no {reference.class_name}"
         )
     return found
 
@@ -58,7 +58,7 @@ def _module(reference: BehaviorReference) -> ModuleType:
         if not f"{reference.module}.".startswith(f"{error.name}."):
             raise  # the module exists, and imports one that does not
         raise BehaviorLoadError(
-            f"behavior '{reference.text}': there is no '{parts[-1]}.py' in {reference.folder} "
+            f"cannot load '{reference.text}': there is no '{parts[-1]}.py' in {reference.folder} "
             "or among the project's node types, and no such installed module"
         ) from error
 
