@@ -8,14 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.commands.run import Autostart
 from composer.cli.support.dashboard_process import (
     follow_parent,
     report_address,
     require_dashboard,
 )
 from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.options import Namespace, examples
+from composer.cli.support.options import (
+    Autostart,
+    AutostartOfRun,
+    Namespace,
+    SettingsOfRun,
+    examples,
+)
 from composer.cli.support.process import end_now
 from composer.cli.support.ros import require_ros
 from composer.cli.support.system_arguments import (
@@ -84,23 +89,9 @@ def dashboard(
         bool,
         typer.Option("--foxglove/--no-foxglove", help="Serve Foxglove and Lichtblick as well."),
     ] = True,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NODE.PARAMETER=VALUE",
-            help="A parameter override, as given to 'compose run'. Repeatable.",
-            show_default=False,
-        ),
-    ] = None,
+    settings: SettingsOfRun = None,
     namespace: Namespace = None,
-    autostart: Annotated[
-        Autostart | None,
-        typer.Option(
-            help="The state up to which nodes were brought up, as given to 'compose run'.",
-            show_default="as declared in the system",
-        ),
-    ] = None,
+    autostart: AutostartOfRun = None,
 ) -> None:
     """Show and control running systems in the browser.
 

@@ -8,9 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from composer.cli.commands.run import Autostart
 from composer.cli.support.errors import FAILED, CommandError
-from composer.cli.support.options import Json, Namespace, Timeout, examples, finite
+from composer.cli.support.options import (
+    Autostart,
+    AutostartOfRun,
+    Json,
+    Namespace,
+    SettingsOfRun,
+    Timeout,
+    examples,
+    finite,
+)
 from composer.cli.support.output import as_json
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import SystemName, load_system, system_file
@@ -42,23 +50,9 @@ Compare = Callable[["Snapshot"], tuple["Drift", ...]]
 def diff(
     system: SystemName,
     *,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NODE.PARAMETER=VALUE",
-            help="A parameter override, as given to 'compose run'. Repeatable.",
-            show_default=False,
-        ),
-    ] = None,
+    settings: SettingsOfRun = None,
     namespace: Namespace = None,
-    autostart: Annotated[
-        Autostart | None,
-        typer.Option(
-            help="The state up to which nodes were brought up, as given to 'compose run'.",
-            show_default="as declared in the system",
-        ),
-    ] = None,
+    autostart: AutostartOfRun = None,
     ignore: Annotated[
         list[str] | None,
         typer.Option(

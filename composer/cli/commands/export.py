@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.support.errors import FAILED, CommandError
-from composer.cli.support.options import Namespace, examples
+from composer.cli.support.options import Namespace, NewFile, examples
 from composer.cli.support.system_arguments import SystemName, load_system, system_file
 from composer.cli.support.terminal import say, write_raw
 
@@ -29,17 +29,6 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE",
-        help="Write to a new file instead of stdout.",
-        show_default=False,
-    ),
-]
-
 
 @app.callback()
 def export() -> None:
@@ -52,7 +41,7 @@ def export() -> None:
 @app.command(
     "launch", epilog=examples("compose export launch pipeline -o launch/pipeline.launch.py")
 )
-def export_launch(system: SystemName, *, output: Output = None) -> None:
+def export_launch(system: SystemName, *, output: NewFile = None) -> None:
     """Write a launch file that runs a system.
 
     It has launch arguments for the namespace, simulated time and the log level, and ends with the
@@ -77,7 +66,7 @@ def export_systemd(
     user: Annotated[
         bool, typer.Option("--user", help="For the service manager of a user, not of the system.")
     ] = False,
-    output: Output = None,
+    output: NewFile = None,
 ) -> None:
     """Write a systemd unit that runs a system.
 
@@ -95,7 +84,9 @@ def export_systemd(
 
 
 @app.command("sros2", epilog=examples("compose export sros2 pipeline -o policies/pipeline.xml"))
-def export_sros2(system: SystemName, *, namespace: Namespace = None, output: Output = None) -> None:
+def export_sros2(
+    system: SystemName, *, namespace: Namespace = None, output: NewFile = None
+) -> None:
     """Write the access control policy that a system implies.
 
     Each process may publish, subscribe, serve and call exactly what its nodes declare, and what ROS

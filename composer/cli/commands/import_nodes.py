@@ -10,7 +10,7 @@ import typer
 
 from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.options import Timeout, examples
+from composer.cli.support.options import NewFile, Timeout, examples
 from composer.cli.support.ros import require_launch, require_ros, ros_session
 from composer.cli.support.terminal import lines, say, write_raw
 
@@ -32,16 +32,6 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE",
-        help="Write to a new file instead of stdout.",
-        show_default=False,
-    ),
-]
 SystemToWrite = Annotated[
     str, typer.Option("--system", metavar="NAME", help="Name of the system that is written.")
 ]
@@ -68,7 +58,7 @@ def live(
         ),
     ] = None,
     system: SystemToWrite = "imported",
-    output: Output = None,
+    output: NewFile = None,
     timeout: Timeout = 10.0,
 ) -> None:
     """Describe the nodes of the running ROS graph as a system.
@@ -123,7 +113,7 @@ def import_class(
             help="Construct the class once, in a process of its own; do not read its source.",
         ),
     ] = False,
-    output: Output = None,
+    output: NewFile = None,
     timeout: Timeout = 30.0,
 ) -> None:
     """Describe an rclpy node class as a node type.
@@ -178,7 +168,7 @@ def import_launch(
     ] = None,
     *,
     system: SystemToWrite = "imported",
-    output: Output = None,
+    output: NewFile = None,
     timeout: Timeout = 30.0,
 ) -> None:
     """Describe the nodes of a launch file as a system.

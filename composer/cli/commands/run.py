@@ -15,7 +15,7 @@ import typer
 
 from composer.cli.support.dashboard_process import require_dashboard
 from composer.cli.support.errors import FAILED, CommandError, UsageError
-from composer.cli.support.options import Namespace, examples, finite
+from composer.cli.support.options import Autostart, Namespace, examples, finite
 from composer.cli.support.ros import require_interfaces, require_ros
 from composer.cli.support.system_arguments import SystemName, load_system, system_file
 from composer.cli.support.terminal import say, write
@@ -46,14 +46,6 @@ EPILOGS = {
 _WAIT_S = 60.0
 #: How long the process may take to start, on a busy machine, before its own limits apply.
 _START_S = 20.0
-
-
-class Autostart(StrEnum):
-    """The states up to which nodes can be brought up."""
-
-    ACTIVE = "active"
-    INACTIVE = "inactive"
-    UNCONFIGURED = "unconfigured"
 
 
 class LogSeverity(StrEnum):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from enum import StrEnum
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -67,6 +69,45 @@ Namespace = Annotated[
         "--namespace",
         metavar="NAMESPACE",
         help="Override the namespace of the system.",
+        show_default=False,
+    ),
+]
+
+
+class Autostart(StrEnum):
+    """The states up to which nodes can be brought up."""
+
+    ACTIVE = "active"
+    INACTIVE = "inactive"
+    UNCONFIGURED = "unconfigured"
+
+
+# How a system was started, for commands that compare its file with the running system.
+SettingsOfRun = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NODE.PARAMETER=VALUE",
+        help="A parameter override, as given to 'compose run'. Repeatable.",
+        show_default=False,
+    ),
+]
+AutostartOfRun = Annotated[
+    Autostart | None,
+    typer.Option(
+        "--autostart",
+        help="The state up to which nodes were brought up, as given to 'compose run'.",
+        show_default="as declared in the system",
+    ),
+]
+
+NewFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FILE",
+        help="Write to a new file instead of stdout.",
         show_default=False,
     ),
 ]
