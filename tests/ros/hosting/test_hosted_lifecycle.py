@@ -92,7 +92,7 @@ def test_what_cannot_be_hosted_is_refused_with_the_reason(
     system: refused
     nodes:
       refused:
-        class: {CLASSES}:{name}
+        class: tests.ros.support.refused_classes:{name}
         lifecycle: {{timeout_ms: 300}}
     """
     with running(text, tmp_path) as system:

@@ -2,7 +2,7 @@
 
 Each uses parts of rclpy's API as the examples and demos of ROS 2 do: publishers and timers in the
 constructor, callbacks with and without message information, services that call others, action
-servers, lifecycle nodes, threads that spin, and what cannot be hosted.
+servers, lifecycle nodes, and threads that spin.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from rclpy.lifecycle import LifecycleNode, State, TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.waitable import Waitable
 from std_msgs.msg import Int64, String
 from std_srvs.srv import SetBool, Trigger
 
@@ -391,51 +390,3 @@ class Sampler(Node):
 
     def tick(self) -> None:
         self.times.append(self.get_clock().now().nanoseconds / 1e9)
-
-
-# --- classes that cannot be hosted
-
-
-class SpinsInConstructor(Node):
-    def __init__(self) -> None:
-        super().__init__("spins")
-        rclpy.spin(self)
-
-
-class MakesSecondNode(Node):
-    def __init__(self) -> None:
-        super().__init__("first")
-        self.helper = rclpy.create_node("helper")
-
-
-class HasOwnArguments(Node):
-    def __init__(self) -> None:
-        super().__init__("own", cli_args=["--ros-args", "-r", "a:=b"])
-
-
-class NeverReturns(Node):
-    def __init__(self) -> None:
-        super().__init__("slow")
-        while True:
-            time.sleep(0.001)
-
-
-class Exits(Node):
-    def __init__(self) -> None:
-        super().__init__("exits")
-        raise SystemExit(3)
-
-
-class HasWaitable(Node):
-    def __init__(self) -> None:
-        super().__init__("waitable")
-        self.add_waitable(Waitable(self.default_callback_group))
-
-
-class WantsArguments(Node):
-    def __init__(self, port: Any) -> None:
-        super().__init__("wants")
-
-
-class NotANode:
-    pass
