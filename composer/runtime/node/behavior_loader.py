@@ -35,7 +35,8 @@ def behavior_class(reference: BehaviorReference) -> type[Any]:
     found = getattr(module, reference.class_name, None)
     if not isinstance(found, type):
         raise BehaviorLoadError(
-            f"cannot load '{reference.text}': {module.__file__} has no {reference.class_name}"
+            f"cannot load '{reference.text}': "
+            f"{module.__file__} has no class '{reference.class_name}'"
         )
     return found
 
