@@ -134,7 +134,8 @@ def summary(outcome: Outcome) -> str:
 
 def _row(node: NodeSummary) -> tuple[str, ...]:
     counts = (node.received, node.sent, node.calls, node.dropped, node.errors)
-    return (node.node, node.state, *map(str, counts))
+    # What a node outside the process counts is not known here.
+    return (node.node, node.state, *(str(n) if node.in_process or n else "-" for n in counts))
 
 
 def _error_line(nodes: Sequence[NodeSummary]) -> str:

@@ -215,7 +215,8 @@ class NodeSummary:
     ``received`` and ``sent`` count topic messages; ``calls`` requests and goals in both directions;
     ``dropped`` messages that arrived or were sent while the node was not active, or were dropped
     from a full queue; ``skipped`` timer calls skipped because the previous one was still running;
-    ``errors`` exceptions and wrong results of user code, and failed calls.
+    ``errors`` exceptions and wrong results of user code, and failed calls. The counts of a
+    node outside the process, which is not ``in_process``, are not known, and 0.
     """
 
     node: str
@@ -226,6 +227,7 @@ class NodeSummary:
     dropped: int
     skipped: int
     errors: int
+    in_process: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -180,6 +180,7 @@ class NodeSet:
                 dropped=node.statistics.dropped,
                 skipped=node.statistics.skipped,
                 errors=node.statistics.errors,
+                in_process=node.model.in_process,
             )
             for node in self.nodes.values()
         )
