@@ -97,3 +97,12 @@ def _named(full: str, node: Node, interfaces: Interfaces) -> Value:
             return {"Goal": action.goal, "Result": action.result, "Feedback": action.feedback}[rest]
         case _:
             return ANYTHING
+
+
+def allows_none(annotation: ast.expr) -> bool:
+    """Return whether an annotation mentions None, Optional or a text that may."""
+    return any(
+        (isinstance(node, ast.Constant) and (node.value is None or isinstance(node.value, str)))
+        or (isinstance(node, ast.Name) and node.id == "Optional")
+        for node in ast.walk(annotation)
+    )

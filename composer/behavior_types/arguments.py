@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import math
 from collections.abc import Iterator
 from functools import cache
 
@@ -105,6 +106,29 @@ def constructor(own: OwnClass) -> Signature | None:
     if "__init__" not in methods:
         return Signature(definition.name, (), (), frozenset())
     return signature_of(found, is_bound=True, name=definition.name) if found is not None else None
+
+
+@cache
+def math_signature(name: str) -> Signature | None:
+    """Return the parameters of a function of ``math``; None if they are not known."""
+    try:
+        parameters = inspect.signature(getattr(math, name)).parameters.values()
+    except (AttributeError, TypeError, ValueError):
+        return None
+    kinds = inspect.Parameter
+    by_position = {kinds.POSITIONAL_ONLY, kinds.POSITIONAL_OR_KEYWORD}
+    return Signature(
+        f"math.{name}",
+        tuple(item.name for item in parameters if item.kind in by_position),
+        tuple(item.name for item in parameters if item.kind is kinds.KEYWORD_ONLY),
+        frozenset(
+            item.name
+            for item in parameters
+            if item.default is kinds.empty and item.kind in (*by_position, kinds.KEYWORD_ONLY)
+        ),
+        sum(item.kind is kinds.POSITIONAL_ONLY for item in parameters),
+        any(item.kind is kinds.VAR_POSITIONAL for item in parameters),
+    )
 
 
 @cache

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from composer.behavior_source import BehaviorSource, Function, Module
 from composer.behavior_source.flow import (
+    empty_returns,
     is_stub,
     may_raise_at_end,
     reaches_end,
@@ -15,11 +16,12 @@ from composer.behavior_source.flow import (
 from composer.behavior_source.receivers import lacks_self
 from composer.behavior_source.spans import attribute_span, span_of, start_span
 from composer.behavior_source.syntax import name_span
-from composer.behavior_types.annotations import annotated
+from composer.behavior_types.annotations import allows_none, annotated
 from composer.behavior_types.api_values import api_parameters
 from composer.behavior_types.arguments import api_signature, constructor, signature_of
 from composer.behavior_types.attributes import attribute_problem
 from composer.behavior_types.bindings import nodes_of
+from composer.behavior_types.elements import element_problems, size_problem
 from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.fitting import argument_problem, value_problem
 from composer.behavior_types.handlers import handler_arguments
@@ -29,6 +31,7 @@ from composer.behavior_types.operations import (
     annotations_of,
     call_problems,
     operation_problems,
+    returned_exceptions,
     uncallable,
 )
 from composer.behavior_types.problems import CodeProblem, Kind
@@ -118,6 +121,7 @@ class _FunctionChecker:
             yield wrong
         else:
             yield from self._returned()
+        yield from returned_exceptions(self.function, self.scope)
         for annotation in annotations_of(self.function):
             for node in ast.walk(annotation):
                 if isinstance(node, ast.Attribute):
@@ -136,6 +140,7 @@ class _FunctionChecker:
                     yield from self._assignment(target, value)
             yield from self._unawaited(node)
             yield from operation_problems(node, self.scope)
+            yield from element_problems(node, self.function, self.scope)
 
     # --- attributes
 
@@ -283,16 +288,20 @@ class _FunctionChecker:
                     yield from self._value(value, response)
                 return
         annotation = self.function.returns
-        if annotation is None or not reaches_end(self.function):
+        if annotation is None:
             return
         expected = annotated(annotation, self.scope.home, self.types.node, self.types.interfaces)
         name = self.function.name
-        if _allows_none(annotation) or name.startswith("accept_") or is_stub(self.function):
+        if allows_none(annotation) or name.startswith("accept_") or is_stub(self.function):
             return
-        if may_raise_at_end(self.function):
+        if not isinstance(expected, Message | FieldType):
             return
-        if isinstance(expected, Message | FieldType):
-            problem = f"'{name}' returns {described(expected)}, but may end without a 'return'"
+        returns = f"'{name}' returns {described(expected)}"
+        for statement in empty_returns(self.function):
+            span = span_of(statement, self.scope.home.source)
+            yield CodeProblem(Kind.RETURN, f"{returns}, not None", span, "return a value")
+        if reaches_end(self.function) and not may_raise_at_end(self.function):
+            problem = f"{returns}, but may end without a 'return'"
             yield CodeProblem(Kind.RETURN, problem, self._name_span(), "return a value at its end")
 
     def _field(self, node: ast.expr, field: Field) -> Iterator[CodeProblem]:
@@ -312,6 +321,9 @@ class _FunctionChecker:
             for item in node.elts if expected.is_array and expected.name != "byte" else ():
                 yield from self._value(item, expected.element)
         problem = value_problem(node, found, expected, self.types.interfaces)
+        if problem is None and isinstance(expected, FieldType):
+            size = size_problem(node, expected)
+            problem = (size, None) if size is not None else None
         if problem is not None:
             yield CodeProblem(Kind.VALUE, problem[0], self._span(node), problem[1])
 
@@ -383,12 +395,3 @@ class _FunctionChecker:
 
     def _span(self, node: ast.expr) -> Span:
         return span_of(node, self.scope.home.source)
-
-
-def _allows_none(annotation: ast.expr) -> bool:
-    """Return whether an annotation mentions None, Optional or a text that may."""
-    return any(
-        (isinstance(node, ast.Constant) and (node.value is None or isinstance(node.value, str)))
-        or (isinstance(node, ast.Name) and node.id == "Optional")
-        for node in ast.walk(annotation)
-    )

@@ -12,7 +12,13 @@ from composer.behavior_source.method_body import dotted
 from composer.behavior_types.annotations import annotated
 from composer.behavior_types.api_values import api_member, api_result, class_member
 from composer.behavior_types.bindings import Binding, Bindings, How, nodes_of
-from composer.behavior_types.names import constant_named, full_name, function_named, interface_name
+from composer.behavior_types.names import (
+    constant_named,
+    full_name,
+    function_named,
+    imported_from,
+    interface_name,
+)
 from composer.behavior_types.operators import (
     binary,
     builtin_call,
@@ -96,6 +102,13 @@ class FunctionTypes:
         """Return the full name of a dotted name that starts with an imported one, or ""."""
         head = name.partition(".")[0]
         return "" if self.is_local(head) else full_name(name, self.home)
+
+    def called_name(self, function: ast.expr) -> str:
+        """Return the full name of an imported or built-in function, or ""."""
+        name = dotted(function)
+        full = self.global_name(name) if name else ""
+        is_builtin = not full and name.isidentifier() and not self.is_local(name)
+        return name if is_builtin and not self.home.may_have(name) else full
 
     def is_local(self, name: str) -> bool:
         """Return whether the function itself binds ``name``."""
@@ -192,7 +205,15 @@ class FunctionTypes:
         constant = constant_named(name, self.home)
         if constant is not None:
             return _constant(constant.value)
-        return class_named(name, self.home) or self._global(name)
+        return class_named(name, self.home) or self._of_helper(name) or self._global(name)
+
+    def _of_helper(self, name: str) -> Value | None:
+        """Return a function or class that is imported from another file of the project."""
+        home, original = imported_from(name, self.home, self.owner.source.own_modules)
+        if home is None:
+            return None
+        function = function_named(original, home)
+        return ModuleFunction(function, home) if function else class_named(original, home)
 
     def _global(self, dotted_name: str) -> Value:
         """Return the type of an imported name."""
@@ -259,11 +280,7 @@ class FunctionTypes:
                 return OwnObject(own)
             case CollectionMethod(owner=collection, name=name):
                 return ANYTHING if len(node.args) > 1 else _collection_result(collection, name)
-        name = dotted(node.func)
-        full = self.global_name(name) if name else ""
-        is_builtin = not full and name.isidentifier() and not self.is_local(name)
-        if is_builtin and not self.home.may_have(name):
-            full = name
+        full = self.called_name(node.func)
         return builtin_call(full, [self.type_of(item) for item in node.args]) if full else ANYTHING
 
     def _returned(self, function: Function, home: Module, call: ast.Call) -> Value:

@@ -181,7 +181,9 @@ def _fits_number(found: FieldType | Message, expected: FieldType) -> bool:
     """Return whether ROS accepts a number or a bool in a field; it converts none of them."""
     if is_float(expected):
         return is_float(found)
-    return found == BOOL or (is_integer(expected) and is_integer(found))
+    if expected == BOOL:
+        return found == BOOL
+    return is_integer(expected) and not is_float(found)
 
 
 def _is_bytes(type_: FieldType | Message) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections import Counter
+from collections.abc import Sequence
 from functools import lru_cache
 
 from composer.behavior_source import Module
@@ -59,6 +60,17 @@ def _functions(module: Module) -> dict[str, Function | None]:
         if isinstance(item, Function):
             found[item.name] = None if item.name in found else item
     return found
+
+
+def imported_from(name: str, module: Module, others: Sequence[Module]) -> tuple[Module | None, str]:
+    """Return which of the ``others`` a name is imported from, and its name there."""
+    imported = module.imports.get(name)
+    if imported is None or not imported.name or not imported.module or name in module.assigned:
+        return None, ""
+    *folders, last = imported.module.split(".")
+    end = (*folders, f"{last}.py")
+    found = [other for other in others if other.path.parts[-len(end) :] == end]
+    return (found[0] if len(found) == 1 else None), imported.name
 
 
 def constant_named(name: str, module: Module) -> ast.Constant | None:

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import ast
+import builtins
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 
+from composer import behavior
 from composer.behavior_source import Function, Module
+from composer.behavior_source.flow import returned_values
 from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of, start_span
 from composer.behavior_types.annotations import annotated
-from composer.behavior_types.arguments import Signature
+from composer.behavior_types.arguments import Signature, math_signature
 from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.fitting import argument_problem
 from composer.behavior_types.inference import BehaviorTypes
-from composer.behavior_types.operators import is_float, is_scalar, operation_problem
+from composer.behavior_types.operators import (
+    is_float,
+    is_scalar,
+    operation_problem,
+    order_problem,
+)
 from composer.behavior_types.problems import CodeProblem, Kind
 from composer.behavior_types.values import (
     ApiMethod,
@@ -118,6 +127,14 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
                 never = word.problem(constant) if isinstance(word, Word) else None
                 if never is not None:
                     yield CodeProblem(Kind.VALUE, never[0], span_of(other, source), never[1])
+        case ast.Compare(left=left, ops=operators, comparators=others):
+            values = [scope.type_of(item) for item in (left, *others)]
+            for (first, second), sign in zip(pairwise(values), operators, strict=True):
+                problem = order_problem(first, sign, second)
+                if problem is not None:
+                    yield CodeProblem(Kind.VALUE, problem, span_of(node, source))
+        case ast.Call(func=function) if called := scope.called_name(function):
+            yield from _library_call(node, called, scope)
         case ast.Expr(value=value):
             yield from _unused(value, scope)
         case ast.Await(value=ast.Call(func=function)):
@@ -126,6 +143,42 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
                 message = f"'{name}' needs the event loop of asyncio, which does not run here"
                 hint = "use self.clock.sleep" if name == "asyncio.sleep" else None
                 yield CodeProblem(Kind.ASYNCIO, message, span_of(function, source), hint)
+
+
+def _library_call(call: ast.Call, name: str, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Check a call of ``range``, or of a function in ``math``."""
+    if name == "range":
+        for argument in call.args:
+            if is_float(scope.type_of(argument)):
+                span = span_of(argument, scope.home.source)
+                yield CodeProblem(
+                    Kind.VALUE, "'range' takes integers, not a float", span, "write int(...)"
+                )
+    elif name.startswith("math."):
+        signature = math_signature(name.removeprefix("math."))
+        if signature is not None:
+            yield from call_problems(call, signature, scope)
+
+
+def returned_exceptions(function: Function, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield the exceptions that a function returns although its result is not used."""
+    returns = function.returns
+    if returns is None and not function.name.startswith("on_"):
+        return
+    if returns is not None and not (isinstance(returns, ast.Constant) and returns.value is None):
+        return
+    for value in returned_values(function):
+        if isinstance(value, ast.Call) and _is_exception(scope.called_name(value.func)):
+            message = "an exception is returned, not raised"
+            span = span_of(value, scope.home.source)
+            yield CodeProblem(Kind.UNUSED, message, span, "write 'raise' instead of 'return'")
+
+
+def _is_exception(name: str) -> bool:
+    module, _, last = name.rpartition(".")
+    home = {"": builtins, "composer.behavior": behavior}.get(module)
+    found = getattr(home, last, None)
+    return isinstance(found, type) and issubclass(found, Exception)
 
 
 def _runs_asyncio(home: Module) -> bool:

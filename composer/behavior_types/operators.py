@@ -160,6 +160,27 @@ def operation_problem(left: Value, operator: ast.operator, right: Value) -> str 
     return None
 
 
+def order_problem(left: Value, operator: ast.cmpop, right: Value) -> str | None:
+    """Return why Python cannot order two values, or None if it may."""
+    if not isinstance(operator, ast.Lt | ast.LtE | ast.Gt | ast.GtE):
+        return None
+    kinds = {_order(left), _order(right)}
+    if len(kinds) > 1 and "" not in kinds:
+        return "a comparison of " + " and ".join(sorted(kinds))
+    return None
+
+
+def _order(type_: Value) -> str:
+    if is_number(type_):
+        return "a number"
+    if is_text(type_):
+        return "a string"
+    is_array = isinstance(type_, FieldType) and type_.is_array
+    # numpy arrays, which messages may hold, can be compared with numbers
+    is_list = is_array and isinstance(type_, FieldType) and type_.name in _TEXTS
+    return "a list" if is_list or (isinstance(type_, Collection) and type_.python is list) else ""
+
+
 _SIGNS: dict[type[ast.operator], str] = {
     ast.Add: "+",
     ast.Sub: "-",

@@ -24,6 +24,7 @@ class Kind(Enum):
     UNUSED = "a comparison or a function whose value is not used"
     ASYNCIO = "an awaited function of asyncio"
     RETURN = "a function that may not return what its annotation says"
+    INDEX = "an element that an array parameter does not have"
     ANNOTATION = "a handler that annotates its argument with another type"
 
 

@@ -47,6 +47,7 @@ def defined_names(statement: ast.stmt, *, declared: bool = False) -> Iterator[st
     if isinstance(statement, ast.AnnAssign) and statement.value is None and not declared:
         return
     is_function = isinstance(statement, Function)
+    by_name = not is_function or _sets_by_name(statement)
     for node in walk([statement]):
         match node:
             case ast.Name(id=name) if not is_function:
@@ -55,8 +56,17 @@ def defined_names(statement: ast.stmt, *, declared: bool = False) -> Iterator[st
                 yield name
             case ast.alias(name=name, asname=other) if not is_function:
                 yield other or name.partition(".")[0]
-            case ast.Constant(value=str() as name) if name.isidentifier():
+            case ast.Constant(value=str() as name) if name.isidentifier() and by_name:
                 yield name
+
+
+def _sets_by_name(statement: ast.stmt) -> bool:
+    """Return whether a function calls ``setattr`` or ``vars``, or passes names on to what may."""
+    return any(
+        (isinstance(node, ast.Name) and node.id in {"setattr", "vars"})
+        or (isinstance(node, ast.Attribute) and node.attr in {"__dict__", "__setattr__"})
+        for node in walk([statement])
+    )
 
 
 def _escapes_from(function: Function) -> bool:

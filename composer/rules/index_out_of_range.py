@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from composer.analysis.behavior_code import diagnostics_of
 from composer.analysis.context import Context
 from composer.analysis.expressions import ExpressionSite, expression_sites
 from composer.analysis.spans import part_of_path
+from composer.behavior_types.elements import counted
+from composer.behavior_types.problems import Kind
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.expressions import FieldPath
 
@@ -15,9 +18,9 @@ RULE = register(
         code="RC308",
         name="index-out-of-range",
         severity=Severity.WARNING,
-        summary="An expression reads an element that an array parameter does not have.",
+        summary="An element of an array parameter is read that does not exist.",
         why=(
-            "Evaluating the expression fails, unless the parameter is set to a longer array "
+            "Reading it fails, unless the parameter is set to a longer array "
             "while the node runs. Indices count from 0."
         ),
         bad="""\
@@ -43,6 +46,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for site in context.once(expression_sites):
         for path in site.expression.paths:
             yield from _path(site, path)
+    yield from diagnostics_of(context, Kind.INDEX, RULE)
 
 
 def _path(site: ExpressionSite, path: FieldPath) -> Iterator[Diagnostic]:
@@ -54,10 +58,9 @@ def _path(site: ExpressionSite, path: FieldPath) -> Iterator[Diagnostic]:
         return
     value = parameter.value.value
     if isinstance(value, list) and not -len(value) <= index < len(value):
-        count = f"{len(value)} element" + ("" if len(value) == 1 else "s")
         yield Diagnostic(
             RULE,
-            f"parameter '{name}' has no element {index}: it has {count}",
+            f"parameter '{name}' has no element {index}: it has {counted(len(value))}",
             part_of_path(site.span, site.expression, path, 2),
             (Label(parameter.value.span, "its value"),),
             f"indices count from 0, so the last one is {len(value) - 1}" if value else None,

@@ -38,11 +38,22 @@ nodes:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the namespaces of the system and its nodes; a shared one is reported once."""
     yield from _name_of_system(context.system)
-    for node in context.system.nodes:
-        namespace = node.namespace
-        problem = namespace_problem(namespace.value)
-        if problem is not None and not is_unresolved(namespace.value):
+    found = [node.namespace for node in context.system.nodes if _is_invalid(node.namespace.value)]
+    invalid = {namespace.value for namespace in found}
+    for namespace in found:
+        if not any(outer in invalid for outer in _outer(namespace.value)):
+            problem = namespace_problem(namespace.value)
             yield Diagnostic(RULE, f"namespace '{namespace}' {problem}", namespace.span)
+
+
+def _is_invalid(namespace: str) -> bool:
+    return namespace_problem(namespace) is not None and not is_unresolved(namespace)
+
+
+def _outer(namespace: str) -> Iterator[str]:
+    """Yield the namespaces around a namespace."""
+    while namespace := namespace.rpartition("/")[0]:
+        yield namespace
 
 
 def _name_of_system(system: System) -> Iterator[Diagnostic]:

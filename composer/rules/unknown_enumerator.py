@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from composer.analysis.context import Context
 from composer.analysis.reactions import message_templates
 from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.field_types import constant_problem
 from composer.interfaces import Interfaces, Message
 from composer.templates import Constant, Items, Record, Template
 
@@ -57,7 +58,8 @@ def _template(template: Template, message: Message, interfaces: Interfaces) -> I
         nested = interfaces.message(field.type.name)
         for item in content.items if isinstance(content, Items) else (content,):
             if isinstance(item, Constant):
-                yield from _number(item, name.value, message)
+                if constant_problem(item.value, field.type.element, interfaces) is None:
+                    yield from _number(item, name.value, message)
             elif nested is not None:
                 yield from _template(item, nested, interfaces)
 
