@@ -40,6 +40,8 @@ nodes:
 
 FAST_HZ = 10.0
 _PACKAGE = "sensor_msgs/msg/"
+#: Messages of that package that are small, and whose consumers usually request reliable QoS.
+_STATES = frozenset({"sensor_msgs/msg/JointState", "sensor_msgs/msg/MultiDOFJointState"})
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
@@ -51,8 +53,12 @@ def check(context: Context) -> Iterator[Diagnostic]:
         sinks = tuple(end for end in channel.sinks if _is_reliable(end.port))
         for source in channel.sources:
             rate_hz = known.publisher_hz(source) if _is_reliable(source.port) else None
-            if source.port.interface.value.startswith(_PACKAGE) and (rate_hz or 0.0) >= FAST_HZ:
+            if _is_stream(source.port.interface.value) and (rate_hz or 0.0) >= FAST_HZ:
                 yield _diagnostic(source.port, rate_hz or 0.0, sinks)
+
+
+def _is_stream(interface: str) -> bool:
+    return interface.startswith(_PACKAGE) and interface not in _STATES
 
 
 def _is_reliable(port: Port) -> bool:
@@ -61,10 +67,13 @@ def _is_reliable(port: Port) -> bool:
 
 def _diagnostic(port: Port, rate_hz: float, sinks: tuple[PortOfNode, ...]) -> Diagnostic:
     """Report a publisher; if it were best effort, it would not match the reliable ``sinks``."""
-    if sinks:
+    if port.external:
+        # Other consumers may request it reliably, and would no longer match.
+        hint = "let subscriptions use 'qos: sensor_data'; a reliable publisher serves them too"
+    elif sinks:
         hint = "use 'qos: sensor_data' for it and for the subscriptions that request reliable QoS"
     else:
-        hint = "use 'qos: sensor_data', unless an external node requests reliable QoS"
+        hint = "use 'qos: sensor_data'"
     return Diagnostic(
         RULE,
         f"sensor data on '{port.full_name}' at {number(rate_hz)} Hz uses reliable QoS",
