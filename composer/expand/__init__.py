@@ -49,12 +49,17 @@ def expand(tree: Mapping, given: Map[str, Entry]) -> tuple[Mapping, list[Diagnos
 def missing_variables(tree: Mapping, given: Collection[str]) -> tuple[str, ...]:
     """Return the variables of a node type that have no default and are not ``given``.
 
-    A variable that was given under a misspelled name is left out: ``expand`` reports it.
+    A variable that was given under another name is left out: ``expand`` reports it.
     """
     scope = read_scope(tree, is_node_type=True)
-    for name in given:
-        if name not in scope.declared:
-            scope.hint(name)
+    unknown = [name for name in given if name not in scope.declared]
+    for name in unknown:
+        scope.hint(name)
+    missing = _without_value(scope, given)
+    return () if len(unknown) == len(missing) == 1 else missing
+
+
+def _without_value(scope: Scope, given: Collection[str]) -> tuple[str, ...]:
     return tuple(
         name
         for name, variable in scope.declared.items()
@@ -102,7 +107,11 @@ def _unknown_arguments(tree: Mapping, scope: Scope, given: Map[str, Entry]) -> I
         if argument not in scope.declared:
             owner = f"'{shown(name.value)}'" if isinstance(name, Scalar) else "this file"
             message = f"{owner} has no variable '{shown(argument)}'"
-            hint = scope.hint(argument) or "remove it"
+            hint = scope.hint(argument)
+            missing = _without_value(scope, given)
+            if hint is None and len(missing) == 1:
+                hint = f"did you mean '{shown(missing[0])}'?"
+            hint = hint or "remove it"
             yield Diagnostic(rules.UNKNOWN_VARIABLE, message, entry.key.span, hint=hint)
 
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import field
 
-from composer.diagnostics import nearest
+from composer.diagnostics import nearest, shown
 from composer.fast_dataclass import dataclass
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 #: Maximum number of comparisons for hints in one file, to limit the time.
 _MAX_COMPARISONS = 20_000
+
+#: Maximum number of names in a hint.
+_MAX_NAMES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +74,11 @@ class Scope:
         """
         if self.outer is not None:
             close = nearest(name, self.declared)
-            return self.outer.hint(name) if close is None else f"did you mean '{close}'?"
+            if close is not None:
+                return f"did you mean '{close}'?"
+            names = ", ".join(f"'{shown(known)}'" for known in list(self.declared)[:_MAX_NAMES])
+            sets = f"'for_each' sets {names}" if names else None
+            return self.outer.hint(name) or sets
         self._compared += len(self.declared)
         close = nearest(name, self.declared) if self._compared <= _MAX_COMPARISONS else None
         if close is None:

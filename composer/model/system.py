@@ -303,6 +303,7 @@ class System:
     nodes: tuple[Node, ...]
     span: Span = field(compare=False)
     namespace: str = "/"  # absolute; default for nodes
+    namespace_span: Span | None = field(default=None, compare=False)
     description: str = ""
     connections: tuple[Connection, ...] = ()
     chains: tuple[Chain, ...] = ()

@@ -83,6 +83,7 @@ def resolve_system(
         nodes=nodes,
         span=_name_span(tree, "system"),
         namespace=namespace.value,
+        namespace_span=namespace.span,
         description=plain_text(tree.get("description")),
         connections=joined,
         chains=read_chains(tree.get("chains")),

@@ -9,6 +9,7 @@ from composer.analysis.formatting import safe_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import System
 from composer.names import join, namespace_problem, node_name_problem
+from composer.source import Located
 
 RULE = register(
     Rule(
@@ -38,7 +39,11 @@ nodes:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the namespaces of the system and its nodes; a shared one is reported once."""
     yield from _name_of_system(context.system)
-    found = [node.namespace for node in context.system.nodes if _is_invalid(node.namespace.value)]
+    system = context.system
+    namespaces = [node.namespace for node in system.nodes]
+    if system.namespace_span is not None:
+        namespaces.append(Located(system.namespace, system.namespace_span))
+    found = [namespace for namespace in namespaces if _is_invalid(namespace.value)]
     invalid = {namespace.value for namespace in found}
     for namespace in found:
         if not any(outer in invalid for outer in _outer(namespace.value)):

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.diagnostics import Diagnostic, Rule, Severity, register, shown, suggestion
 from composer.model import UnmatchedParameters
+from composer.names import namespace_problem
 
 RULE = register(
     Rule(
@@ -43,7 +44,10 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the names of nodes, and the parameters below names with wildcards."""
-    for unmatched in context.system.unmatched_parameters if not context.is_partial else ():
+    # With an invalid namespace, no name matches; another rule reports it.
+    is_named = namespace_problem(context.system.namespace) is None
+    is_known = is_named and not context.is_partial
+    for unmatched in context.system.unmatched_parameters if is_known else ():
         if unmatched.parameter is None:
             yield Diagnostic(
                 RULE, _message(unmatched), unmatched.section.span, hint=_hint(unmatched)

@@ -82,7 +82,7 @@ HINTS: dict[str, tuple[str, str, list[str | None]]] = {
         ["publish from the subscription, or use shorter timer periods"],
     ),
     "sensor data with a reliable subscription": (
-        f"{LIDAR}  map:\n"
+        f"{LIDAR.replace(', external: true', '')}  map:\n"
         f"    subscriptions: {{scan: {{{SCAN}, topic: /scan, qos: command, log: x}}}}\n",
         "reliable-sensor-stream",
         ["use 'qos: sensor_data' for it and for the subscriptions that request reliable QoS"],
@@ -90,7 +90,23 @@ HINTS: dict[str, tuple[str, str, list[str | None]]] = {
     "sensor data for external nodes": (
         LIDAR,
         "reliable-sensor-stream",
-        ["use 'qos: sensor_data', unless an external node requests reliable QoS"],
+        ["let subscriptions use 'qos: sensor_data'; a reliable publisher serves them too"],
+    ),
+    "joint states, which consumers request reliably": (
+        LIDAR.replace("LaserScan", "JointState"),
+        "reliable-sensor-stream",
+        [],
+    ),
+    "a variable of an include with for_each": (
+        "system: demo\ninclude:\n  - {file: other.yaml, for_each: {bay: [north, south]}, "
+        "prefix: '${bay}_', variables: {zone: '${side}'}}\n",
+        "unknown-variable",
+        ["'for_each' sets 'bay'"],
+    ),
+    "a variable of a node type under another name": (
+        "system: demo\nnodes: {n: {type: relay, variables: {kind: std_msgs/msg/String}}}\n",
+        "unknown-variable",
+        ["did you mean 'message_type'?"],
     ),
 }
 
