@@ -50,6 +50,12 @@ class ExecutorLoad:
         return sum(share.load for share in self.shares) / self.threads
 
     @property
+    def primary(self) -> Span:
+        """The budget of a callback that alone needs more time than there is, or the executor."""
+        heaviest = self._ordered()[0]
+        return heaviest.budget_ms.span if heaviest.load > 1.0 else self.span
+
+    @property
     def formula(self) -> str:
         """The sum, as shown in messages."""
         ordered = self._ordered()

@@ -48,7 +48,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             yield Diagnostic(
                 RULE,
                 f"callbacks of {load.what} may need more time than it has: {load.formula}",
-                load.span,
+                load.primary,
                 load.labels,
                 "lower a rate or a budget, or move nodes to another executor",
             )
