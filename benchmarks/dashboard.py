@@ -17,13 +17,14 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import IO
-
-from websockets.sync.client import ClientConnection, connect
+from typing import IO, TYPE_CHECKING
 
 from benchmarks.figures import Row
 from benchmarks.pipeline import COMPOSED, Side, cpu_s, running
 from benchmarks.processes import ROOT, ProgramFailed, environment
+
+if TYPE_CHECKING:
+    from websockets.sync.client import ClientConnection, connect
 
 IDLE = "pipeline.yaml, dashboard without a browser"
 WATCHED = "pipeline.yaml, graph in one browser"
@@ -169,6 +170,8 @@ def _dashboard(
 def _connected(address: re.Match[bytes]) -> connect:
     """Return the connection of a browser, for a ``with`` block."""
     host, port, token = (part.decode() for part in address.groups())
+    from websockets.sync.client import connect  # an extra, which the targets do without
+
     return connect(
         f"ws://{host}/ws",
         origin=f"http://{host}",
