@@ -170,7 +170,8 @@ def _dashboard(
 def _connected(address: re.Match[bytes]) -> connect:
     """Return the connection of a browser, for a ``with`` block."""
     host, port, token = (part.decode() for part in address.groups())
-    from websockets.sync.client import connect  # an extra, which the targets do without
+    # An extra, which the targets do without.
+    from websockets.sync.client import connect  # noqa: PLC0415
 
     return connect(
         f"ws://{host}/ws",

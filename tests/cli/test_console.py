@@ -121,7 +121,7 @@ with queued_output():
     for _ in range(LINES):
         libc.fprintf(stderr, b"from C code%s" % (b" " * 1000))
     if STARTS:
-        subprocess.run([sys.executable, "-c", "import os, sys; os.write(2, b'y' * 300_000)"])
+        subprocess.run([sys.executable, "-c", "import os, sys; os.write(2, b'#' * 300_000)"])
     assert os.get_blocking(1) and os.get_blocking(2)
 print("the end")
 """
@@ -181,5 +181,5 @@ def test_a_started_process_waits_until_it_can_print() -> None:
         while waiting_bytes(reading) < 60_000 and time.monotonic() < until_s:
             time.sleep(0.01)  # poll until the pipe is full: it holds 64 KiB
         received = pipe.read()
-    assert received.count(b"y") == 300_000
+    assert received.count(b"#") == 300_000
     assert ended(process)[0] == PRINTED

@@ -158,7 +158,7 @@ def test_a_kill_is_noticed_at_once(children: ChildProcesses) -> None:
 def test_the_rest_of_a_group_ends_with_its_leader(children: ChildProcesses) -> None:
     lines: list[tuple[str, bool]] = []
     child = start(children, "sleep 60 & echo $!; exec sleep 60", lines)
-    wait_until(lambda: lines, "the number of the grandchild")
+    wait_until(lambda: lines and child.started.done(), "the number of the grandchild")
     os.kill(child.started.result(), signal.SIGKILL)
     grandchild = Path("/proc", lines[0][0])
     wait_until(lambda: not grandchild.exists(), "the end of the grandchild")
