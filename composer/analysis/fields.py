@@ -11,6 +11,7 @@ from composer.analysis.reactions import ReactionSite, reactions
 from composer.expressions import Expression
 from composer.field_types import (
     ANYTHING,
+    BOOL,
     INTEGER,
     NUMBER,
     STATUS,
@@ -18,11 +19,13 @@ from composer.field_types import (
     FieldChecker,
     Problem,
     ValueType,
+    constant_problem,
     parameter_type,
     type_of,
 )
-from composer.interfaces import Action, Message, Service
+from composer.interfaces import Action, Interfaces, Message, Service
 from composer.model import Event, Node, Parameter, Port, Reaction
+from composer.templates import Constant
 from composer.tree import Plain
 
 
@@ -105,8 +108,11 @@ def _reaction(context: Context, checker: FieldChecker, site: ReactionSite) -> It
     reaction = site.reaction
     if reaction.when is not None:
         yield from checker.condition(reaction.when, reaction.when_span or reaction.span)
-    for _, content in reaction.state:
+    initial = {name.value: type_of(value) for name, value in site.node.state}
+    for name, content in reaction.state:
         yield from checker.text(content)
+        if isinstance(content, Constant):
+            yield from _state(content, initial.get(name.value, ANYTHING), checker.interfaces)
     if reaction.log is not None:
         yield from checker.text(reaction.log)
     yield from _sends(context, checker, site.node, reaction)
@@ -116,6 +122,18 @@ def _reaction(context: Context, checker: FieldChecker, site: ReactionSite) -> It
             yield from checker.template(reaction.respond, definition.response)
         else:
             yield from checker.text(reaction.respond)
+
+
+def _state(value: Constant, initial: ValueType, interfaces: Interfaces) -> Iterator[Problem]:
+    """Compare a constant with the initial value of its state variable."""
+    expected = NUMBER if initial == INTEGER else initial
+    if value.value is None or expected not in (BOOL, NUMBER, STRING):
+        return
+    problem = constant_problem(value.value, expected, interfaces)
+    if problem is not None:
+        kind = "number" if expected == NUMBER else str(expected)
+        message = problem[0].replace(f"where {expected} is", f"where a {kind} is")
+        yield Problem(f"{message}, as the initial value is one", value.span, problem[1])
 
 
 def _sends(

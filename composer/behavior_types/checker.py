@@ -24,6 +24,7 @@ from composer.behavior_types.bindings import nodes_of
 from composer.behavior_types.elements import element_problems, size_problem
 from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.fitting import argument_problem, value_problem
+from composer.behavior_types.frames import frame_problem
 from composer.behavior_types.handlers import handler_arguments
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.operations import (
@@ -305,10 +306,9 @@ class _FunctionChecker:
             yield CodeProblem(Kind.RETURN, problem, self._name_span(), "return a value at its end")
 
     def _field(self, node: ast.expr, field: Field) -> Iterator[CodeProblem]:
-        text = node.value if isinstance(node, ast.Constant) else None
-        if field.name.endswith("frame_id") and isinstance(text, str) and text.startswith("/"):
-            problem = f"frame ID '{text}' begins with a slash"
-            yield CodeProblem(Kind.FRAME, problem, self._span(node), "remove the slash")
+        frame = frame_problem(node, field.name, self.scope)
+        if frame is not None:
+            yield frame
         else:
             yield from self._value(node, field.type)
 

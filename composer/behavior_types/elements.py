@@ -23,7 +23,7 @@ def element_problems(
     match node:
         case ast.Subscript(value=owner, slice=index):
             at = _integer(index)
-            parameter = _parameter(owner, scope)
+            parameter = parameter_read(owner, scope)
             if at is None or parameter is None or _looks_first(function):
                 return
             name, count = parameter.name.value, _count(parameter)
@@ -35,7 +35,7 @@ def element_problems(
                     f"indices count from 0, so the last one is {count - 1}" if count else None,
                 )
         case ast.Assign(targets=[ast.Tuple(elts=targets) | ast.List(elts=targets)], value=value):
-            parameter = _parameter(value, scope)
+            parameter = parameter_read(value, scope)
             if parameter is None or any(isinstance(item, ast.Starred) for item in targets):
                 return
             name, count = parameter.name.value, _count(parameter)
@@ -58,7 +58,7 @@ def counted(count: int) -> str:
     return f"{count} element" + ("" if count == 1 else "s")
 
 
-def _parameter(node: ast.expr, scope: FunctionTypes) -> Parameter | None:
+def parameter_read(node: ast.expr, scope: FunctionTypes) -> Parameter | None:
     """Return the parameter that an expression such as ``self.parameters.goal`` reads."""
     if isinstance(node, ast.Attribute) and isinstance(scope.type_of(node.value), Parameters):
         return scope.owner.node.parameter(node.attr)
