@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
 from dataclasses import field
 from enum import Enum
 from functools import lru_cache
@@ -133,6 +134,16 @@ def _bind(node: ast.AST, found: Bindings) -> None:
                 found.name(name)
         case _:
             pass
+
+
+def assigned_pairs(target: ast.expr, value: ast.expr) -> Iterator[tuple[ast.expr, ast.expr]]:
+    """Yield what an assignment stores where: each value of ``a, b = 1, 2`` with its target."""
+    targets = target.elts if isinstance(target, ast.Tuple | ast.List) else []
+    values = _elements(value, len(targets)) if targets else None
+    if values is None or any(isinstance(item, ast.Starred) for item in targets):
+        yield target, value
+    else:
+        yield from zip(targets, values, strict=True)
 
 
 def _elements(expression: ast.expr | None, count: int) -> list[ast.expr] | None:

@@ -20,7 +20,7 @@ from composer.behavior_types.annotations import allows_none, annotated
 from composer.behavior_types.api_values import api_parameters
 from composer.behavior_types.arguments import api_signature, constructor, signature_of
 from composer.behavior_types.attributes import attribute_problem
-from composer.behavior_types.bindings import nodes_of
+from composer.behavior_types.bindings import assigned_pairs, nodes_of
 from composer.behavior_types.elements import element_problems, size_problem
 from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.fitting import argument_problem, value_problem
@@ -138,7 +138,8 @@ class _FunctionChecker:
                 case ast.Call():
                     yield from self._call(node)
                 case ast.Assign(targets=[target], value=value):
-                    yield from self._assignment(target, value)
+                    for part, given in assigned_pairs(target, value):
+                        yield from self._assignment(part, given)
             yield from self._unawaited(node)
             yield from operation_problems(node, self.scope)
             yield from element_problems(node, self.function, self.scope)
