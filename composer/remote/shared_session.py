@@ -8,6 +8,7 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
@@ -18,6 +19,7 @@ from composer.remote.session import Deadline, Session
 from composer.remote.values import class_of
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
+InvalidHandle = rclpy_implementation.InvalidHandle
 _WAIT_S = 0.02
 _SPIN_S = 1.0
 _JOIN_S = 2.0
@@ -71,7 +73,9 @@ class SharedSession(Session):
         while self._is_open:
             try:
                 self._executor.spin_once(timeout_sec=_SPIN_S)
-            except Exception:  # a callback has failed, or another thread has destroyed its entity
+            except InvalidHandle:  # another thread has destroyed an entity
+                pass
+            except Exception:  # a callback has failed
                 if not self._is_open:
                     return
                 logging.getLogger(__name__).exception("a callback of the session failed")

@@ -184,19 +184,22 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
     tmp_path: Path, peer: Peer
 ) -> None:
     path = tmp_path / "robot.yaml"
-    path.write_text(TEXT, encoding="utf-8")
+    # With this backoff, the process returns before the coordinator starts one in its place.
+    text = TEXT.replace("backoff_ms: 100", "backoff_ms: 10000")
+    path.write_text(text, encoding="utf-8")
     tmp_path.joinpath("detector.py").write_text(DETECTOR, encoding="utf-8")
     members = [
         subprocess.Popen([*command_of(path), "--process", name], stderr=subprocess.DEVNULL)
         for name in ("sensing", "acting")
     ]
     try:
+        wait_until(lambda: len(running_managers(peer)) == 2, "the processes")
         with CommandProcess(str(path)) as coordinator:
             coordinator.wait_for("3 of 3 nodes active")
             coordinator.stop(signal.SIGKILL)
         found = peer.listen(String, "/lab/found")
         wait_until(lambda: len(found) > 10, "messages without the coordinator")
-        with split(tmp_path) as system:  # another one takes over, and nothing moves
+        with split(tmp_path, text) as system:  # another one takes over, and nothing moves
             assert system.node("camera").pid is None
             system.wait_for_log("found picture")
             assert states(system) == {"active"}
@@ -217,6 +220,12 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
             member.send_signal(signal.SIGINT)
         codes = [member.wait(20) for member in members]
     assert codes == [0, 0]
+
+
+def running_managers(peer: Peer) -> list[str]:
+    """Return the manager nodes of processes that are up."""
+    names = ("/lab/robot/sensing/manager", "/lab/robot/acting/manager")
+    return [name for name in names if peer.node.count_publishers(f"{name}/state")]
 
 
 def wait_for_failure(system: RunningSystem) -> NodeFailed:
