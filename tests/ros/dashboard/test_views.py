@@ -175,6 +175,12 @@ def test_plotted_values_are_those_published(page: Browser) -> None:
 
 
 def test_messages_are_published(page: Browser) -> None:
+    page.until(
+        page.subscribe("topics"),
+        lambda data: any(
+            item["name"] == "/lab/in" and item["subscriptions"] for item in data.get("topics", ())
+        ),
+    )
     echo = page.subscribe("echo", topic="/lab/received")
     message = {"topic": "/lab/in", "type": "std_msgs/msg/String", "message": {"data": "hello {x}"}}
     assert page.ok("publish", **message) == {"subscriptions": 1}
