@@ -51,7 +51,10 @@ def find_node(
     found = session.search(lambda: _matches(name, list_nodes()) or None, deadline)
     if found is None:
         check_all_respond(session)
-        raise not_found_error(kind, name, list_nodes())
+        known = list_nodes()  # it may have been discovered meanwhile
+        found = _matches(name, known)
+        if not found:
+            raise not_found_error(kind, name, known)
     if name not in found:  # wait for other nodes with the same last part
         found = _matches(name, session.wait_until_settled(list_nodes, deadline))
     if len(found) > 1:
