@@ -68,9 +68,9 @@ def page(browser: Browser, fleet: Dashboard) -> Iterator[Page]:
 def test_a_hundred_nodes_are_shown_soon(page: Page) -> None:
     """The first page of all also waits until the dashboard has joined the ROS graph.
 
-    The limits are generous: they only find a page that draws many times too much.
+    Joining takes seconds on a busy machine, so the first limit is generous.
     """
-    for limit_ms in (10_000.0, 5000.0):
+    for limit_ms in (10_000.0, 1000.0):
         page.wait_for_function(f"() => {ALL_NODES}", polling="raf")
         shown_after_ms = page.evaluate("performance.now()")
         print(f"first view after {shown_after_ms:.0f} ms, overload {overload():.1f}")
@@ -86,7 +86,7 @@ def test_panning_is_smooth_at_any_zoom(page: Page) -> None:
         times_ms = page.evaluate(PAN)
         median_ms = times_ms[len(times_ms) // 2]
         print(f"zoomed {presses} times: median {median_ms:.1f} ms, p95 {times_ms[-6]:.1f} ms")
-        assert median_ms < FRAME_MS * 3.0 * overload()
+        assert median_ms < FRAME_MS * 1.1 * overload()
 
 
 def test_what_is_searched_for_is_brought_near(page: Page) -> None:
