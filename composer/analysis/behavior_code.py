@@ -1,4 +1,4 @@
-"""The problems in the Python files of behaviors: types, imports and undefined names."""
+"""The problems in the Python files of behaviors and classes: types, imports, undefined names."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from pathlib import Path
 
 from composer.analysis.behaviors import GENERAL_HANDLERS, distinct_behaviors, handlers
 from composer.analysis.context import Context
+from composer.analysis.hosted_classes import hosted_classes
+from composer.behavior_checks import CodeProblem, Kind, behavior_problems, import_problems
 from composer.behavior_source import BehaviorSource, Function, Module
 from composer.behavior_source.receivers import lacks_self
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.undefined_names import undefined_names
-from composer.behavior_types import CodeProblem, Kind, behavior_problems, import_problems
 from composer.diagnostics import Diagnostic, Label, Rule, nearest
 from composer.model import Node
 
@@ -23,22 +24,45 @@ def diagnostics_of(context: Context, kind: Kind, rule: Rule) -> Iterator[Diagnos
     """Yield the problems of one kind as diagnostics of ``rule``."""
     for source, problem in context.once(_problems):
         if problem.kind is kind:
-            label = Label(source.reference.text.span, "the behavior of this node")
+            classes = {id(item.source) for item in context.once(hosted_classes)}
+            what = "class" if id(source) in classes else "behavior"
+            label = Label(source.reference.text.span, f"the {what} of this node")
             yield Diagnostic(rule, problem.message, problem.span, (label,), problem.hint)
 
 
 def _problems(context: Context) -> tuple[tuple[BehaviorSource, CodeProblem], ...]:
-    """Return the problems of all behaviors; those of a file are found once."""
+    """Return the problems of all behaviors and classes; those of a file are found once."""
     checked: set[Path] = set()
     found: list[tuple[BehaviorSource, CodeProblem]] = []
-    for node, source in context.once(distinct_behaviors):
+    unnamed: list[tuple[str, range]] = []  # where names are missing because of another problem
+    for node, source in (*context.once(distinct_behaviors), *_distinct_classes(context)):
         for module in source.own_modules:
             if module.path not in checked:
                 checked.add(module.path)
                 found += ((source, problem) for problem in _of_file(context, node, source, module))
-        problems = behavior_problems(node, source, context.interfaces)
-        found += ((source, problem) for problem in problems)
-    return tuple(found)
+        for problem in behavior_problems(node, source, context.interfaces):
+            found.append((source, problem))
+            if problem.lines is not None:
+                first, last = problem.lines
+                unnamed.append((problem.span.file.path, range(first, last + 1)))
+    return tuple(item for item in found if not _follows(item[1], unnamed))
+
+
+def _follows(problem: CodeProblem, unnamed: list[tuple[str, range]]) -> bool:
+    """Return whether a name is missing because of another problem."""
+    span = problem.span
+    return problem.kind is Kind.NAME and any(
+        span.file.path == path and span.line in lines for path, lines in unnamed
+    )
+
+
+def _distinct_classes(context: Context) -> Iterator[tuple[Node, BehaviorSource]]:
+    """Yield one node for each class of rclpy that a node is of."""
+    seen: set[int] = set()
+    for found in context.once(hosted_classes):
+        if id(found.source) not in seen:
+            seen.add(id(found.source))
+            yield found.node, found.source
 
 
 def _of_file(
@@ -81,6 +105,8 @@ def _hint(name: str, known: frozenset[str]) -> str:
 
 def _missing_arguments(node: Node, source: BehaviorSource) -> Iterator[str]:
     """Yield the arguments of handlers that do not accept them; another rule reports these."""
+    if node.hosted_class is not None:
+        yield from (name.value for name, _ in node.hosted_class.arguments)
     for handler in handlers(node):
         method = source.method(handler.name)
         if method is not None and not method.accepts(len(handler.arguments)):

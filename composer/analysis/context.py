@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import field
 from typing import Any, TypeVar
 
@@ -51,6 +51,11 @@ class Context:
         """Every topic, service and action whose name is known, with its endpoints."""
         return self.once(_channels)
 
+    @property
+    def all_channels(self) -> tuple[Channel, ...]:
+        """The same, with the endpoints on /tf and /tf_static that follow from ``transforms``."""
+        return self.once(_all_channels)
+
     def interface(self, port: Port) -> Message | Service | Action | None:
         """Return the definition of a port's type; None if it is unknown or of another kind."""
         found = self.interfaces.find(port.interface.value)
@@ -68,5 +73,12 @@ def location(span: Span) -> tuple[str, int, int]:
 
 
 def _channels(context: Context) -> tuple[Channel, ...]:
-    found = channels(context.system.nodes)
+    return _known(channels(context.system.nodes))
+
+
+def _all_channels(context: Context) -> tuple[Channel, ...]:
+    return _known(channels(context.system.nodes, with_transforms=True))
+
+
+def _known(found: Iterable[Channel]) -> tuple[Channel, ...]:
     return tuple(channel for channel in found if not is_unresolved(channel.name))

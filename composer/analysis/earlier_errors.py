@@ -11,7 +11,9 @@ from composer.model import Node, PortKind
 from composer.source import Span
 
 PORT_SECTIONS = tuple(kind.section for kind in PortKind)
-SECTIONS = (*PORT_SECTIONS, "parameters", "state", "timers")
+SECTIONS = (*PORT_SECTIONS, "parameters", "state", "timers", "transforms")
+
+_NEARBY_LINES = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +53,23 @@ def earlier_errors(context: Context) -> EarlierErrors:
         if node_file is not None and not names:
             elsewhere = True
         affected.update(names)
-        section = nearest(_text(span), SECTIONS) if names else None
+        section = nearest(span.text, SECTIONS) if names else None
         if section is not None:
             misspelled.update((name, section) for name in names)
     return EarlierErrors(frozenset(affected), elsewhere, frozenset(misspelled))
+
+
+def is_misspelled(context: Context, key: str, near: Span) -> bool:
+    """Return whether an earlier error next to ``near`` is about a misspelling of ``key``.
+
+    The keys of a map are on one line, or on lines that follow each other.
+    """
+    return any(
+        span.file == near.file
+        and abs(span.line - near.line) <= _NEARBY_LINES
+        and nearest(span.text, [key]) is not None
+        for span in context.refused
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +111,6 @@ def _node_files(context: Context) -> dict[str, _NodeFile]:
         end = min((place for place in following if starts and place > starts[-1]), default=None)
         node_files[path] = _NodeFile(starts, found, end)
     return node_files
-
-
-def _text(span: Span) -> str:
-    return span.file.line(span.line)[span.column - 1 :][: span.length].strip("'\"")
 
 
 def _files(node: Node) -> set[str]:

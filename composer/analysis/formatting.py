@@ -34,6 +34,11 @@ def listed(names: Sequence[str], limit: int = 3) -> str:
     return f"{', '.join(quoted[:-1])} and {quoted[-1]}"
 
 
+def and_others(count: int) -> str:
+    """Return the end of a list of which only the first is named: `` and 2 others``, or nothing."""
+    return f" and {count} other{'s' if count > 1 else ''}" if count else ""
+
+
 def number(value: float) -> str:
     """Return a number without trailing zeros: ``50``, not ``50.0``; ``0.1``."""
     return f"{value:.6g}"

@@ -7,11 +7,20 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from composer.analysis.context import Context, is_unresolved
-from composer.behavior_source import BehaviorSource, Method, find_behavior, imported_from
+from composer.behavior_source import (
+    BehaviorSource,
+    Method,
+    NearbyModules,
+    find_behavior,
+    imported_from,
+    nearby_modules,
+    top_package,
+)
 from composer.behavior_source.spans import span_of
 from composer.diagnostics import Diagnostic, Label, Rule
 from composer.fast_dataclass import dataclass
 from composer.model import HostedClass, Node
+from composer.project import Project
 from composer.source import Span
 
 #: Where rclpy's node classes come from.
@@ -40,6 +49,14 @@ class ClassOfNode:
         return self.hosted.reference.text.span
 
     @property
+    def nearby(self) -> NearbyModules | None:
+        """The modules next to one that is not found, or None if it is."""
+        if self.source.module_found or self.source.problem is not None:
+            return None
+        reference = self.hosted.reference
+        return nearby_modules(reference.module, reference.folder, Project.at(reference.folder))
+
+    @property
     def constructor(self) -> Method | None:
         """The constructor of the class or of its bases outside of rclpy, if it is known."""
         return next((item for item in self.methods if item.name == "__init__"), None)
@@ -49,7 +66,7 @@ class ClassOfNode:
         """The methods of the class and of its bases outside of rclpy, nearest first."""
         seen: set[str] = set()
         for module, known in self.source.classes:
-            if _RCLPY in module.path.parts:
+            if top_package(module.path) == _RCLPY:
                 continue
             for method in known.methods:
                 if method.name not in seen:
@@ -59,16 +76,21 @@ class ClassOfNode:
     @property
     def is_node(self) -> bool:
         """Whether a base class comes from rclpy."""
-        return any(
-            origin is not None and f"{origin.module}.".startswith(f"{_RCLPY}.")
-            for module, known in self.source.classes
-            for origin in (imported_from(module, base) for base in known.bases)
-        )
+        return is_rclpy_node(self.source)
 
     def diagnostic(self, rule: Rule, message: str, where: Span, hint: str) -> Diagnostic:
         """Return a diagnostic about the class, with its place in the Python file."""
         related = (Label(where, "here"),)
         return Diagnostic(rule, message, self.span, related=related, hint=hint)
+
+
+def is_rclpy_node(source: BehaviorSource) -> bool:
+    """Return whether a base class comes from rclpy."""
+    return any(
+        origin is not None and f"{origin.module}.".startswith(f"{_RCLPY}.")
+        for module, known in source.classes
+        for origin in (imported_from(module, base) for base in known.bases)
+    )
 
 
 def hosted_classes(context: Context) -> tuple[ClassOfNode, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
-from composer.analysis.context import Context, is_unresolved
+from composer.analysis.context import Context, is_unresolved, location
 from composer.fast_dataclass import dataclass
 from composer.model import Parameter, ParameterType
 from composer.source import Located
@@ -15,11 +15,12 @@ from composer.tree import Plain
 def known_values(context: Context) -> Iterator[tuple[Parameter, Located[Plain]]]:
     """Yield every default and every set value of the parameters with a known type.
 
+    So are values in parameter files that name the node, even if the system replaces them.
     In parameter files, ``${`` is plain text.
     """
     files = context.system.parameter_files
     for node in context.system.nodes:
-        for parameter in node.parameters:
+        for parameter in (*node.parameters, *node.overridden_parameters):
             if parameter.type.value not in KNOWN_TYPES:
                 continue
             for value in _values(parameter):
@@ -32,6 +33,48 @@ def valid_values(context: Context) -> Iterator[tuple[Parameter, Located[Plain]]]
     for parameter, value in known_values(context):
         if type_problem(value.value, parameter.type.value) is None:
             yield parameter, value
+
+
+def has_wrong_default(parameter: Parameter) -> bool:
+    """Return whether the default does not have the declared type: either may be wrong."""
+    default, kind = parameter.default, parameter.type.value
+    if default is None or kind not in KNOWN_TYPES or _is_unresolved_value(default.value):
+        return False
+    return type_problem(default.value, kind) is not None
+
+
+def wrong_choices(parameter: Parameter) -> list[Plain]:
+    """Return the choices that do not have the type of their parameter, or of its elements."""
+    kind = parameter.type.value.removesuffix("_array")
+    if parameter.choices is None or kind not in KNOWN_TYPES:
+        return []
+    return [choice for choice in parameter.choices.value if type_problem(choice, kind) is not None]
+
+
+def is_wrong_choice(parameter: Parameter, value: Plain) -> bool:
+    """Return whether a value only consists of choices with another type than the declared one."""
+    wrong = wrong_choices(parameter)
+    items = value if isinstance(value, list) else [value]
+    return bool(wrong) and all(item in wrong for item in items)
+
+
+class ReportedValues:
+    """The values that a rule has reported, so that it reports one mistake once.
+
+    A value of a declaration with a wrong default is left out, and so is a value that is given to
+    many nodes, such as the number of copies.
+    """
+
+    def __init__(self) -> None:
+        self._places: set[tuple[str, int, int]] = set()
+
+    def add(self, parameter: Parameter, value: Located[Plain]) -> bool:
+        """Return whether to report ``value``, and count it as reported."""
+        place, default = location(value.span), parameter.default
+        if place in self._places or (default and location(default.span) in self._places):
+            return False
+        self._places.add(place)
+        return True
 
 
 def _values(parameter: Parameter) -> Iterator[Located[Plain]]:

@@ -28,7 +28,7 @@ def own_name(node: Node, name: str) -> str:
 def matched_ports(node: Node, remapping: Remapping) -> Iterator[Port]:
     """Yield the ports whose declared name the remapping replaces."""
     source = own_name(node, remapping.source.value)
-    for port in node.ports:
+    for port in node.all_ports:
         if own_name(node, port.ros_name.value) == source:
             yield port
 
@@ -49,3 +49,10 @@ def known_profiles(context: Context) -> frozenset[str]:
     """Return the names of the system's own profiles and of the presets."""
     own = (profile.name.value for profile in context.system.qos_profiles)
     return frozenset((*own, *PRESETS))
+
+
+def class_name_hint(text: str) -> str:
+    """Return the hint for ``text`` in place of ``module:Class``."""
+    module, _, name = text.rstrip(":").rpartition(".")
+    is_dotted = bool(module) and name[:1].isupper()
+    return f"did you mean '{module}:{name}'?" if is_dotted else "write 'module:Class'"

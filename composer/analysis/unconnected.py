@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import field
 from typing import TypeAlias
@@ -76,9 +78,22 @@ def diagnostic_location(endpoint: PortOfNode) -> tuple[Span, tuple[Label, ...]]:
     declared = endpoint.port.name.span
     if declared.file == endpoint.node.span.file:
         return declared, ()
-    return endpoint.node.name.span, (
-        Label(declared, f"{endpoint.port.kind} '{endpoint.port.name}'"),
-    )
+    return endpoint.node.name.span, (_port_label(endpoint),)
+
+
+def name_location(endpoint: PortOfNode) -> tuple[Span, tuple[Label, ...]]:
+    """Return the span for a diagnostic about the name of a port, and further labels.
+
+    This is the name of the connection that sets it, else as :func:`diagnostic_location`.
+    """
+    connected_at = endpoint.port.connected_at
+    if connected_at is None:
+        return diagnostic_location(endpoint)
+    return connected_at, (_port_label(endpoint),)
+
+
+def _port_label(endpoint: PortOfNode) -> Label:
+    return Label(endpoint.port.name.span, f"{endpoint.port.kind} '{endpoint.port.name}'")
 
 
 def external_hint(endpoint: PortOfNode) -> str:
@@ -161,13 +176,56 @@ def _key(endpoint: PortOfNode) -> tuple[str, str]:
 
 def nearest_channel(context: Context, endpoint: PortOfNode) -> str | None:
     """Return a hint with the most similar name of a possible counterpart, or None."""
+    name = _nearest_name(context, endpoint)
+    return f"did you mean '{name}'?" if name is not None else None
+
+
+def _nearest_name(context: Context, endpoint: PortOfNode) -> str | None:
     port = endpoint.port
     counterpart = (COUNTERPARTS[port.kind], port.interface.value)
     nodes = context.once(_channel_names).get(counterpart, {})
     for name in vocabulary(tuple(nodes)).close(port.full_name, _MAXIMUM_CANDIDATES):
         if name != port.full_name and nodes[name] != {endpoint.node.name.value}:
-            return f"did you mean '{name}'?"
+            return name
     return None
+
+
+def is_meant_by_another(context: Context, publisher: PortOfNode) -> bool:
+    """Return whether a subscription without a publisher is probably meant to have this one.
+
+    That is, its name is similar, and is written less often: it is the misspelled one of the two.
+    """
+    key = (publisher.port.interface.value, publisher.port.full_name)
+    meant = context.once(_meant_publishers).get(key)
+    if meant is None:
+        return False
+    return _occurrences(context, meant) < _occurrences(context, publisher)
+
+
+def _meant_publishers(context: Context) -> dict[tuple[str, str], PortOfNode]:
+    """Return the subscriptions without a publisher, by interface and the name they may mean."""
+    found: dict[tuple[str, str], PortOfNode] = {}
+    for endpoint in unconnected_ports(context, PortKind.SUBSCRIPTION):
+        name = _nearest_name(context, endpoint) if endpoint.port.required is None else None
+        if name is not None:
+            found.setdefault((endpoint.port.interface.value, name), endpoint)
+    return found
+
+
+def _occurrences(context: Context, endpoint: PortOfNode) -> int:
+    """Return how often the last part of the name of a port is written in the file."""
+    words = context.once(_words)[endpoint.port.name.span.file.path]
+    return words[endpoint.port.full_name.rpartition("/")[2]]
+
+
+def _words(context: Context) -> dict[str, Counter[str]]:
+    """Return how often each word is written, in the files that declare ports."""
+    files = {
+        port.name.span.file.path: port.name.span.file
+        for node in context.system.nodes
+        for port in node.ports
+    }
+    return {path: Counter(re.findall(r"\w+", file.text)) for path, file in files.items()}
 
 
 def _channel_names(context: Context) -> _ChannelNames:

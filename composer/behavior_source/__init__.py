@@ -7,6 +7,8 @@ decorator, ``__getattr__``) is marked as unknown, and rules do not report it as 
 
 from composer.behavior_source.lookup import BehaviorSource, find_behavior, imported_from
 from composer.behavior_source.method_body import Call, Function
+from composer.behavior_source.modules import top_package
+from composer.behavior_source.nearby_modules import NearbyModules, nearby_modules
 from composer.behavior_source.publishing import published_port
 from composer.behavior_source.syntax import Class, Method, Module
 
@@ -17,7 +19,10 @@ __all__ = [
     "Function",
     "Method",
     "Module",
+    "NearbyModules",
     "find_behavior",
     "imported_from",
+    "nearby_modules",
     "published_port",
+    "top_package",
 ]

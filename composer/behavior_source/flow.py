@@ -73,6 +73,16 @@ def may_raise_at_end(function: Function) -> bool:
     return False
 
 
+def returns_nothing(function: Function) -> bool:
+    """Return whether ``function`` returns None on every path, and does not wait to be overridden.
+
+    A method that always raises, and one with a decorator, is not said to.
+    """
+    if function.decorator_list or is_stub(function):
+        return False
+    return reaches_end(function) and next(returned_values(function), None) is None
+
+
 def is_stub(function: Function) -> bool:
     """Return whether a function only has a docstring, 'pass' or '...': one to be overridden."""
     return all(

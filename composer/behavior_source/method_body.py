@@ -79,6 +79,13 @@ def read_body(function: Function, imports: Mapping[str, str], source: SourceFile
     )
 
 
+def argument(call: ast.Call, position: int, name: str) -> ast.expr | None:
+    """Return what a call passes for a parameter, by its position or its name."""
+    if len(call.args) > position:
+        return call.args[position]
+    return next((item.value for item in call.keywords if item.arg == name), None)
+
+
 def dotted(node: ast.expr) -> str:
     """Return a dotted name as written; "" for other expressions."""
     parts: list[str] = []

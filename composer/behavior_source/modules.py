@@ -61,7 +61,7 @@ def local_module_file(module: str, folder: Path, project: Project) -> Path | Non
 def is_compiled(module: str) -> bool:
     """Return whether ``module`` exists without Python source: compiled or built in."""
     parts = module.split(".")
-    spec = _spec(parts[0]) if all(part.isidentifier() for part in parts) else None
+    spec = module_spec(parts[0]) if all(part.isidentifier() for part in parts) else None
     if spec is None or len(parts) == 1:
         return spec is not None
     *parents, last = parts[1:]
@@ -109,6 +109,14 @@ def module_below(base: Path, parts: Sequence[str]) -> Path | None:
     return next((file for file in candidates if _exists(file)), None)
 
 
+def top_package(path: Path) -> str:
+    """Return the package that a file belongs to: source folders may have the name of one too."""
+    folder = path.parent
+    while folder.name and (folder.parent / "__init__.py").is_file():
+        folder = folder.parent
+    return folder.name if (folder / "__init__.py").is_file() else ""
+
+
 def _checked(path: Path, project: Project) -> Path:
     if not project.holds(path):
         raise Unreadable("is a symbolic link out of the project")
@@ -125,7 +133,7 @@ def _exists(path: Path) -> bool:
 
 
 def _installed(parts: list[str]) -> Path | None:
-    spec = _spec(parts[0])
+    spec = module_spec(parts[0])
     if spec is None:
         return None
     if len(parts) == 1:
@@ -143,10 +151,10 @@ def _submodules(spec: importlib.machinery.ModuleSpec, parts: list[str]) -> Itera
 
 def is_installed(module: str) -> bool:
     """Return whether the first part of ``module`` can be imported, without importing it."""
-    return _spec(module.partition(".")[0]) is not None
+    return module_spec(module.partition(".")[0]) is not None
 
 
-def _spec(name: str) -> importlib.machinery.ModuleSpec | None:
+def module_spec(name: str) -> importlib.machinery.ModuleSpec | None:
     """Return the spec of a top-level module, without importing it."""
     try:
         return importlib.util.find_spec(name)

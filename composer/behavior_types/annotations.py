@@ -4,11 +4,23 @@ from __future__ import annotations
 
 import ast
 import warnings
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from types import GeneratorType
 
 from composer.behavior_source import Module
-from composer.behavior_types.names import api_class, interface_name, own_name
+from composer.behavior_types.names import alias_named, api_class, interface_name, own_name
 from composer.behavior_types.own_classes import class_named
-from composer.behavior_types.values import NONE, ApiValue, Collection, OwnObject, Value, join
+from composer.behavior_types.rclpy_api import rclpy_class
+from composer.behavior_types.values import (
+    NONE,
+    ApiValue,
+    Collection,
+    OwnObject,
+    Value,
+    join,
+    join_all,
+)
 from composer.field_types import ANYTHING, BOOL, INTEGER, NUMBER, STRING
 from composer.interfaces import Action, Interfaces, Message, Service
 from composer.model import Node, PortKind
@@ -25,6 +37,20 @@ _COLLECTIONS: dict[str, type] = {
     "set": set,
     "Set": set,
     "tuple": tuple,
+}
+_GENERIC: dict[str, type] = {
+    "collections.OrderedDict": dict,
+    "collections.defaultdict": dict,
+    "typing.DefaultDict": dict,
+    "collections.deque": deque,
+    "collections.abc.Generator": GeneratorType,
+    "collections.abc.Iterable": Iterable,
+    "collections.abc.Iterator": Iterator,
+    "collections.abc.Sequence": Sequence,
+    "typing.Generator": GeneratorType,
+    "typing.Iterable": Iterable,
+    "typing.Iterator": Iterator,
+    "typing.Sequence": Sequence,
 }
 #: The kind of port that a value of the API belongs to.
 _KINDS = {
@@ -51,24 +77,38 @@ def annotated(annotation: ast.expr, home: Module, node: Node, interfaces: Interf
         case ast.Subscript(value=ast.Name(id=name), slice=inner) if name in _COLLECTIONS:
             types = inner.elts if isinstance(inner, ast.Tuple) else [inner]
             parts = [annotated(item, home, node, interfaces) for item in types]
-            return _collection(_COLLECTIONS[name], parts)
+            has_length = not any(_is_ellipsis(item) for item in types)
+            return _collection(_COLLECTIONS[name], parts, has_length=has_length)
+        case ast.Subscript(value=generic, slice=inner):
+            python = _GENERIC.get(own_name(generic, home))
+            types = inner.elts if isinstance(inner, ast.Tuple) else [inner]
+            parts = [annotated(item, home, node, interfaces) for item in types]
+            return _collection(python, parts) if python is not None else ANYTHING
         case ast.Name(id=name) if name in _COLLECTIONS and name not in home.imports:
             return Collection(_COLLECTIONS[name])
         case ast.Name(id=name) if name in _BUILTINS and name not in home.imports:
             return _BUILTINS[name]
         case ast.Name(id=name) if (own := class_named(name, home)) is not None:
             return OwnObject(own)
+        case ast.Name(id=name) if (alias := alias_named(name, home)) is not None:
+            return annotated(alias, home, node, interfaces)
         case ast.Name() | ast.Attribute():
             return _named(own_name(annotation, home), node, interfaces)
         case _:
             return ANYTHING
 
 
-def _collection(python: type, parts: list[Value]) -> Collection:
+def _collection(python: type, parts: list[Value], *, has_length: bool = True) -> Collection:
     if python is dict and len(parts) > 1:
         return Collection(dict, parts[1], parts[0])
-    is_uniform = all(part == parts[0] for part in parts)
-    return Collection(python, parts[0] if is_uniform else ANYTHING)
+    if python is GeneratorType or (python is tuple and not has_length):
+        return Collection(python, parts[0])
+    items = tuple(parts) if python is tuple else None
+    return Collection(python, join_all(parts), items=items)
+
+
+def _is_ellipsis(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and node.value is Ellipsis
 
 
 def _parsed(text: str) -> ast.expr | None:
@@ -87,6 +127,9 @@ def _named(full: str, node: Node, interfaces: Interfaces) -> Value:
     if api is not None:
         ports = node.ports_of(_KINDS[api]) if api in _KINDS else ()
         return ApiValue(api, ports[0] if len(ports) == 1 else None)
+    if full.startswith("rclpy."):
+        own = rclpy_class(full)
+        return OwnObject(own) if own is not None else ANYTHING
     name, rest = interface_name(full)
     match interfaces.find(name) if name else None:
         case Message() as message if not rest:

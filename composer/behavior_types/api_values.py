@@ -19,11 +19,26 @@ _ANNOTATIONS: Mapping[str, Value] = {
     "None": NONE,
 }
 _TIME = "builtin_interfaces/msg/Time"
+_TRANSFORM = "geometry_msgs/msg/TransformStamped"
+#: The messages that parameters of methods take, by class and name.
+_MESSAGES: Mapping[str, Mapping[str, str]] = {
+    "Transforms": {"transform": "geometry_msgs/msg/Transform", "stamp": _TIME},
+}
+
+
+def api_parameters(class_name: str, method: str, interfaces: Interfaces) -> Mapping[str, Value]:
+    """Return the types of the parameters of a method of the API, as far as they are known."""
+    known = _plain_parameters(class_name, method)
+    messages = _MESSAGES.get(class_name, {})
+    return {name: _message(messages.get(name), interfaces) or known[name] for name in known}
+
+
+def _message(name: str | None, interfaces: Interfaces) -> Message | None:
+    return None if name is None else interfaces.message(name)
 
 
 @cache
-def api_parameters(class_name: str, method: str) -> Mapping[str, Value]:
-    """Return the types of the parameters of a method of the API, as far as they are known."""
+def _plain_parameters(class_name: str, method: str) -> Mapping[str, Value]:
     annotations = inspect.get_annotations(getattr(getattr(behavior, class_name), method))
     known = {name: _ANNOTATIONS.get(text, ANYTHING) for name, text in annotations.items()}
     return {name: type_ for name, type_ in known.items() if name != "return"}
@@ -57,6 +72,8 @@ def api_result(owner: ApiValue, name: str, interfaces: Interfaces) -> Value:
             return STATUS
         case "Clock", "stamp", _:
             return interfaces.message(_TIME) or ANYTHING
+        case "Transforms", "lookup" | "wait", _:
+            return interfaces.message(_TRANSFORM) or ANYTHING
     annotation = members(owner.class_name)[name].annotation
     if annotation in {"SentGoal", "GoalResult"}:
         return ApiValue(annotation, owner.port)

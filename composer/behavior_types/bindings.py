@@ -19,18 +19,21 @@ class How(Enum):
     VALUE = "value"  # the name has this value
     ELEMENT = "element"  # the name is an element of this value
     ANNOTATION = "annotation"  # the expression is the annotation
+    EXCEPTION = "exception"  # the name is an exception of this class
 
 
 @dataclass(frozen=True, slots=True)
 class Binding:
     """One place that binds a name; an ``expression`` of None may be anything.
 
+    ``positions`` are the places of the name in the tuples that are unpacked, outermost first.
     ``creates`` is false for a declaration of an attribute without a value.
     """
 
     expression: ast.expr | None = None
     how: How = How.VALUE
     creates: bool = True
+    positions: tuple[int, ...] = ()
 
 
 @dataclass(slots=True)
@@ -43,23 +46,36 @@ class Bindings:
     changes: dict[str, list[tuple[ast.operator, ast.expr]]] = field(default_factory=dict)
     name_changes: dict[str, list[tuple[ast.operator, ast.expr]]] = field(default_factory=dict)
     receiver: str | None = None
+    #: The names that the function asks for their class, so that they are of several.
+    distinguished: set[str] = field(default_factory=set)
+    #: The arguments of lambdas that get the elements of a list.
+    elements: set[ast.AST] = field(default_factory=set)
+    #: The annotations of the arguments of functions within the function, by name.
+    inner: dict[str, list[ast.expr | None]] = field(default_factory=dict)
 
-    def bind(self, target: ast.AST, expression: ast.expr | None, how: How = How.VALUE) -> None:
-        """Record that ``target`` is bound to ``expression``."""
+    def bind(
+        self,
+        target: ast.AST,
+        expression: ast.expr | None,
+        how: How = How.VALUE,
+        positions: tuple[int, ...] = (),
+    ) -> None:
+        """Record that ``target`` is bound to ``expression``, or to an item within it."""
         match target:
             case ast.Name(id=name):
-                self.names.setdefault(name, []).append(Binding(expression, how))
+                found = Binding(expression, how, positions=positions)
+                self.names.setdefault(name, []).append(found)
             case ast.Attribute(value=ast.Name(id=name), attr=attribute) if name == self.receiver:
-                self.attributes.setdefault(attribute, []).append(Binding(expression, how))
+                found = Binding(expression, how, positions=positions)
+                self.attributes.setdefault(attribute, []).append(found)
             case ast.Tuple(elts=targets) | ast.List(elts=targets):
-                values = _elements(expression, len(targets)) if how is How.VALUE else None
-                for index, item in enumerate(targets):
+                plain = how is How.VALUE and not positions
+                values = _elements(expression, len(targets)) if plain else None
+                for item, position in zip(targets, _positions(targets), strict=True):
                     if values is not None:
-                        self.bind(item, values[index])
-                    elif how is How.VALUE:
-                        self.bind(item, expression, How.ELEMENT)
+                        self.bind(item, values[position])
                     else:
-                        self.bind(item, None)
+                        self.bind(item, expression, how, (*positions, position))
             case ast.Starred(value=value):
                 self.bind(value, None)
 
@@ -76,7 +92,9 @@ def bindings_of(function: Function, *, is_method: bool = True) -> Bindings:
     """
     is_method = is_method and not is_static(function)
     arguments = (*function.args.posonlyargs, *function.args.args)
-    found = Bindings(receiver=arguments[0].arg if arguments and is_method else None)
+    # The object is not annotated; where it is, 'self' is missing.
+    is_method = is_method and bool(arguments) and arguments[0].annotation is None
+    found = Bindings(receiver=arguments[0].arg if is_method else None)
     for argument in arguments[1:] if is_method else arguments:
         found.bind(ast.Name(argument.arg), argument.annotation, How.ANNOTATION)
     for argument in function.args.kwonlyargs:
@@ -85,6 +103,14 @@ def bindings_of(function: Function, *, is_method: bool = True) -> Bindings:
         found.name(other.arg if other is not None else None)
     for node in nodes_of(function):
         _bind(node, found)
+    for name, inner in found.inner.items():
+        # what the function around it calls the same may be something else
+        is_only = len(inner) == 1 and name not in found.names
+        for annotation in inner:
+            if is_only and annotation is not None:
+                found.bind(ast.Name(name), annotation, How.ANNOTATION)
+            else:
+                found.name(name)
     return found
 
 
@@ -95,6 +121,15 @@ def is_static(function: Function) -> bool:
     )
 
 
+def is_class_method(function: Function) -> bool:
+    """Return whether a function is a class method and has no other decorator."""
+    match function.decorator_list:
+        case [ast.Name(id="classmethod")]:
+            return True
+        case _:
+            return False
+
+
 @lru_cache(maxsize=512)
 def nodes_of(function: Function) -> tuple[ast.AST, ...]:
     """Return the nodes in the body of ``function`` in source order, without nested classes."""
@@ -103,6 +138,8 @@ def nodes_of(function: Function) -> tuple[ast.AST, ...]:
 
 def _bind(node: ast.AST, found: Bindings) -> None:
     match node:
+        case ast.If(test=test) | ast.IfExp(test=test) | ast.While(test=test):
+            found.distinguished.update(_distinguished(test))
         case ast.Assign(targets=targets, value=value):
             for target in targets:
                 found.bind(target, value)
@@ -119,14 +156,19 @@ def _bind(node: ast.AST, found: Bindings) -> None:
             found.bind(node.target, None if is_async else node.iter, How.ELEMENT)
         case ast.withitem(optional_vars=ast.expr() as target):
             found.bind(target, None)
+        case ast.ExceptHandler(type=ast.expr() as caught, name=str() as name):
+            found.bind(ast.Name(name), caught, How.EXCEPTION)
         case ast.ExceptHandler(name=name) | ast.MatchAs(name=name) | ast.MatchStar(name=name):
             found.name(name)
         case ast.MatchMapping(rest=name):
             found.name(name)
         case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
             found.name(name)
-        case ast.arg(arg=name):  # of a nested function or a lambda
-            found.name(name)
+        case ast.Call():
+            _bind_keys(node, found)
+        case ast.arg(arg=name, annotation=annotation) if node not in found.elements:
+            # of a nested function or a lambda
+            found.inner.setdefault(name, []).append(annotation)
         case ast.alias(name=name, asname=other):
             found.name(other or name.partition(".")[0])
         case ast.Global(names=names) | ast.Nonlocal(names=names):
@@ -146,9 +188,42 @@ def assigned_pairs(target: ast.expr, value: ast.expr) -> Iterator[tuple[ast.expr
         yield from zip(targets, values, strict=True)
 
 
+def _positions(targets: list[ast.expr]) -> list[int]:
+    """Return the positions of the targets of a tuple; those after ``*`` count from its end."""
+    starred = [index for index, item in enumerate(targets) if isinstance(item, ast.Starred)]
+    first = starred[0] if starred else len(targets)
+    return [index if index <= first else index - len(targets) for index in range(len(targets))]
+
+
 def _elements(expression: ast.expr | None, count: int) -> list[ast.expr] | None:
     if not isinstance(expression, ast.Tuple | ast.List) or len(expression.elts) != count:
         return None
     if any(isinstance(item, ast.Starred) for item in expression.elts):
         return None
     return expression.elts
+
+
+def _bind_keys(call: ast.Call, found: Bindings) -> None:
+    """Bind the argument of the lambda in ``sorted(items, key=lambda item: ...)`` and the like."""
+    match call:
+        case ast.Call(func=ast.Name(id="max" | "min" | "sorted"), args=[items], keywords=keywords):
+            pass
+        case ast.Call(func=ast.Attribute(value=items, attr="sort"), args=[], keywords=keywords):
+            pass
+        case _:
+            return
+    for keyword in keywords:
+        match keyword:
+            case ast.keyword(
+                arg="key", value=ast.Lambda(args=ast.arguments(args=[argument], posonlyargs=[]))
+            ):
+                found.elements.add(argument)
+                found.bind(ast.Name(argument.arg), items, How.ELEMENT)
+
+
+def _distinguished(test: ast.expr) -> Iterator[str]:
+    """Yield the names whose class a condition asks for."""
+    for node in walk([test]):
+        match node:
+            case ast.Call(func=ast.Name(id="isinstance" | "type"), args=[ast.Name(id=name), *_]):
+                yield name

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
+from types import GeneratorType
 from typing import TYPE_CHECKING
 
-from composer.behavior_source import Function, Module
+from composer.behavior_source import Module
 from composer.behavior_source.method_body import dotted
 from composer.behavior_types.annotations import annotated
 from composer.behavior_types.api_values import api_member, api_result, class_member
-from composer.behavior_types.bindings import Binding, Bindings, How, nodes_of
+from composer.behavior_types.bindings import Binding, Bindings, How
+from composer.behavior_types.literals import constant_type, integer_constant
 from composer.behavior_types.names import (
     constant_named,
     full_name,
@@ -19,18 +21,33 @@ from composer.behavior_types.names import (
     imported_from,
     interface_name,
 )
-from composer.behavior_types.operators import (
-    binary,
-    builtin_call,
-    comparison,
-    element_of,
-    unary,
+from composer.behavior_types.objects import (
+    attribute_of_class,
+    attribute_of_object,
+    created_object,
+    given_class,
+    returned_by,
 )
-from composer.behavior_types.own_classes import class_named
+from composer.behavior_types.operators import binary, both, comparison, is_text, unary
+from composer.behavior_types.own_classes import (
+    class_named,
+)
+from composer.behavior_types.rclpy_api import is_rclpy, rclpy_value
+from composer.behavior_types.rebinding import joined, with_changes
+from composer.behavior_types.standard_types import (
+    builtin_result,
+    called,
+    element_of,
+    exception_type,
+    method_result,
+    sliced,
+)
 from composer.behavior_types.values import (
     NONE,
     ApiMethod,
     ApiValue,
+    BuiltinMethod,
+    BuiltinObject,
     Collection,
     CollectionMethod,
     InterfaceClass,
@@ -49,9 +66,6 @@ from composer.behavior_types.values import (
 from composer.fast_dataclass import dataclass
 from composer.field_types import (
     ANYTHING,
-    BOOL,
-    INTEGER,
-    NUMBER,
     STRING,
     fields_of,
     parameter_type,
@@ -62,8 +76,6 @@ from composer.model import PortKind
 if TYPE_CHECKING:
     from composer.behavior_types.inference import BehaviorTypes
 
-_NO_ITEMS: dict[str, str] = {}
-_VALUES, _KEYS = type(_NO_ITEMS.values()), type(_NO_ITEMS.keys())
 _PORT_CLASSES = {
     PortKind.PUBLISHER: "Publisher",
     PortKind.CLIENT: "Client",
@@ -94,9 +106,30 @@ class FunctionTypes:
         if binding.expression is None:
             return ANYTHING
         if binding.how is How.ANNOTATION:
-            return self._annotated(binding.expression, self.home)
+            return self.annotated(binding.expression, self.home)
+        if binding.how is How.EXCEPTION:
+            return exception_type(self.called_name(binding.expression))
         found = self.type_of(binding.expression)
-        return found if binding.how is How.VALUE else self._element(found)
+        if binding.how is How.ELEMENT:
+            found = self.element(found)
+        for position in binding.positions:
+            found = self._at(found, position)
+        return found
+
+    def forget(self) -> None:
+        """Forget all types, since one of them rests on an assumption that is wrong."""
+        self._known.clear()
+        self._names.clear()
+
+    def reads_attribute(self, node: ast.expr | None, name: str) -> bool:
+        """Return whether an expression reads ``self.<name>``."""
+        return node is not None and any(
+            isinstance(item, ast.Attribute)
+            and item.attr == name
+            and isinstance(item.value, ast.Name)
+            and item.value.id == self.bindings.receiver
+            for item in ast.walk(node)
+        )
 
     def global_name(self, name: str) -> str:
         """Return the full name of a dotted name that starts with an imported one, or ""."""
@@ -117,7 +150,7 @@ class FunctionTypes:
     def _infer(self, node: ast.expr) -> Value:
         match node:
             case ast.Constant(value=value):
-                return _constant(value)
+                return constant_type(value)
             case ast.JoinedStr():
                 return STRING
             case ast.Name(id=name):
@@ -128,8 +161,7 @@ class FunctionTypes:
             case ast.Call():
                 return self._call(node)
             case ast.Await(value=value):
-                awaited = self.type_of(value)
-                return awaited.result if isinstance(awaited, Pending) else ANYTHING
+                return _awaited(self.type_of(value))
             case ast.Subscript(value=value, slice=index):
                 return self._item(self.type_of(value), index)
             case ast.IfExp(body=first, orelse=second):
@@ -148,16 +180,23 @@ class FunctionTypes:
                 return unary(operator, self.type_of(operand))
             case ast.Compare(left=left, ops=operators, comparators=others):
                 return comparison(operators, [self.type_of(item) for item in (left, *others)])
-            case ast.BoolOp(values=values):
-                return join_all(self.type_of(value) for value in values)
+            case ast.BoolOp(op=operator, values=values):
+                return both(operator, [self.type_of(value) for value in values])
             case ast.List(elts=items):
-                return Collection(list, self._common(items))
+                return Collection(list, self._common(items), is_empty=not items)
             case ast.Tuple(elts=items):
-                return Collection(tuple, self._common(items))
+                types = tuple(self.type_of(item) for item in items)
+                has_more = any(isinstance(item, ast.Starred) for item in items)
+                return Collection(tuple, join_all(types), items=None if has_more else types)
+            case ast.GeneratorExp(elt=item):
+                return Collection(GeneratorType, self.type_of(item))
+            case ast.Starred(value=value):
+                return self.element(self.type_of(value))
             case ast.Set(elts=items):
                 return Collection(set, self._common(items))
             case ast.Dict(keys=keys, values=values):
-                return Collection(dict, self._common(values), self._common(keys))
+                common = self._of_record(values), self._common(keys)
+                return Collection(dict, *common, is_empty=not values)
             case ast.ListComp(elt=item):
                 return Collection(list, self.type_of(item))
             case ast.SetComp(elt=item):
@@ -170,6 +209,11 @@ class FunctionTypes:
     def _common(self, items: Iterable[ast.expr | None]) -> Value:
         """Return the type of all of the items, ANYTHING if they differ."""
         return join_all(ANYTHING if item is None else self.type_of(item) for item in items)
+
+    def _of_record(self, values: Sequence[ast.expr]) -> Value:
+        """Return the type of the values of a dict; None is the place of a value of any type."""
+        is_open = any(self.type_of(value) is NONE for value in values)
+        return ANYTHING if is_open else self._common(values)
 
     def name(self, name: str) -> Value:
         """Return the type of a name."""
@@ -184,7 +228,9 @@ class FunctionTypes:
         bindings = self.bindings.names.get(name)
         if bindings is None:
             return self._of_module(name)
-        found = joined((self.bound(binding), binding.how) for binding in bindings)
+        if name in self.bindings.distinguished:
+            return ANYTHING
+        found = self.before_changes(name)
         found = with_changes(
             found,
             ((op, self.type_of(value)) for op, value in self.bindings.name_changes.get(name, ())),
@@ -192,10 +238,17 @@ class FunctionTypes:
         given = self.arguments.get(name)
         if given is None:
             return found
-        only_argument = len(bindings) == 1
-        return (
-            given if only_argument and (found is ANYTHING or _compatible(found, given)) else found
-        )
+        if len(bindings) > 1:
+            return found
+        if found is ANYTHING or _compatible(found, given):
+            return given
+        # The annotation is reported; which of the two the function means is not known.
+        return ANYTHING if isinstance(given, Message) else found
+
+    def before_changes(self, name: str) -> Value:
+        """Return the type of a name of the function without what '+=' and the like do to it."""
+        bindings = self.bindings.names.get(name, [])
+        return joined((self.bound(binding), binding.how) for binding in bindings)
 
     def _of_module(self, name: str) -> Value:
         """Return the type of a name that the function does not bind."""
@@ -203,8 +256,10 @@ class FunctionTypes:
         if function is not None:
             return ModuleFunction(function, self.home)
         constant = constant_named(name, self.home)
+        if isinstance(constant, ast.Constant):
+            return constant_type(constant.value)
         if constant is not None:
-            return _constant(constant.value)
+            return self.owner.at_module(self.home).type_of(constant)
         return class_named(name, self.home) or self._of_helper(name) or self._global(name)
 
     def _of_helper(self, name: str) -> Value | None:
@@ -220,7 +275,7 @@ class FunctionTypes:
         full = self.global_name(dotted_name)
         name, rest = interface_name(full)
         definition = self.owner.interfaces.find(name) if name and not rest else None
-        return InterfaceClass(definition) if definition is not None else ANYTHING
+        return InterfaceClass(definition) if definition is not None else rclpy_value(full)
 
     def member(self, owner: Value, name: str) -> Value:
         """Return the type of attribute ``name`` of a value."""
@@ -236,34 +291,31 @@ class FunctionTypes:
                 if parameter is None:
                     return ANYTHING
                 choices = parameter.choices.value if parameter.choices is not None else ()
-                return parameter_type(parameter.type.value, choices)
+                value = parameter_type(parameter.type.value, choices)
+                is_array = isinstance(value, FieldType) and value.is_array
+                return Collection(list, element_of(value)) if is_array else value
             case ApiValue():
                 return api_member(owner, name, self.owner.interfaces)
             case InterfaceClass(definition=definition):
                 return class_member(definition, name)
             case Collection():
                 return CollectionMethod(owner, name)
-            case OwnObject(of=of):
-                return self._of_object(of, name)
+            case BuiltinObject(python=python):
+                return BuiltinMethod(python, name)
+            case OwnObject():
+                return attribute_of_object(self, owner, name)
+            case OwnClass():
+                return attribute_of_class(owner, name)
+            case FieldType() if is_text(owner):
+                return CollectionMethod(Collection(str, STRING), name)
             case Message() | FieldType():
                 message = fields_of(owner, self.owner.interfaces)
                 member = message.field(name) if message is not None else None
-                return self._normal(member.type) if member is not None else ANYTHING
+                if member is None:
+                    return class_member(message, name) if message is not None else ANYTHING
+                return self._normal(member.type)
             case _:
                 return ANYTHING
-
-    def _of_object(self, of: OwnClass, name: str) -> Value:
-        """Return the type of an attribute of an object, from methods and annotations."""
-        for method in of.definition.methods:
-            if method.name == name and method.node is not None:
-                known = method.known and not method.node.decorator_list
-                return ModuleFunction(method.node, of.home, is_bound=True) if known else ANYTHING
-        for statement in of.definition.node.body:
-            match statement:
-                case ast.AnnAssign(target=ast.Name(id=found), annotation=annotation):
-                    if found == name:
-                        return self._annotated(annotation, of.home)
-        return ANYTHING
 
     def _call(self, node: ast.Call) -> Value:
         match self.type_of(node.func):
@@ -273,29 +325,27 @@ class FunctionTypes:
                 result = api_result(owner, member.name, self.owner.interfaces)
                 return Pending(member.name, node, result) if member.is_async else result
             case OwnMethod(method=method, home=home) if method.node is not None:
-                return self._returned(method.node, home, node)
-            case ModuleFunction(node=function, home=home):
-                return self._returned(function, home, node)
+                return returned_by(self, method.node, home, node)
+            case ModuleFunction(node=function, home=home, parameter=parameter):
+                if is_rclpy(home) and parameter is ANYTHING:
+                    parameter = given_class(self, function, node, is_bound=True)
+                return returned_by(self, function, home, node, parameter)
             case OwnClass() as own:
-                return OwnObject(own)
+                return created_object(self, own, node)
+            case BuiltinMethod(python=python, name=name):
+                return builtin_result(python, name, [self.type_of(item) for item in node.args])
             case CollectionMethod(owner=collection, name=name):
-                return ANYTHING if len(node.args) > 1 else _collection_result(collection, name)
+                return method_result(collection, name, [self.type_of(item) for item in node.args])
         full = self.called_name(node.func)
-        return builtin_call(full, [self.type_of(item) for item in node.args]) if full else ANYTHING
+        if full == "super" and not node.args:
+            return self.owner.parent(self)
+        if not full or any(isinstance(item, ast.Starred) for item in node.args):
+            return ANYTHING
+        named = {item.arg: self.type_of(item.value) for item in node.keywords if item.arg}
+        return called(full, [self.type_of(item) for item in node.args], named)
 
-    def _returned(self, function: Function, home: Module, call: ast.Call) -> Value:
-        """Return the type of a call of a function; only annotations determine it."""
-        result: Value = ANYTHING
-        if function.returns is not None:
-            result = self._annotated(function.returns, home)
-        if not isinstance(function, ast.AsyncFunctionDef):
-            return result
-        is_plain = not function.decorator_list and not any(
-            isinstance(inner, ast.Yield) for inner in nodes_of(function)
-        )
-        return Pending(function.name, call, result) if is_plain else ANYTHING
-
-    def _annotated(self, annotation: ast.expr, home: Module) -> Value:
+    def annotated(self, annotation: ast.expr, home: Module) -> Value:
+        """Return the type that an annotation in ``home`` names."""
         return annotated(annotation, home, self.owner.node, self.owner.interfaces)
 
     def _item(self, owner: Value, index: ast.expr) -> Value:
@@ -303,50 +353,37 @@ class FunctionTypes:
             name = index.value if isinstance(index, ast.Constant) else None
             return self.member(owner, name) if isinstance(name, str) else ANYTHING
         if isinstance(index, ast.Slice):
-            return owner if isinstance(owner, Collection) else ANYTHING
+            return sliced(owner)
         if isinstance(owner, Collection):
+            position = integer_constant(index)
+            if owner.items is not None and position is not None:
+                return self._at(owner, position)
             return ANYTHING if owner.python is set else owner.element
-        return self._element(owner)
+        return self.element(owner)
 
-    def _element(self, owner: Value) -> Value:
+    def element(self, owner: Value) -> Value:
+        """Return the type of what iterating over a value gives."""
         found = element_of(owner)
         return self._normal(found) if isinstance(found, FieldType) else found
+
+    def _at(self, owner: Value, position: int) -> Value:
+        """Return the type of the item at a position of what is unpacked."""
+        if isinstance(owner, Collection) and owner.items is not None:
+            count = len(owner.items)
+            return owner.items[position] if -count <= position < count else ANYTHING
+        return self.element(owner)
 
     def _normal(self, type_: FieldType) -> Value:
         """Return the message of a type that is one, so that equal types compare as equal."""
         return fields_of(type_, self.owner.interfaces) or type_
 
 
-def joined(found: Iterable[tuple[Value, How]]) -> Value:
-    """Return the type of a name with these bindings; an annotation decides."""
-    pairs = list(found)
-    for type_, how in pairs:
-        if how is How.ANNOTATION:
-            return type_
-    result: Value = NONE
-    for type_, _ in pairs:
-        result = join(result, type_)
-    return result
-
-
-def with_changes(type_: Value, changes: Iterable[tuple[ast.operator, Value]]) -> Value:
-    """Return the type of a name after ``+=`` and the like; ANYTHING if they may change it."""
-    for operator, value in changes:
-        if binary(type_, operator, value) != type_:
-            return ANYTHING
-    return type_
-
-
-def _collection_result(owner: Collection, name: str) -> Value:
-    match name:
-        case "values" if owner.python is dict:
-            return Collection(_VALUES, owner.element)
-        case "keys" if owner.python is dict:
-            return Collection(_KEYS, owner.key)
-        case "get" | "pop":
-            return owner.element
-        case "copy":
-            return owner
+def _awaited(awaitable: Value) -> Value:
+    match awaitable:
+        case Pending(result=result):
+            return result
+        case OwnObject(of=of, parameter=parameter) if is_rclpy(of.home):
+            return parameter
         case _:
             return ANYTHING
 
@@ -355,22 +392,7 @@ def _compatible(annotation: Value, given: Value) -> bool:
     """Return whether what a handler gets agrees with its annotation; None for no annotation."""
     if isinstance(annotation, ApiValue) and isinstance(given, ApiValue):
         return annotation.class_name == given.class_name
+    if isinstance(annotation, OwnObject) and isinstance(given, OwnObject):
+        is_open = annotation.parameter is ANYTHING  # 'ServerGoalHandle' names no action
+        return annotation.of == given.of and (is_open or annotation == given)
     return annotation == given
-
-
-def _constant(value: object) -> Value:
-    match value:
-        case None:
-            return NONE
-        case bool():
-            return BOOL
-        case int():
-            return INTEGER
-        case float():
-            return NUMBER
-        case str():
-            return STRING
-        case bytes():
-            return Collection(bytes, INTEGER)
-        case _:
-            return ANYTHING

@@ -10,10 +10,21 @@ from functools import cached_property
 from composer.behavior_source import BehaviorSource, Function, Method, Module
 from composer.behavior_types.api import attribute_class
 from composer.behavior_types.bindings import Binding, Bindings, How, bindings_of
-from composer.behavior_types.expressions import FunctionTypes, joined, with_changes
-from composer.behavior_types.handlers import handler_arguments
+from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.handlers import Handler, handlers_of
+from composer.behavior_types.objects import method_value
+from composer.behavior_types.own_classes import has_fields
+from composer.behavior_types.rebinding import joined, with_changes
 from composer.behavior_types.self_attributes import escapes, self_attributes
-from composer.behavior_types.values import ApiValue, OwnMethod, Parameters, Ports, Value
+from composer.behavior_types.values import (
+    ApiValue,
+    OwnClass,
+    OwnMethod,
+    OwnObject,
+    Parameters,
+    Ports,
+    Value,
+)
 from composer.fast_dataclass import dataclass
 from composer.field_types import ANYTHING
 from composer.interfaces import Interfaces
@@ -36,6 +47,9 @@ class BehaviorTypes:
     interfaces: Interfaces
     scopes: dict[int, FunctionTypes] = field(default_factory=dict)
     _known: dict[str, Value] = field(default_factory=dict)
+    #: The types of attributes that methods of other classes assign, by class and name.
+    of_objects: dict[tuple[int, str], Value] = field(default_factory=dict)
+    _at_modules: dict[int, FunctionTypes] = field(default_factory=dict)
 
     def scope(self, method: Method, home: Module) -> FunctionTypes | None:
         """Return the types within a method; None if its syntax is not known."""
@@ -43,16 +57,33 @@ class BehaviorTypes:
             return None
         if id(method.node) not in self.scopes:
             self.scopes[id(method.node)] = FunctionTypes(
-                self, home, bindings_of(method.node), self._arguments(method)
+                self, home, bindings_of(method.node), self.arguments_of(method)
             )
         return self.scopes[id(method.node)]
 
-    def function(self, node: Function, home: Module, *, is_method: bool) -> FunctionTypes:
-        """Return the types within a function outside the class of the behavior."""
+    def function(self, node: Function, home: Module, own: OwnClass | None = None) -> FunctionTypes:
+        """Return the types within a function, or a method of ``own``, not of the behavior."""
         bindings = bindings_of(node, is_method=False)
-        if is_method and (*node.args.posonlyargs, *node.args.args):
-            bindings.name((*node.args.posonlyargs, *node.args.args)[0].arg)
-        return FunctionTypes(self, home, bindings, {})
+        arguments: dict[str, Value] = {}
+        positional = (*node.args.posonlyargs, *node.args.args)
+        if own is not None and positional and positional[0].annotation is None:
+            # Other classes may be behaviors as well: the composer sets their attributes.
+            is_plain = not node.decorator_list and has_fields(own)
+            arguments = {positional[0].arg: OwnObject(own)} if is_plain else {}
+        return FunctionTypes(self, home, bindings, arguments)
+
+    def parent(self, scope: FunctionTypes) -> Value:  # noqa: ARG002 - for HostedTypes
+        """Return the type of ``super()`` in a method."""
+        return ANYTHING
+
+    def declared_value(self, call: ast.Call) -> Value:  # noqa: ARG002 - for HostedTypes
+        """Return the type of the value of the parameter of rclpy that a call names."""
+        return ANYTHING
+
+    @cached_property
+    def handlers(self) -> Mapping[str, Handler]:
+        """The handlers of the node's ports and timers, by name."""
+        return handlers_of(self.node, self.interfaces)
 
     @cached_property
     def self_attributes(self) -> frozenset[str]:
@@ -65,7 +96,7 @@ class BehaviorTypes:
         }
         assigned = {
             name
-            for name, bindings in self._assigned.items()
+            for name, bindings in self.assigned.items()
             if name not in declared or any(binding.creates for _, binding in bindings)
         }
         return self_attributes(self.source, assigned)
@@ -75,6 +106,20 @@ class BehaviorTypes:
         """Whether other code may set further attributes."""
         return escapes(self.source)
 
+    def at_module(self, home: Module) -> FunctionTypes:
+        """Return the types at the top level of a module."""
+        if id(home.tree) not in self._at_modules:
+            self._at_modules[id(home.tree)] = FunctionTypes(self, home, Bindings(), {})
+        return self._at_modules[id(home.tree)]
+
+    def infer(self) -> None:
+        """Infer the types of all attributes, before expressions in methods ask for them.
+
+        A type that rests on itself, as in ``self.count = self.count + 1``, is found only so.
+        """
+        for name in self.assigned:
+            self.attribute(name)
+
     def attribute(self, name: str) -> Value:
         """Return the type of ``self.<name>``."""
         if name not in self._known:
@@ -82,9 +127,14 @@ class BehaviorTypes:
             self._known[name] = self._attribute(name)
         return self._known[name]
 
+    def before_changes(self, name: str) -> Value:
+        """Return the type of ``self.<name>`` without what '+=' and the like do to it."""
+        places = self.assigned.get(name, ())
+        return joined((scope.bound(binding), binding.how) for scope, binding in places)
+
     def annotation(self, name: str) -> Value:
         """Return the type that an annotation gives to ``self.<name>``, ANYTHING without one."""
-        for scope, binding in self._assigned.get(name, ()):
+        for scope, binding in self.assigned.get(name, ()):
             if binding.how is How.ANNOTATION:
                 return scope.bound(binding)
         return ANYTHING
@@ -93,19 +143,38 @@ class BehaviorTypes:
         method = self.source.method(name)
         if method is not None and method.node is not None:
             home = self._home(method)
-            return OwnMethod(method, home) if method.known and home is not None else ANYTHING
-        bindings = self._assigned.get(name, [])
-        if bindings:
-            found = joined((scope.bound(binding), binding.how) for scope, binding in bindings)
-            return with_changes(found, self._changes(name))
-        if method is not None:
-            return ANYTHING
+            if method.known and home is not None:
+                return OwnMethod(method, home)
+            scope = self.scope(method, home) if home is not None else None
+            return ANYTHING if scope is None else method_value(scope, method.node, scope.home)
+        if name in self.assigned:
+            return self._joined(name)
+        return ANYTHING if method is not None else self.of_base(name)
+
+    def of_base(self, name: str) -> Value:
+        """Return the type of an attribute that the class does not set itself."""
         if name in CONTAINERS:
             return Ports(CONTAINERS[name])
         if name == "parameters":
             return Parameters()
         api = attribute_class(name)
         return ApiValue(api) if api is not None else ANYTHING
+
+    def _joined(self, name: str) -> Value:
+        """Return the type of an attribute that methods assign, also from its own old value."""
+        plain: list[tuple[FunctionTypes, Binding]] = []
+        computed: list[tuple[FunctionTypes, Binding]] = []
+        for scope, binding in self.assigned[name]:
+            of_itself = scope.reads_attribute(binding.expression, name)
+            (computed if of_itself else plain).append((scope, binding))
+        found = joined((scope.bound(binding), binding.how) for scope, binding in plain)
+        self._known[name] = found
+        found = joined([(found, How.VALUE)] + [(s.bound(item), item.how) for s, item in computed])
+        if found != self._known[name]:
+            for scope in self.scopes.values():
+                scope.forget()
+            return ANYTHING
+        return with_changes(found, self._changes(name))
 
     def _changes(self, name: str) -> Iterator[tuple[ast.operator, Value]]:
         """Yield what ``+=`` and the like do to ``self.<name>``."""
@@ -114,7 +183,7 @@ class BehaviorTypes:
                 yield operator, scope.type_of(value)
 
     @cached_property
-    def _assigned(self) -> dict[str, list[tuple[FunctionTypes, Binding]]]:
+    def assigned(self) -> dict[str, list[tuple[FunctionTypes, Binding]]]:
         """The bindings of the attributes of ``self``."""
         assigned: dict[str, list[tuple[FunctionTypes, Binding]]] = {}
         for home, known in self.source.classes:
@@ -132,10 +201,10 @@ class BehaviorTypes:
         found = (home for home, known in self.source.classes if method in known.methods)
         return next(found, None)
 
-    def _arguments(self, method: Method) -> Mapping[str, Value]:
+    def arguments_of(self, method: Method) -> Mapping[str, Value]:
         """Return the types of the arguments that the composer passes to a handler."""
-        types = handler_arguments(self.node, self.interfaces).get(method.name, ())
-        return dict(zip(method.arguments, types, strict=False))
+        handler = self.handlers.get(method.name)
+        return dict(zip(method.arguments, handler.arguments if handler else (), strict=False))
 
 
 def _of_class(node: ast.ClassDef) -> Iterator[tuple[str, Binding]]:

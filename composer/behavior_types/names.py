@@ -73,16 +73,36 @@ def imported_from(name: str, module: Module, others: Sequence[Module]) -> tuple[
     return (found[0] if len(found) == 1 else None), imported.name
 
 
-def constant_named(name: str, module: Module) -> ast.Constant | None:
-    """Return the constant that a module assigns to a name once, and that nothing changes."""
+def constant_named(name: str, module: Module) -> ast.expr | None:
+    """Return what a module assigns to a name once, and that nothing replaces: a value or a call."""
     return _constants(module).get(name)
 
 
+def alias_named(name: str, module: Module) -> ast.expr | None:
+    """Return the type that a module names at its top level, as in ``Box = tuple[int, int]``."""
+    found = [
+        statement.value
+        for statement in module.tree.body
+        if isinstance(statement, ast.Assign)
+        and any(isinstance(target, ast.Name) and target.id == name for target in statement.targets)
+    ]
+    is_type = len(found) == 1 and isinstance(found[0], ast.Subscript | ast.Name | ast.Attribute)
+    # 'Box = Box' would never end
+    is_other = is_type and not any(
+        isinstance(node, ast.Name) and node.id in module.assigned for node in ast.walk(found[0])
+    )
+    return found[0] if is_other else None
+
+
+_SINGLE = (ast.BinOp, ast.Call, ast.Constant, ast.Dict, ast.List, ast.Tuple, ast.UnaryOp)
+
+
 @lru_cache(maxsize=128)
-def _constants(module: Module) -> dict[str, ast.Constant]:
-    values: dict[str, ast.Constant] = {}
+def _constants(module: Module) -> dict[str, ast.expr]:
+    values: dict[str, ast.expr] = {}
     for statement in module.tree.body:
-        if isinstance(statement, ast.Assign) and isinstance(statement.value, ast.Constant):
+        is_single = isinstance(statement, ast.Assign) and isinstance(statement.value, _SINGLE)
+        if isinstance(statement, ast.Assign) and is_single:
             for target in statement.targets:
                 if isinstance(target, ast.Name):
                     values[target.id] = statement.value

@@ -4,35 +4,21 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Sequence
+from typing import TypeGuard
 
-from composer.behavior_types.values import NONE, Collection, Value, join_all
+from composer.behavior_types.own_classes import is_plain, known_attributes
+from composer.behavior_types.rclpy_api import is_time, order_of_rclpy, time_arithmetic
+from composer.behavior_types.values import (
+    NONE,
+    Collection,
+    ModuleFunction,
+    OwnMethod,
+    OwnObject,
+    Value,
+    join_all,
+)
 from composer.field_types import ANYTHING, BOOL, INTEGER, NUMBER, STRING
 from composer.interfaces import FLOATS, INTEGER_RANGES, FieldType, Message
-
-_TO_INTEGER = frozenset({"ceil", "comb", "factorial", "floor", "gcd", "isqrt", "lcm", "trunc"})
-_TO_BOOL = frozenset({"isclose", "isfinite", "isinf", "isnan"})
-_TO_OTHER = frozenset({"frexp", "modf", "perm", "prod", "sumprod"})
-_CONVERSIONS = {
-    "str": STRING,
-    "repr": STRING,
-    "int": INTEGER,
-    "len": INTEGER,
-    "float": NUMBER,
-    "bool": BOOL,
-    "isinstance": BOOL,
-    "any": BOOL,
-    "all": BOOL,
-}
-_COLLECTIONS: dict[str, type] = {
-    "list": list,
-    "sorted": list,
-    "tuple": tuple,
-    "set": set,
-    "frozenset": frozenset,
-    "dict": dict,
-    "bytes": bytes,
-    "bytearray": bytearray,
-}
 
 
 def is_scalar(type_: Value, names: frozenset[str] | None = None) -> bool:
@@ -61,6 +47,11 @@ def is_number(type_: Value) -> bool:
     return is_integer(type_) or is_float(type_) or type_ == BOOL
 
 
+def is_byte(type_: Value) -> bool:
+    """Return whether values of a type are a single byte: bytes of length 1 in Python."""
+    return isinstance(type_, FieldType) and not type_.is_array and type_.name == "byte"
+
+
 def is_text(type_: Value) -> bool:
     """Return whether values of a type are strings of Python."""
     return is_scalar(type_, _TEXTS)
@@ -70,6 +61,8 @@ def binary(left: Value, operator: ast.operator, right: Value) -> Value:
     """Return the type of an arithmetic operation."""
     if is_number(left) and is_number(right):
         return _arithmetic(left, operator, right)
+    if isinstance(operator, ast.Add | ast.Sub) and (is_time(left) or is_time(right)):
+        return time_arithmetic(left, _SIGNS[type(operator)], right)
     if is_text(left) and (
         (isinstance(operator, ast.Add) and is_text(right))
         or (isinstance(operator, ast.Mult) and is_number(right))
@@ -78,7 +71,10 @@ def binary(left: Value, operator: ast.operator, right: Value) -> Value:
         return STRING
     if isinstance(left, Collection) and left.python is not dict:
         if isinstance(operator, ast.Add) and isinstance(right, Collection):
-            return join_all((left, right))
+            joined = join_all((left, right))
+            if isinstance(joined, Collection) and joined.items is not None:
+                return Collection(tuple, joined.element)
+            return joined
         if isinstance(operator, ast.Mult) and is_integer(right):
             return left
     return ANYTHING
@@ -87,8 +83,9 @@ def binary(left: Value, operator: ast.operator, right: Value) -> Value:
 def _arithmetic(left: Value, operator: ast.operator, right: Value) -> Value:
     if isinstance(operator, ast.Div) or is_float(left) or is_float(right):
         return NUMBER
-    is_exact = isinstance(operator, ast.Add | ast.Sub | ast.Mult | ast.FloorDiv | ast.Mod)
-    return INTEGER if is_exact else ANYTHING
+    if isinstance(operator, ast.BitAnd | ast.BitOr | ast.BitXor) and BOOL in (left, right):
+        return ANYTHING
+    return ANYTHING if isinstance(operator, ast.Pow | ast.MatMult) else INTEGER
 
 
 def unary(operator: ast.unaryop, operand: Value) -> Value:
@@ -100,6 +97,16 @@ def unary(operator: ast.unaryop, operand: Value) -> Value:
     return ANYTHING
 
 
+def both(operator: ast.boolop, operands: Sequence[Value]) -> Value:
+    """Return the type of ``a and b`` or ``a or b``."""
+    if isinstance(operator, ast.Or):
+        return join_all(operands)
+    *first, last = operands
+    # a message is never false
+    possible = [*(item for item in first if not isinstance(item, Message)), last]
+    return ANYTHING if NONE in possible else join_all(possible)
+
+
 def comparison(operators: Sequence[ast.cmpop], operands: Sequence[Value]) -> Value:
     """Return the type of a comparison: a bool, unless an operand is of an unknown type."""
     if all(isinstance(item, ast.In | ast.NotIn | ast.Is | ast.IsNot) for item in operators):
@@ -108,65 +115,82 @@ def comparison(operators: Sequence[ast.cmpop], operands: Sequence[Value]) -> Val
     return BOOL if all(known) else ANYTHING
 
 
-def builtin_call(name: str, arguments: Sequence[Value]) -> Value:
-    """Return the type of a call of a built-in function or of one in ``math``."""
-    module, _, function = name.rpartition(".")
-    if module == "math":
-        return _math(function)
-    if name == "range":
-        return Collection(range, INTEGER)
-    if name in _COLLECTIONS:
-        source = arguments[0] if len(arguments) == 1 else ANYTHING
-        of_dict = isinstance(source, Collection) and source.python is dict
-        element = element_of(source) if name != "dict" and not of_dict else ANYTHING
-        return Collection(_COLLECTIONS[name], element)
-    if name in {"min", "max"} and len(arguments) > 1:
-        return join_all(arguments)
-    if name == "abs" and len(arguments) == 1 and is_number(arguments[0]):
-        return arguments[0]
-    if name == "round" and len(arguments) == 1 and is_number(arguments[0]):
-        return INTEGER
-    return _CONVERSIONS.get(name, ANYTHING)
-
-
-def _math(function: str) -> Value:
-    if function in _TO_OTHER:
-        return ANYTHING
-    if function in _TO_INTEGER:
-        return INTEGER
-    return BOOL if function in _TO_BOOL else NUMBER
-
-
-def element_of(type_: Value) -> Value:
-    """Return the type of what iterating over a value gives, as it is written in its type."""
-    if isinstance(type_, Collection):
-        return type_.key if type_.python is dict else type_.element
-    if isinstance(type_, FieldType) and type_.is_array:
-        return type_.element
-    return ANYTHING
-
-
 def operation_problem(left: Value, operator: ast.operator, right: Value) -> str | None:
     """Return why an operation on two values fails, or None if it may be right."""
     sign = _SIGNS.get(type(operator))
-    if sign is None or ANYTHING in (left, right):
+    if sign is None:
         return None
-    for message in (left, right):
-        if isinstance(message, Message):
-            return f"{message.name} has no operator '{sign}'"
-    is_sum = isinstance(operator, ast.Add | ast.Sub)
-    if is_sum and ((is_text(left) and is_number(right)) or (is_number(left) and is_text(right))):
+    if isinstance(operator, ast.Mod) and left is ANYTHING:
+        return None
+    for value in (left, right):
+        if isinstance(value, Message) and ANYTHING in (left, right):
+            return f"{value.name} has no operator '{sign}'"
+    if ANYTHING in (left, right):
+        return None
+    if isinstance(operator, ast.Mod) and is_text(left):
+        return None  # it formats any value
+    for value in (left, right):
+        if isinstance(value, Message):
+            return f"{value.name} has no operator '{sign}'"
+        if isinstance(value, OwnMethod | ModuleFunction):
+            return f"a function has no operator '{sign}'"
+    if is_time(left) or is_time(right):
+        return _problem_of_times(left, sign, right)
+    name = _NAMES[type(operator)]
+    is_defined = _defines(left, f"__{name}__") or _defines(right, f"__r{name}__")
+    for value in (left, right):
+        if isinstance(value, OwnObject) and not is_defined and is_plain(value.of):
+            return f"a {value.of.definition.name} has no operator '{sign}'"
+    is_repeated = isinstance(operator, ast.Mult) and (is_integer(left) or is_integer(right))
+    for first, second in ((left, right), (right, left)):
+        if is_number(first) and _is_list(second) and not is_repeated:
+            return f"operator '{sign}' on a {second.python.__name__} and a number"
+    is_mixed = (is_text(left) and is_number(right)) or (is_number(left) and is_text(right))
+    if is_mixed and not is_repeated:
         return f"operator '{sign}' on a string and a number"
     return None
+
+
+def _problem_of_times(left: Value, sign: str, right: Value) -> str | None:
+    """Return why rclpy cannot calculate with two values, one of which is a Time or a Duration."""
+    names = [order_of_rclpy(item) or _order(item) for item in (left, right)]
+    if "" in names or time_arithmetic(left, sign, right) is not ANYTHING:
+        return None
+    return f"operator '{sign}' on {names[0]} and {names[1]}"
+
+
+def _defines(value: Value, method: str) -> bool:
+    """Return whether an object may define an operator."""
+    if not isinstance(value, OwnObject):
+        return False
+    known = known_attributes(value.of) if is_plain(value.of) else None
+    return known is None or method in known
+
+
+def _is_list(type_: Value) -> TypeGuard[Collection]:
+    return isinstance(type_, Collection) and type_.python in (list, tuple, dict, set)
 
 
 def order_problem(left: Value, operator: ast.cmpop, right: Value) -> str | None:
     """Return why Python cannot order two values, or None if it may."""
     if not isinstance(operator, ast.Lt | ast.LtE | ast.Gt | ast.GtE):
         return None
-    kinds = {_order(left), _order(right)}
+    kinds = {order_of_rclpy(left) or _order(left), order_of_rclpy(right) or _order(right)}
     if len(kinds) > 1 and "" not in kinds:
         return "a comparison of " + " and ".join(sorted(kinds))
+    return None
+
+
+def equality_problem(left: Value, right: Value) -> str | None:
+    """Return why two values are never equal, None if they may be."""
+    for first, second in ((left, right), (right, left)):
+        if isinstance(first, Message) and (is_number(second) or is_text(second)):
+            return f"{first.name} is never equal to {_order(second)}"
+        if isinstance(first, OwnMethod | ModuleFunction) and _order(second) not in (
+            "",
+            "a function",
+        ):
+            return f"a function is never equal to {_order(second)}"
     return None
 
 
@@ -175,12 +199,43 @@ def _order(type_: Value) -> str:
         return "a number"
     if is_text(type_):
         return "a string"
+    if isinstance(type_, Message):
+        return type_.name
+    if isinstance(type_, OwnMethod | ModuleFunction):
+        return "a function"
     is_array = isinstance(type_, FieldType) and type_.is_array
     # numpy arrays, which messages may hold, can be compared with numbers
     is_list = is_array and isinstance(type_, FieldType) and type_.name in _TEXTS
-    return "a list" if is_list or (isinstance(type_, Collection) and type_.python is list) else ""
+    if is_list:
+        return "a list"
+    if isinstance(type_, Collection) and type_.python in (list, tuple, dict):
+        return f"a {type_.python.__name__}"
+    if isinstance(type_, OwnObject) and is_plain(type_.of):
+        return "" if _may_order(type_) else f"a {type_.of.definition.name}"
+    return ""
 
 
+def _may_order(type_: OwnObject) -> bool:
+    """Return whether objects of a class may be compared with other values."""
+    own = {method.name for method in type_.of.definition.methods}
+    options = any(isinstance(item, ast.Call) for item in type_.of.definition.node.decorator_list)
+    return options or bool(own & {"__lt__", "__le__", "__gt__", "__ge__"})
+
+
+_NAMES: dict[type[ast.operator], str] = {
+    ast.Add: "add",
+    ast.Sub: "sub",
+    ast.Mult: "mul",
+    ast.Div: "truediv",
+    ast.FloorDiv: "floordiv",
+    ast.Mod: "mod",
+    ast.Pow: "pow",
+    ast.BitAnd: "and",
+    ast.BitOr: "or",
+    ast.BitXor: "xor",
+    ast.LShift: "lshift",
+    ast.RShift: "rshift",
+}
 _SIGNS: dict[type[ast.operator], str] = {
     ast.Add: "+",
     ast.Sub: "-",
@@ -189,4 +244,9 @@ _SIGNS: dict[type[ast.operator], str] = {
     ast.FloorDiv: "//",
     ast.Mod: "%",
     ast.Pow: "**",
+    ast.BitAnd: "&",
+    ast.BitOr: "|",
+    ast.BitXor: "^",
+    ast.LShift: "<<",
+    ast.RShift: ">>",
 }

@@ -13,8 +13,10 @@ from composer.behavior_types.bindings import bindings_of
 from composer.behavior_types.names import full_name
 from composer.behavior_types.self_attributes import defined_names
 from composer.behavior_types.values import OwnClass
+from composer.fast_dataclass import dataclass
 
 _ENUMS = frozenset({"enum.Enum", "enum.IntEnum", "enum.StrEnum"})
+_NAMED_TUPLE = "typing.NamedTuple"
 _DATACLASS = "dataclasses.dataclass"
 _OF_DATACLASSES = frozenset({"__dataclass_fields__", "__dataclass_params__", "__match_args__"})
 
@@ -36,14 +38,79 @@ def known_attributes(owner: OwnClass) -> frozenset[str] | None:
     bases = {full_name(base, home) or base for base in definition.bases}
     decorators = {_decorator(item, home) for item in definition.node.decorator_list}
     is_enum = bool(bases & _ENUMS)
-    if bases - _ENUMS - {"object"} or decorators - {_DATACLASS} or definition.node.keywords:
+    is_tuple = _NAMED_TUPLE in bases
+    if (
+        bases - _ENUMS - {"object", _NAMED_TUPLE}
+        or decorators - {_DATACLASS}
+        or definition.node.keywords
+    ):
         return None
-    found = {*dir(Enum if is_enum else object), *_own(definition), *_assigned_from_outside(home)}
+    found = {*dir(Enum if is_enum else object), *_own(definition), *assigned_from_outside(home)}
     if is_enum:
         found |= {"name", "value"}
+    if is_tuple:
+        found |= {*dir(tuple), "_asdict", "_field_defaults", "_fields", "_make", "_replace"}
     if {"__getattr__", "__getattribute__", "__setattr__"} & found - set(dir(object)):
         return None
     return frozenset(found | (_OF_DATACLASSES if decorators else set()))
+
+
+@dataclass(frozen=True, slots=True)
+class ClassField:
+    """A field of a dataclass or of a named tuple; ``value`` is its default, if it has one."""
+
+    name: str
+    annotation: ast.expr
+    value: ast.expr | None
+
+
+def has_fields(owner: OwnClass) -> bool:
+    """Return whether a class is a dataclass or a named tuple without bases and constructor."""
+    definition, home = owner.definition, owner.home
+    bases = [full_name(base, home) or base for base in definition.bases]
+    decorators = definition.node.decorator_list
+    if {method.name for method in definition.methods} & {"__init__", "__new__"}:
+        return False
+    if bases == [_NAMED_TUPLE] and not decorators:
+        return True
+    if bases or len(decorators) != 1 or _decorator(decorators[0], home) != _DATACLASS:
+        return False
+    options = getattr(decorators[0], "keywords", ())
+    return not {item.arg for item in options} & {"init", "kw_only", None}
+
+
+def is_dataclass(owner: OwnClass) -> bool:
+    """Return whether a class is a dataclass."""
+    decorators = owner.definition.node.decorator_list
+    return any(_decorator(item, owner.home) == _DATACLASS for item in decorators)
+
+
+def fields_of_class(owner: OwnClass) -> Iterator[ClassField]:
+    """Yield the fields of a dataclass or of a named tuple, in order."""
+    for statement in owner.definition.node.body:
+        match statement:
+            case ast.AnnAssign(target=ast.Name(id=name), annotation=annotation, value=value):
+                if "ClassVar" not in ast.unparse(annotation):
+                    yield ClassField(name, annotation, value)
+
+
+@lru_cache(maxsize=256)
+def is_enumeration(owner: OwnClass, base: str | None = None) -> bool:
+    """Return whether a class is an enumeration, derived from ``base`` if that is given."""
+    wanted = _ENUMS if base is None else {base}
+    return any((full_name(name, owner.home) or name) in wanted for name in owner.definition.bases)
+
+
+def is_named_tuple(owner: OwnClass) -> bool:
+    """Return whether a class is a NamedTuple."""
+    bases = [full_name(base, owner.home) or base for base in owner.definition.bases]
+    return bases == [_NAMED_TUPLE]
+
+
+def is_plain(owner: OwnClass) -> bool:
+    """Return whether objects of a class are nothing else than that: no numbers, texts or tuples."""
+    bases = {full_name(base, owner.home) or base for base in owner.definition.bases}
+    return known_attributes(owner) is not None and bases <= {"object", "enum.Enum"}
 
 
 def _decorator(node: ast.expr, home: Module) -> str:
@@ -62,7 +129,7 @@ def _own(definition: Class) -> Iterator[str]:
 
 
 @lru_cache(maxsize=128)
-def _assigned_from_outside(module: Module) -> frozenset[str]:
+def assigned_from_outside(module: Module) -> frozenset[str]:
     """Return the names that the file assigns as attributes of anything but ``self``."""
     nodes = list(walk(module.tree.body))
     changed = {id(node.target) for node in nodes if isinstance(node, ast.AugAssign)}

@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 import ast
-from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
-from composer.behavior_source import BehaviorSource, Function
-from composer.behavior_source.spans import attribute_span
+from composer.behavior_source import BehaviorSource, Function, Module
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.api import BEHAVIOR_ATTRIBUTES
 from composer.behavior_types.bindings import is_static, nodes_of
-from composer.behavior_types.problems import CodeProblem, Kind
+from composer.behavior_types.names import own_name
 
-_OF_OBJECTS = frozenset({*dir(type("Plain", (), {})), *dir(type)})
+#: The attributes of every object of a class.
+ATTRIBUTES_OF_OBJECTS = frozenset({*dir(type("Plain", (), {})), *dir(type)})
 
 
 def self_attributes(source: BehaviorSource, assigned: Iterable[str]) -> frozenset[str]:
-    """Return the attributes of a behavior whose class is known completely.
+    """Return the attributes of a behavior whose class is known completely."""
+    of_behavior = {*ATTRIBUTES_OF_OBJECTS, *BEHAVIOR_ATTRIBUTES}
+    return class_attributes(source, assigned) | of_behavior
+
+
+def class_attributes(source: BehaviorSource, assigned: Iterable[str]) -> frozenset[str]:
+    """Return the attributes that the class itself defines.
 
     ``assigned`` are those that its methods assign. A name in a string counts, because
     ``setattr(self, "name", ...)`` may set it.
     """
-    found = {*_OF_OBJECTS, *BEHAVIOR_ATTRIBUTES, *assigned}
+    found = {*assigned}
     for _, known in source.classes:
         found.update(method.name for method in known.methods)
         for statement in known.node.body:
@@ -30,11 +35,14 @@ def self_attributes(source: BehaviorSource, assigned: Iterable[str]) -> frozense
     return frozenset(found)
 
 
-def escapes(source: BehaviorSource) -> bool:
-    """Return whether a behavior passes itself on, so that other code may set its attributes."""
+def escapes(source: BehaviorSource, is_harmless: Callable[[str], bool] = lambda _: False) -> bool:
+    """Return whether a class passes its object on, so that other code may set its attributes.
+
+    ``is_harmless`` says which functions and classes, by full name, do not.
+    """
     return any(
-        method.node is not None and _escapes_from(method.node)
-        for _, known in source.classes
+        method.node is not None and _escapes_from(method.node, home, is_harmless)
+        for home, known in source.classes
         for method in known.methods
     )
 
@@ -69,7 +77,7 @@ def _sets_by_name(statement: ast.stmt) -> bool:
     )
 
 
-def _escapes_from(function: Function) -> bool:
+def _escapes_from(function: Function, home: Module, is_harmless: Callable[[str], bool]) -> bool:
     positional = (*function.args.posonlyargs, *function.args.args)
     if not positional or is_static(function):
         return False
@@ -83,55 +91,7 @@ def _escapes_from(function: Function) -> bool:
                 if attribute == "__dict__":
                     return True
                 uses -= 1
+            case ast.Call(func=called) if is_harmless(own_name(called, home)):
+                given = (*node.args, *(keyword.value for keyword in node.keywords))
+                uses -= sum(isinstance(item, ast.Name) and item.id == receiver for item in given)
     return uses > 0
-
-
-def misspelled_attributes(source: BehaviorSource) -> Iterator[CodeProblem]:
-    """Yield the attributes that are set once, never read, and named like one that is read.
-
-    Only a letter that is missing, doubled or swapped with the next one counts.
-    """
-    if not source.complete:
-        return
-    nodes = [node for module in source.own_modules for node in walk(module.tree.body)]
-    attributes = [node for node in nodes if isinstance(node, ast.Attribute)]
-    used = {node.attr for node in attributes if isinstance(node.ctx, ast.Load)}
-    used |= {
-        node.value
-        for node in nodes
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-    }
-    for home, known in source.own_classes:
-        inside = [node for node in walk(known.node.body) if isinstance(node, ast.Attribute)]
-        stored = [node for node in inside if isinstance(node.ctx, ast.Store) and _is_self(node)]
-        times = Counter(node.attr for node in stored)
-        for node in stored:
-            if times[node.attr] > 1 or node.attr in used:
-                continue
-            meant = next((name for name in times if _is_typo(node.attr, name)), None)
-            if meant in used:
-                message = f"attribute '{node.attr}' is set, but never read"
-                span = attribute_span(node, home.source)
-                yield CodeProblem(Kind.UNUSED, message, span, f"did you mean '{meant}'?")
-
-
-def _is_self(node: ast.Attribute) -> bool:
-    return isinstance(node.value, ast.Name) and node.value.id == "self"
-
-
-def _is_typo(name: str, meant: str) -> bool:
-    """Return whether a letter inside ``name`` is missing, too many, or swapped with the next."""
-    if min(len(name), len(meant)) < _SHORTEST_TYPO or name == meant:
-        return False
-    if len(name) == len(meant):
-        pairs = [(a, b) for a, b in zip(name, meant, strict=True) if a != b]
-        swapped = len(pairs) == _PAIR and pairs[0] == pairs[1][::-1]
-        return swapped and "".join(pairs[0]) in meant + name
-    shorter, longer = sorted((name, meant), key=len)
-    # A letter or a digit at the end, as in a plural, makes another name.
-    return any(longer[:at] + longer[at + 1 :] == shorter for at in range(1, len(shorter)))
-
-
-#: Shorter names are alike too easily.
-_SHORTEST_TYPO = 5
-_PAIR = 2

@@ -9,8 +9,8 @@ from typing import TypeAlias
 from composer.behavior_source import Class, Method, Module
 from composer.behavior_types.api import Member
 from composer.fast_dataclass import dataclass
-from composer.field_types import ANYTHING, ValueType
-from composer.interfaces import Action, Message, Service
+from composer.field_types import ANYTHING, INTEGER, NUMBER, STRING, ValueType
+from composer.interfaces import FLOATS, INTEGER_RANGES, TEXTS, Action, FieldType, Message, Service
 from composer.model import Port, PortKind
 
 
@@ -20,6 +20,8 @@ class NoneType:
 
 
 NONE = NoneType()
+
+_INTEGERS = frozenset(INTEGER_RANGES) - {"byte"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +68,36 @@ class ApiMethod:
 class Collection:
     """A list, dict, set, tuple or bytes of Python, with the type of its elements.
 
-    ``element`` is the type of the values of a dict, and ``key`` that of its keys.
+    ``element`` is the type of the values of a dict, and ``key`` that of its keys. ``items`` are the
+    types of the elements of a tuple whose length is known. ``is_empty`` is true for ``[]``, which
+    may get elements of any type.
     """
 
     python: type
     element: Value = ANYTHING
     key: Value = ANYTHING
+    items: tuple[Value, ...] | None = None
+    is_empty: bool = False
+
+
+def pair(*items: Value) -> Collection:
+    """Return the type of a tuple of these elements."""
+    return Collection(tuple, join_all(items), items=items)
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltinObject:
+    """An object of a class of Python that has no attributes but those of its class."""
+
+    python: type
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltinMethod:
+    """A method of such an object."""
+
+    python: type
+    name: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +110,7 @@ class CollectionMethod:
 
 @dataclass(frozen=True, slots=True)
 class OwnClass:
-    """A class in a file of the behavior, other than that of the behavior."""
+    """A class in a file of the behavior, other than that of the behavior, or a class of rclpy."""
 
     definition: Class
     home: Module
@@ -92,9 +118,13 @@ class OwnClass:
 
 @dataclass(frozen=True, slots=True)
 class OwnObject:
-    """An object of such a class."""
+    """An object of such a class.
+
+    ``parameter`` is the interface that an object of rclpy was created for, or what a future gives.
+    """
 
     of: OwnClass
+    parameter: Value = ANYTHING
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,11 +137,15 @@ class OwnMethod:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModuleFunction:
-    """A function of the behavior's module, or a method of an object of a class in it."""
+    """A function of the behavior's module, or a method of an object of a class in it.
+
+    ``parameter`` is that of the object.
+    """
 
     node: ast.FunctionDef | ast.AsyncFunctionDef
     home: Module
     is_bound: bool = False
+    parameter: Value = ANYTHING
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,6 +160,7 @@ class Pending:
 Value: TypeAlias = (
     "ValueType | NoneType | Self | Ports | Parameters | InterfaceClass | ApiValue | ApiMethod"
     " | OwnMethod | ModuleFunction | Pending | Collection | CollectionMethod | OwnClass | OwnObject"
+    " | BuiltinObject | BuiltinMethod"
 )
 
 
@@ -133,12 +168,36 @@ def join(first: Value, second: Value) -> Value:
     """Return the type of a value that is of one of two types; None is disregarded."""
     if first == second or second is NONE:
         return first
+    if first is NONE:
+        return second
     if isinstance(first, Collection) and isinstance(second, Collection):
-        if first.python is second.python:
-            element, key = join(first.element, second.element), join(first.key, second.key)
-            return Collection(first.python, element, key)
+        return _join_collections(first, second)
+    if isinstance(first, FieldType) and isinstance(second, FieldType):
+        return _join_fields(first, second)
+    return ANYTHING
+
+
+def _join_collections(first: Collection, second: Collection) -> Value:
+    if first.python is not second.python:
         return ANYTHING
-    return second if first is NONE else ANYTHING
+    if first.is_empty or second.is_empty:
+        return second if first.is_empty else first
+    items = None
+    one, other = first.items, second.items
+    if one is not None and other is not None and len(one) == len(other):
+        items = tuple(map(join, one, other))
+    element, key = join(first.element, second.element), join(first.key, second.key)
+    return Collection(first.python, element, key, items)
+
+
+def _join_fields(first: FieldType, second: FieldType) -> Value:
+    """Return the type of numbers or texts of different size, which are the same in Python."""
+    if first.is_array or second.is_array:
+        return ANYTHING
+    for names, general in ((FLOATS, NUMBER), (_INTEGERS, INTEGER), (TEXTS, STRING)):
+        if first.name in names and second.name in names:
+            return general
+    return ANYTHING
 
 
 def join_all(found: Iterable[Value]) -> Value:

@@ -240,7 +240,8 @@ class TreeBuilder:
         name, colon, rest = str(key.value).partition(":")
         if colon and name and rest and name.isidentifier():
             message = f"there is no space after the colon of '{shown(key.value)}'"
-            self._report(rules.KEY_WITHOUT_VALUE, message, key.span, f"write '{name}: {rest}'")
+            hint = f"write '{shown(f'{name}: {rest}')}'"
+            self._report(rules.KEY_WITHOUT_VALUE, message, key.span, hint)
             value = Scalar(self._plain(rest, key.span), key.part(len(name) + 1, len(rest)))
             parent.entries[-1] = Entry(Scalar(name, key.part(0, len(name))), value)
             return

@@ -37,13 +37,20 @@ def expand(tree: Mapping, given: Map[str, Entry]) -> tuple[Mapping, list[Diagnos
     """
     scope = read_scope(tree, is_node_type=kind_of(tree) == "node")
     substitution = Substitution(scope)
-    diagnostics = list(_unknown_arguments(tree, scope, given))
+    unknown = dict(_unknown_arguments(tree, scope, given))
+    diagnostics: list[Diagnostic] = []
     try:
         diagnostics += _evaluate(substitution, given)
         expanded = _expand_sections(substitution, tree)
     except TooLarge as stopped:
-        return tree, [*diagnostics, *substitution.diagnostics, stopped.diagnostic]
-    return expanded, [*diagnostics, *substitution.diagnostics, *_unused(scope)]
+        found = [*unknown.values(), *diagnostics, *substitution.diagnostics]
+        return tree, [*found, stopped.diagnostic]
+    # What the file uses and does not declare is reported there.
+    arguments = [item for name, item in unknown.items() if name not in substitution.unknown]
+    found = [*arguments, *diagnostics, *substitution.diagnostics]
+    # An unknown variable may be meant to be the unused one.
+    is_unknown = any(item.rule is rules.UNKNOWN_VARIABLE for item in found)
+    return expanded, found if is_unknown else [*found, *_unused(scope)]
 
 
 def missing_variables(tree: Mapping, given: Collection[str]) -> tuple[str, ...]:
@@ -99,7 +106,9 @@ def _expand_sections(substitution: Substitution, tree: Mapping) -> Mapping:
     return Mapping(tuple(expanded_entry(entry) for entry in tree), tree.span)
 
 
-def _unknown_arguments(tree: Mapping, scope: Scope, given: Map[str, Entry]) -> Iterator[Diagnostic]:
+def _unknown_arguments(
+    tree: Mapping, scope: Scope, given: Map[str, Entry]
+) -> Iterator[tuple[str, Diagnostic]]:
     if not scope.is_known:
         return
     name = tree.get(kind_of(tree) or "")
@@ -112,7 +121,8 @@ def _unknown_arguments(tree: Mapping, scope: Scope, given: Map[str, Entry]) -> I
             if hint is None and len(missing) == 1:
                 hint = f"did you mean '{shown(missing[0])}'?"
             hint = hint or "remove it"
-            yield Diagnostic(rules.UNKNOWN_VARIABLE, message, entry.key.span, hint=hint)
+            problem = Diagnostic(rules.UNKNOWN_VARIABLE, message, entry.key.span, hint=hint)
+            yield argument, problem
 
 
 def _cycle(names: list[str], scope: Scope) -> Diagnostic:

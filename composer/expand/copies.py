@@ -20,7 +20,7 @@ from composer.expand import rules
 from composer.expand.references import has_reference, references
 from composer.expand.scope import Declared
 from composer.expand.substitution import Substitution
-from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, describe
+from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 FOR_EACH = "for_each"
 
@@ -37,8 +37,10 @@ def _nodes(section: Tree, substitution: Substitution) -> Tree:
     for entry in section:
         for copy, body in _copies(entry.value, substitution):
             substitution.grow(1, entry.key)
-            key = _key(entry.key, copy)
+            key = copy.key(entry.key)
             made = Entry(key, copy.add(body, _DEPTH).tree)
+            if made.name in found and has_reference(made.name):
+                continue  # a variable in the name is unknown
             if made.name in found:
                 substitution.diagnostics.append(
                     _duplicate_name(entry, written[made.name], made.name)
@@ -114,19 +116,6 @@ def _choices(tree: Tree) -> tuple[Tree, ...]:
 
 def _is_plain(tree: Tree) -> bool:
     return isinstance(tree, Scalar) and tree.value is not None
-
-
-def _key(key: Scalar, copy: Substitution) -> Scalar:
-    """Return the name of a copy, at the location of the original key."""
-    if not isinstance(key.value, str) or not has_reference(key.value):
-        return key
-    name = copy.add(key, _DEPTH).tree
-    if not isinstance(name, Scalar):
-        message = f"'{shown(key.value)}' is {describe(name)}, which cannot be the name of a node"
-        copy.diagnostics.append(Diagnostic(rules.NOT_A_TEXT, message, key.span))
-        return key
-    text = name.value if isinstance(name.value, str) else shown(name.value)
-    return Scalar(text, key.span, verbatim=False)
 
 
 def _duplicate_name(entry: Entry, earlier: Entry, name: str) -> Diagnostic:

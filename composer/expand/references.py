@@ -57,4 +57,5 @@ def references(tree: Tree) -> Iterator[str]:
                 yield from references(item)
         case Mapping():
             for entry in tree:
+                yield from references(entry.key)
                 yield from references(entry.value)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import field
 
-from composer.diagnostics import Diagnostic, Rule, shown
+from composer.diagnostics import Diagnostic, Label, Rule, shown
 from composer.document.limits import MAX_BYTES, MAX_COPIES, MAX_DEPTH, MAX_VALUES
+from composer.document.rules import DUPLICATE_KEY
 from composer.expand import rules
 from composer.expand.references import Reference, has_reference, pieces
 from composer.expand.scope import Scope, Sized
 from composer.fast_dataclass import dataclass
-from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
+from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, describe
+
+#: Depth of the names of nodes, which are checked first.
+_KEY_DEPTH = 2
 
 
 class TooLarge(Exception):
@@ -37,10 +41,11 @@ class Substitution:
     scope: Scope
     diagnostics: list[Diagnostic] = field(default_factory=list)
     growth: Growth = field(default_factory=Growth)
+    unknown: set[str] = field(default_factory=set)  # names of undeclared variables
 
     def within(self, scope: Scope) -> Substitution:
         """Return a substitution for another scope that shares the counts."""
-        return Substitution(scope, self.diagnostics, self.growth)
+        return Substitution(scope, self.diagnostics, self.growth, self.unknown)
 
     def evaluate(self, tree: Tree, depth: int = 0) -> Sized:
         """Return ``tree``, nested in ``depth`` maps and lists, with its variables replaced.
@@ -84,11 +89,35 @@ class Substitution:
     def _mapping(self, tree: Mapping, depth: int) -> Sized:
         self.grow(1 + len(tree.entries), tree)
         parts = [self.add(entry.value, depth + 1) for entry in tree]
-        pairs = list(zip(parts, tree.entries, strict=True))
-        if any(part.tree is not entry.value for part, entry in pairs):
-            entries = tuple(Entry(entry.key, part.tree) for part, entry in pairs)
+        keys = [self.key(entry.key) for entry in tree]
+        made = list(zip(keys, parts, tree.entries, strict=True))
+        if any(key is not entry.key or part.tree is not entry.value for key, part, entry in made):
+            self._check_keys(tree, keys)
+            entries = tuple(Entry(key, part.tree) for key, part, _ in made)
             tree = Mapping(entries, tree.span)
         return _sized(tree, parts, keys=len(parts))
+
+    def key(self, key: Scalar) -> Scalar:
+        """Return a key with its variables replaced, at its location. Raises TooLarge."""
+        if not isinstance(key.value, str) or not has_reference(key.value):
+            return key
+        name = self.add(key, _KEY_DEPTH).tree
+        if not isinstance(name, Scalar):
+            message = f"'{shown(key.value)}' is {describe(name)}, which cannot be a name"
+            self.diagnostics.append(Diagnostic(rules.NOT_A_TEXT, message, key.span))
+            return key
+        text = name.value if isinstance(name.value, str) else shown(name.value)
+        return Scalar(text, key.span, verbatim=False)
+
+    def _check_keys(self, tree: Mapping, keys: list[Scalar]) -> None:
+        """Report keys that are equal once their variables are replaced."""
+        first: dict[object, Scalar] = {}
+        for key, entry in zip(keys, tree.entries, strict=True):
+            earlier = first.setdefault(key.value, key)
+            if earlier is not key and (key is not entry.key or not earlier.verbatim):
+                message = f"the key '{shown(key.value)}' is repeated"
+                label = Label(earlier.span, "the other one")
+                self.diagnostics.append(Diagnostic(DUPLICATE_KEY, message, key.span, (label,)))
 
     def _scalar(self, scalar: Scalar, depth: int) -> Sized:
         if not isinstance(scalar.value, str) or not has_reference(scalar.value):
@@ -145,6 +174,7 @@ class Substitution:
             return None
         found = self.scope.find(name)
         if not self.scope.declares(name) and self.scope.is_known:
+            self.unknown.add(name)
             message = f"there is no variable '{shown(name)}'"
             hint = self.scope.hint(name) or "declare it under 'variables'"
             self._report(rules.UNKNOWN_VARIABLE, message, reference, scalar, hint)

@@ -13,6 +13,7 @@ from composer.field_types.constants import constant_problem
 from composer.field_types.inference import infer, literal_integer
 from composer.field_types.types import (
     ANYTHING,
+    STRING,
     Problem,
     Scope,
     ValueType,
@@ -24,6 +25,7 @@ from composer.field_types.types import (
     is_number,
     is_seconds,
     is_string,
+    type_of,
 )
 from composer.interfaces import FieldType, Interfaces, Message
 from composer.source import Span
@@ -75,6 +77,20 @@ class FieldChecker:
                 for item in items:
                     yield from self.text(item)
 
+    def type_of(self, template: Template) -> ValueType:
+        """Return the type of the value that a template gives, as far as it is known."""
+        match template:
+            case Constant(value=value):
+                return type_of(value)
+            case Computed(expression=expression, span=span):
+                return self._infer(expression, span)[0]
+            case Text():
+                return STRING
+            case Record(fields=fields):
+                return {name.value: self.type_of(content) for name, content in fields}
+            case Items():
+                return ANYTHING
+
     def condition(self, expression: Expression, span: Span) -> Iterator[Problem]:
         """Yield the problems of an expression that must be a bool."""
         found, problems = self._infer(expression, span)
@@ -83,6 +99,13 @@ class FieldChecker:
             message = f"a condition must be a bool, not {described(found)}"
             hint = "compare it, as in '... > 0'" if is_number(found) else None
             yield Problem(message, span, hint)
+
+    def number(self, expression: Expression, span: Span) -> Iterator[Problem]:
+        """Yield the problems of an expression that must be a number."""
+        found, problems = self._infer(expression, span)
+        yield from problems
+        if found is not ANYTHING and not is_number(found):
+            yield Problem(f"{described(found)} where a number is expected", span)
 
     def expression(self, expression: Expression, span: Span) -> Iterator[Problem]:
         """Yield the problems of an expression."""
@@ -165,8 +188,12 @@ class FieldChecker:
             type_.array_bound is not None and count > type_.array_bound
         ):
             yield Problem(f"a list of {count} elements does not fit {type_}", items.span)
-        for item in items.items:
-            yield from self._field(item, type_.element)
+        found = [list(self._field(item, type_.element)) for item in items.items]
+        if len(found) > 1 and all(found) and all(isinstance(i, Constant) for i in items.items):
+            first = found[0][0]  # the type of the field is not the one that the list is for
+            yield replace(first, message=f"{first.message}, as in all {len(found)} elements")
+        else:
+            yield from (problem for problems in found for problem in problems)
 
     def _computed(
         self, expression: Expression, span: Span, target: FieldType | Message

@@ -58,6 +58,7 @@ class Interfaces:
         self._project = project if project is not None else Packages({})
         self._others = tuple(sources)
         self._found: dict[str, Interface | InvalidDefinition | None] = {}
+        self._reading: set[str] = set()  # a definition, and those that contain it
         self._installed: dict[str, Interface | None] = {}
         self._packages: frozenset[str] | None = None
 
@@ -127,6 +128,10 @@ class Interfaces:
         """Return the folder of the project's package that defines ``name``, or None."""
         return self._project.folders.get(name.partition("/")[0])
 
+    def folder_without_manifest(self, package: str) -> Path | None:
+        """Return the folder of ``package`` in the project if it lacks a package.xml, or None."""
+        return self._project.without_manifest(package)
+
     def _is_of_project(self, name: str) -> bool:
         return self.source_folder(name) is not None
 
@@ -160,7 +165,9 @@ class Interfaces:
     def _look_up(self, name: str) -> Interface | InvalidDefinition | None:
         if name not in self._found:
             self._found[name] = None  # in case it contains itself
+            self._reading.add(name)
             self._found[name] = self._read(name)
+            self._reading.remove(name)
         return self._found[name]
 
     def _read(self, name: str) -> Interface | InvalidDefinition | None:
@@ -179,9 +186,10 @@ class Interfaces:
     def _check_fields(
         self, interface: Interface | InvalidDefinition, definition: Definition
     ) -> InvalidDefinition | None:
-        """Return an error if a field of a project's interface has a type that does not exist.
+        """Return an error if a field of a project's interface has a type that cannot be used.
 
-        So is one in the definition of that type. Types of unknown packages are not errors: their
+        Such a type does not exist, contains the interface itself, or has an error in its own
+        definition. Types of unknown packages are not errors unless their name is misspelled: their
         definitions may be installed elsewhere.
         """
         if isinstance(interface, InvalidDefinition) or not self._is_of_project(interface.name):
@@ -189,22 +197,30 @@ class Interfaces:
         for field in (field for part in parts(interface).values() for field in part.fields):
             if field.type.is_primitive:
                 continue
-            if self._may_exist(field.type.name):
+            if not self._may_exist(field.type.name):
+                message = f"field '{field.name}' has the unknown type '{shown(field.type.name)}'"
+            elif field.type.name in self._reading:
+                message = f"field '{field.name}' makes the message contain itself"
+            else:
                 nested = self.problem(field.type.name)
                 if nested is not None:
                     return nested
                 continue
             written = re.search(rf"(?m)^.*\s{re.escape(field.name)}\b", definition.text)
             line = definition.text.count("\n", 0, written.start()) + 1 if written else 1
-            message = f"field '{field.name}' has the unknown type '{shown(field.type.name)}'"
             return InvalidDefinition(
                 interface.name, definition.path, line, message, definition.text
             )
         return None
 
     def _may_exist(self, name: str) -> bool:
-        if name.partition("/")[0] not in self.packages():
-            return True
+        package, _, rest = name.partition("/")
+        if package not in self.packages():
+            close = nearest(package, self.packages())
+            return close is None or not self._exists(f"{close}/{rest}")
+        return self._exists(name)
+
+    def _exists(self, name: str) -> bool:
         return any(source.read(name) is not None for source in self._sources)
 
 

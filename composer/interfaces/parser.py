@@ -77,7 +77,9 @@ def parse_definition(name: str, text: str) -> Interface:
     parts = _parts(text)
     expected = {"msg": 1, "srv": 2, "action": 3}[folder]
     if len(parts) != expected:
-        line = len(text.splitlines()) or 1
+        starts = _separators(text)
+        surplus = starts[expected - 1] if len(parts) > expected else len(text.splitlines())
+        line = surplus or 1
         message = (
             f"a .{folder} file has {expected - 1} lines with '{SEPARATOR}', not {len(parts) - 1}"
         )
@@ -127,6 +129,12 @@ def _parts(text: str) -> list[_Lines]:
         elif content:
             parts[-1].append((number, content))
     return parts
+
+
+def _separators(text: str) -> list[int]:
+    """Return the numbers of the lines with separators."""
+    lines = enumerate(text.splitlines(), start=1)
+    return [number for number, line in lines if line.partition("#")[0].strip() == SEPARATOR]
 
 
 def _message(name: str, package: str, lines: _Lines) -> Message:

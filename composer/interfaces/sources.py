@@ -21,6 +21,7 @@ from composer.interfaces.parser import split_name
 FOLDERS = ("msg", "srv", "action")
 _MAXIMUM_BYTES = 1_000_000
 _MAXIMUM_DEPTH = 4
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,200}", re.ASCII)  # a file name
 _PACKAGE_NAME = re.compile(r"<name>\s*([a-z][a-z0-9_]*)\s*</name>", re.ASCII)
 #: Folders without sources, made by colcon, Python and JavaScript tools.
 _SKIPPED = frozenset(("build", "install", "log", "node_modules", "site-packages", "__pycache__"))
@@ -57,6 +58,17 @@ class Packages:
     """Packages by name, each with the folder that holds its ``msg``, ``srv`` and ``action``."""
 
     folders: Mapping[str, Path]
+    searched: tuple[Path, ...] = ()
+
+    def without_manifest(self, name: str) -> Path | None:
+        """Return the folder of definitions ``name`` that lacks a package.xml, or None."""
+        if not _NAME.fullmatch(name):
+            return None
+        for base in (folder / name for folder in self.searched):
+            has_interfaces = any((base / kind).is_dir() for kind in FOLDERS)
+            if has_interfaces and not (base / "package.xml").exists():
+                return base
+        return None
 
     def packages(self) -> frozenset[str]:
         """Return the names of the packages."""
@@ -134,13 +146,14 @@ def installed_prefixes() -> tuple[Prefix, ...]:
 def find_packages(folders: Iterable[Path]) -> Packages:
     """Return the interface packages in and below ``folders``: those with a ``package.xml``."""
     found: dict[str, Path] = {}
-    for folder in folders:
+    searched = tuple(folders)
+    for folder in searched:
         for manifest in _manifests(folder, _MAXIMUM_DEPTH):
             name = _package_name(manifest)
             has_interfaces = any((manifest.parent / kind).is_dir() for kind in FOLDERS)
             if name is not None and has_interfaces:
                 found.setdefault(name, manifest.parent)
-    return Packages(found)
+    return Packages(found, searched)
 
 
 def _manifests(folder: Path, depth: int) -> Iterator[Path]:

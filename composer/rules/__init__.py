@@ -1,8 +1,8 @@
-"""The rules: one rule, one file.
+"""The rules: one rule, one file, in one package per subject.
 
-Every module here with a function ``check`` is a rule and is found automatically. Its ``RULE`` holds
-the documentation (see CONTRIBUTING for how to add a rule). A check reports one kind of problem and
-skips input that is itself invalid, because another rule reports that.
+Every module of these packages with a function ``check`` is a rule and is found automatically. Its
+``RULE`` holds the documentation (see CONTRIBUTING for how to add a rule). A check reports one kind
+of problem and skips input that is itself invalid, because another rule reports that.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from pathlib import Path
 from composer.analysis.context import Context, location
 from composer.analysis.formatting import with_short_values
 from composer.diagnostics import Diagnostic, Severity, in_order
-from composer.source import Span
 
 Check = Callable[[Context], Iterator[Diagnostic]]
 
@@ -37,53 +36,25 @@ def run_checks(context: Context) -> list[Diagnostic]:
             or location(diagnostic.primary)[:2] not in refused_lines
         )
     ]
-    return in_order(_without_follow_ups(found, context))
+    return in_order(_without_repeats(found))
 
 
-def _without_follow_ups(found: list[Diagnostic], context: Context) -> list[Diagnostic]:
-    """Leave out what is only reported because a connection has an error: ports lack its name."""
+def _without_repeats(found: list[Diagnostic]) -> list[Diagnostic]:
+    """Leave out ports that are connected twice because a connection has the wrong ones."""
     wrong = {location(item.primary) for item in found if item.rule.name == "wrong-port-kind"}
-    found = [
+    return [
         item
         for item in found
         if item.rule.name != "port-connected-twice" or location(item.primary) not in wrong
     ]
-    causes = [item.primary for item in found if item.rule.name in _CAUSES]
-    ends = (
-        end.text.span
-        for connection in (context.system.connections if causes else ())
-        for end in (*connection.sources, *connection.sinks)
-    )
-    if not any(_covers(end, cause) for end in ends for cause in causes):
-        return found
-    return [item for item in found if item.rule.name not in _FOLLOW_UPS]
-
-
-def _covers(whole: Span, part: Span) -> bool:
-    is_same_line = (whole.file.path, whole.line) == (part.file.path, part.line)
-    return is_same_line and 0 <= part.column - whole.column < whole.length
-
-
-#: Errors in the ports of a connection.
-_CAUSES = frozenset({"unknown-node", "unknown-port", "wrong-port-kind", "port-connected-twice"})
-#: What depends on the names that connections give to ports.
-_FOLLOW_UPS = frozenset(
-    {
-        "broken-chain",
-        "client-without-server",
-        "competing-commands",
-        "own-publisher",
-        "publisher-without-subscription",
-        "subscription-without-publisher",
-        "unused-remapping",
-    }
-)
 
 
 @cache
 def all_checks() -> tuple[Check, ...]:
     """Return the ``check`` function of every rule, sorted by module name."""
-    names = sorted(path.stem for path in Path(__file__).parent.glob("[a-z]*.py"))
+    folder = Path(__file__).parent
+    files = sorted(folder.rglob("[a-z]*.py"), key=lambda path: path.stem)
+    names = (".".join(path.relative_to(folder).with_suffix("").parts) for path in files)
     modules = (import_module(f"{__name__}.{name}") for name in names)
     return tuple(module.check for module in modules if hasattr(module, "check"))
 

@@ -12,7 +12,7 @@ from composer.schema.common_mistakes import advice, intended_key, value_advice
 from composer.schema.expectations import expected, type_hint
 from composer.schema.locations import TreeIndex, TreeValue
 from composer.source import Span
-from composer.tree import describe
+from composer.tree import Entry, describe
 
 if TYPE_CHECKING:
     from jsonschema import ValidationError
@@ -22,6 +22,13 @@ Path = tuple[str | int, ...]
 #: Keys that determine which other keys are valid, and the titles of schemas that have them.
 _DECIDING = frozenset({"type", "topic", "service", "action"})
 _DECIDED = frozenset({"inline node", "connection"})
+
+#: The ends of each form of connection, by the title of its schema.
+_ENDS = {
+    "topic connection": ("from", "to"),
+    "service connection": ("server", "clients"),
+    "action connection": ("server", "clients"),
+}
 
 #: Example values for missing keys, by the title of the schema.
 _EXAMPLES = {
@@ -159,6 +166,9 @@ def _intended_key(error: _SchemaError, name: str) -> str | None:
 
 def _unknown_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
     entries = error.index.entries(error.place.tree)
+    if _has_other_ends(error):
+        yield _other_ends(error, entries)
+        return
     valid = error.schema["properties"]
     unused = [key for key in valid if key not in error.instance]
     for name in error.unknown:
@@ -170,6 +180,33 @@ def _unknown_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[
         if needed is not None and f"'{needed}'" not in str(hint):
             hint = f"it needs the key '{needed}'"
         yield Diagnostic(rules.UNKNOWN_KEY, message, entries[name].key.span, hint=hint)
+
+
+def _has_other_ends(error: _SchemaError) -> bool:
+    """Return whether a connection only has ends of another form: a topic with a server."""
+    title = error.schema.get("title", "")
+    if title not in _ENDS:
+        return False
+    others = {end for ends in _ENDS.values() for end in ends} - set(_ENDS[title])
+    found = others.intersection(error.instance)
+    # A single key may also be a slip.
+    is_meant = len(found) > 1 or (title == "topic connection" and len(found) == 1)
+    return is_meant and set(_ENDS[title]).isdisjoint(error.instance)
+
+
+def _other_ends(error: _SchemaError, entries: dict[str, Entry]) -> Diagnostic:
+    """Report the key with the name of a connection that has the ends of another form."""
+    title = error.schema["title"]
+    kind = title.removesuffix(" connection")
+    given = [end for end in dict.fromkeys(sum(_ENDS.values(), ())) if end in error.instance]
+    ends = " and ".join(f"'{end}'" for end in given)
+    own = " and ".join(f"'{end}'" for end in _ENDS[title])
+    fitting = [name for name in _ENDS if given[0] in _ENDS[name]]
+    forms = " or ".join(f"'{name.removesuffix(' connection')}'" for name in fitting)
+    article = "an" if kind == "action" else "a"
+    message = f"{article} {title} has {own}, not {ends}"
+    hint = f"write {forms} instead of '{kind}', or {own}"
+    return Diagnostic(rules.UNKNOWN_KEY, message, entries[kind].key.span, hint=hint)
 
 
 def _missing_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
@@ -185,6 +222,8 @@ def _missing_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[
 
 def _missing_choice(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
     names = [name for choice in error.required for name in choice["required"]]
+    if _has_other_ends(error):
+        return
     if not any((error.path, name) in misspelled.keys for name in names):
         message = f"{error.owner} needs {_any_of(names)}"
         example = _EXAMPLES.get((error.schema.get("title", ""), names[0]))

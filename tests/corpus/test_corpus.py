@@ -5,11 +5,12 @@ without knowledge of the rules:
 
 - ``files``: its files. They give no error and no warning.
 - ``mistakes``: lists of file, old text, new text, what is wrong and, optionally, other places at
-  which it may be reported, as texts separated by ``|``: in that file, or in another one
+  which it may be reported, as texts separated by ``|``: in any file, or in the named one
   (``nodes/arm.py:text``). The changed lines are always such a place.
 - ``valid``: edits in the same form that are correct.
 
-A mistake is found if it adds an error, a warning or an info.
+A mistake is found if it adds an error, a warning or an info. The files in ``more`` are checked by
+``make soak``.
 """
 
 from __future__ import annotations
@@ -29,7 +30,17 @@ from composer.node_types import interface_folders
 from composer.project import Project
 
 FILES = sorted(Path(__file__).parent.glob("*.yaml"))
+MORE = sorted((Path(__file__).parent / "more").glob("*.yaml"))
 MIN_FOUND, MIN_RIGHT, MAX_REPORTS = 0.97, 0.98, 1.1
+#: Found, and reports each, of the files in ``more``: what was measured, below the target for some.
+#: They may not get worse. Most mistakes not found are in Python code.
+MEASURED = {
+    "site": (0.99, 1.03),
+    "code": (0.985, 1.04),
+    "services": (0.954, 1.10),
+    "swarms": (0.992, 1.13),
+    "vehicles": (0.972, 1.12),
+}
 MIN_MISTAKES, MIN_VALID = 220, 50
 _INSTALLED = Interfaces.load()
 
@@ -98,6 +109,13 @@ def _read(path: Path) -> Iterator[ProjectFiles]:
 # On a busy machine it takes a minute.
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 PROJECTS = [project for path in FILES for project in _read(path)]
+CORPORA = [
+    pytest.param(FILES, MIN_FOUND, MAX_REPORTS, id="corpus"),
+    *(
+        pytest.param([path], *MEASURED[path.stem], id=path.stem, marks=pytest.mark.soak)
+        for path in MORE
+    ),
+]
 
 
 class Checker:
@@ -146,11 +164,14 @@ class Checker:
         lines = {(edit.file, line) for line in range(first, last + 1)}
         edited = {**self.files, edit.file: text}
         for place in edit.places:
+            named, _, rest = place.partition(":")
+            text = rest if named in edited else place
             found = {
                 (name, number)
                 for name, content in edited.items()
+                if named not in edited or name == named
                 for number, line in enumerate(content.split("\n"), 1)
-                if place in line
+                if text in line
             }
             assert found, f"{edit}: there is no {place!r}"
             lines |= found
@@ -224,22 +245,30 @@ def test_the_corpus_is_large_enough() -> None:
     assert sum(len(project.valid) for project in PROJECTS) >= MIN_VALID
 
 
+@pytest.mark.parametrize(("files", "min_found", "max_reports"), CORPORA)
 def test_mistakes_are_found_once_in_the_right_place(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    files: list[Path],
+    min_found: float,
+    max_reports: float,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     result = Result()
-    for project in PROJECTS:
+    for project in (project for path in files for project in _read(path)):
         _check_project(project, _folder(project, tmp_path, monkeypatch), result)
     print(result)
-    assert result.found >= MIN_FOUND * result.mistakes, result
+    assert result.found >= min_found * result.mistakes, result
     assert result.right >= MIN_RIGHT * result.found, result
-    assert result.reports <= MAX_REPORTS * result.found, result
+    assert result.reports <= max_reports * result.found, result
 
 
+@pytest.mark.parametrize(
+    "files", [FILES, pytest.param(MORE, marks=pytest.mark.soak)], ids=["corpus", "more"]
+)
 def test_correct_files_give_no_errors_and_no_warnings(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    files: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    reported = []
-    for project in PROJECTS:
+    reported: list[str] = []
+    for project in (project for path in files for project in _read(path)):
         reported += _false_positives(project, _folder(project, tmp_path, monkeypatch))
     assert not reported, "\n".join(reported)

@@ -164,6 +164,13 @@ def test_all_diagnostics_in_one_run() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.usefixtures("parser")
+def test_the_hint_about_a_missing_space_is_short_however_long_the_value_is() -> None:
+    (diagnostic,) = diagnostics_in(f"set: {{silent:{'9' * 3000} false}}")
+    assert str(diagnostic.hint).startswith("write 'silent: 999")
+    assert len(str(diagnostic.hint)) < 200
+
+
 @pytest.mark.parametrize(
     ("text", "value"),
     [

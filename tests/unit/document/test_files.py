@@ -64,13 +64,11 @@ def test_name_that_cannot_be_one() -> None:
     assert diagnostic_for(Path("a" * 5000)).rule.name == "unreadable-file"
 
 
-@pytest.mark.timeout(20)
 def test_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.yaml")
     assert diagnostic_for(tmp_path / "pipe.yaml").message == "expected a file, found a pipe"
 
 
-@pytest.mark.timeout(20)
 @pytest.mark.parametrize("device", ["/dev/zero", "/dev/null", "/dev/tty"])
 def test_device_is_not_opened(device: str) -> None:
     assert diagnostic_for(Path(device)).message == "expected a file, found a device"

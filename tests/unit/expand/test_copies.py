@@ -144,4 +144,4 @@ nodes:
         "variable-not-string",
         "system.yaml:4:3",
     )
-    assert diagnostic.message == f"'${{a}}' is {kind}, which cannot be the name of a node"
+    assert diagnostic.message == f"'${{a}}' is {kind}, which cannot be a name"

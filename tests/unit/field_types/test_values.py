@@ -96,6 +96,7 @@ NOT_FITTING: list[tuple[str, Any, str, str | None]] = [
     ("three", [1, 2], "a list of 2 elements does not fit float64[3]", None),
     ("few", [1, 2, 3], "a list of 3 elements does not fit int8[<=2]", None),
     ("few", [128], "128 is outside the range of int8", "allowed: -128 to 127"),
+    ("few", ["a", "b"], "the string 'a' where int8 is expected, as in all 2 elements", None),
     ("double", [1.0], "a list where float64 is expected", None),
     ("double", {"x": 1}, "a map of fields where float64 is expected", None),
     ("stamp", 1e12, "1000000000000.0 seconds do not fit builtin_interfaces/msg/Time", None),

@@ -242,9 +242,11 @@ def test_packages_that_are_not_on_pypi_are_known_without_ros(name: str) -> None:
         ({"msg_Demo": "# a\nbool on\nOthr other\n"}, "field 'other' has the unknown type", 3),
         ({"msg_Demo": "std_msgs/Heder header\n"}, "field 'header' has the unknown type", 1),
         ({"msg_Demo": "bool on\nint33 x\n"}, "'int33' is neither a primitive type", 2),
-        ({"msg_Demo": "Other other\n", "msg_Other": "Demo demo\n"}, None, 0),
         ({"msg_Demo": "bool on\nOther other\n", "msg_Other": ""}, None, 0),
         ({"msg_Demo": "elsewhere_msgs/Other other\n"}, None, 0),
+        ({"msg_Demo": "std_msg/Header header\n"}, "field 'header' has the unknown type", 1),
+        ({"msg_Demo": "std_msg/Elsewhere header\n"}, None, 0),
+        ({"msg_Demo": "bool on\n---\nbool off\n"}, "a .msg file has 0 lines with '---'", 2),
     ],
 )
 def test_wrong_types_of_fields_are_found(
@@ -288,3 +290,27 @@ def test_changes_since_the_build_are_found(
     assert Interfaces([installed]).outdated("demo_msgs/msg/Demo") is None
     without = Interfaces([Bundle()], find_packages([tmp_path / "source"]))
     assert without.outdated("demo_msgs/msg/Demo") is None
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "name", "line"),
+    [
+        ("string id\nFirst[] parts", "bool on", "First", 2),
+        ("Second inner", "bool on\nFirst outer", "Second", 2),
+    ],
+    ids=["directly", "through another"],
+)
+def test_a_message_must_not_contain_itself(
+    tmp_path: Path, first: str, second: str, name: str, line: int
+) -> None:
+    folder = package(tmp_path / "demo", "demo", msg_First=first, msg_Second=second)
+    interfaces = Interfaces([], find_packages([folder]))
+    problem = interfaces.problem("demo/msg/First")
+    assert problem is not None
+    assert (problem.name, problem.line) == (f"demo/msg/{name}", line)
+    assert problem.message.endswith("makes the message contain itself")
+
+
+def test_a_message_may_be_used_twice(tmp_path: Path) -> None:
+    folder = package(tmp_path / "demo", "demo", msg_Pair="Item a\nItem b", msg_Item="bool on")
+    assert Interfaces([], find_packages([folder])).find("demo/msg/Pair") is not None

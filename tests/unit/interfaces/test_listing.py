@@ -6,6 +6,7 @@ import pytest
 
 from composer.interfaces import Interfaces, parts
 from composer.interfaces.listing import ListingOptions, listing, packages, prototype
+from composer.interfaces.sources import Prefix
 
 OUTER = """\
 # outside
@@ -88,11 +89,14 @@ def test_a_prototype_has_the_defaults(interfaces: Interfaces) -> None:
 
 
 def test_a_message_that_contains_itself_is_expanded_once(tmp_path: Path) -> None:
-    (tmp_path / "msg").mkdir()
-    (tmp_path / "package.xml").write_text("<package><name>my_msgs</name></package>")
-    (tmp_path / "msg" / "Tree.msg").write_text("Leaf leaf\n")
-    (tmp_path / "msg" / "Leaf.msg").write_text("Tree tree\n")
-    interfaces = Interfaces.load([tmp_path])
+    folder = tmp_path / "share" / "my_msgs" / "msg"
+    index = tmp_path / "share" / "ament_index" / "resource_index" / "rosidl_interfaces"
+    folder.mkdir(parents=True)
+    index.mkdir(parents=True)
+    (index / "my_msgs").touch()
+    (folder / "Tree.msg").write_text("Leaf leaf\n")
+    (folder / "Leaf.msg").write_text("Tree tree\n")
+    interfaces = Interfaces([Prefix(tmp_path)])
     shown = list(listing("my_msgs/msg/Tree", interfaces, ListingOptions()))
     assert shown == ["Leaf leaf", "\tTree tree"]
     tree = interfaces.message("my_msgs/msg/Tree")

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from composer.analysis import behavior_code
-from composer.behavior_types import CodeProblem, behavior_problems
+from composer.behavior_checks import CodeProblem, behavior_problems
 from composer.model import Node
 from tests.unit.support.checking import diagnostics_in
 

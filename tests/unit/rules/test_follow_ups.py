@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from composer.loading import load
 from tests.unit.support.checking import rules_broken
 
 TALKER = "talker: {publishers: {chatter: {type: std_msgs/msg/String, qos: command}}}"
@@ -21,6 +20,13 @@ def system(*nodes: str, connections: tuple[str, ...] = (), above: str = "") -> s
 
 
 MISTAKES = {
+    "a parameter file that is missing may set what a node needs": (
+        system(
+            "motor: {parameters: {limit: {type: double}}, on_activate: {log: started}}",
+            above="parameter_files: motor.yaml",
+        ),
+        ["parameter-file"],
+    ),
     "a node of an unknown type may publish what another one subscribes to": (
         system("talker: {type: tlker}", LISTENER),
         ["unknown-node-type"],
@@ -146,6 +152,161 @@ MISTAKES = {
         system("motor: {timers: {tick: {period_ms: -5, log: tick}}}"),
         ["out-of-range"],
     ),
+    "the default of a parameter is wrong, not the values that are like it": (
+        system(
+            "motor: {parameters: {gains: {type: double, default: [1.0, 2.0]}}, "
+            'timers: {tick: {period_ms: 100, log: "{parameters.gains[0]}"}}}'
+        ),
+        ["parameter-type"],
+    ),
+    "a value of many copies is one value": (
+        system(
+            "motor_${i}: {for_each: {i: 5}, "
+            'parameters: {index: {type: integer, default: "${i}", maximum: 2}}}'
+        ),
+        ["parameter-range"],
+    ),
+    "a publisher of another type does not fill its messages wrongly": (
+        system(
+            "talker: {publishers: {chatter: {type: std_msgs/msg/Bool, qos: command}}, "
+            "timers: {tick: {period_ms: 100, publish: {chatter: {data: hello}}}}}",
+            LISTENER,
+        ),
+        ["type-mismatch"],
+    ),
+    "a misspelled topic is not also a topic that no node subscribes to": (
+        system(
+            "talker: {publishers: {chatter: {type: std_msgs/msg/String, qos: command}}, "
+            "timers: {tick: {period_ms: 100, publish: {chatter: {data: hello}}}}}",
+            "listener: {subscriptions: {chater: {type: std_msgs/msg/String, qos: command}}}",
+        ),
+        ["subscription-without-publisher"],
+    ),
+    "a chain in the wrong order has one gap": (
+        system(
+            "a: {publishers: {out: {type: std_msgs/msg/String, topic: /x, qos: command}}}",
+            "b: {subscriptions: {in: {type: std_msgs/msg/String, topic: /x, qos: command, "
+            'publish: {out: "{message}"}}}, '
+            "publishers: {out: {type: std_msgs/msg/String, topic: /y, qos: command}}}",
+            "c: {subscriptions: {in: {type: std_msgs/msg/String, topic: /y, qos: command, "
+            'publish: {out: "{message}"}}}, '
+            "publishers: {out: {type: std_msgs/msg/String, qos: command, external: true}}}",
+            above="chains: {all: {through: [b.out, a.out, c.out], latency_ms: 100}}",
+        ),
+        ["broken-chain"],
+    ),
+    "a node in an unknown process leaves another process without nodes": (
+        system(
+            "motor: {process: remotes, on_activate: {log: started}}",
+            above="processes: {remote: {memory_mb: 100}}",
+        ),
+        ["unknown-process"],
+    ),
+    "discovery of another kind makes several keys useless": (
+        system(
+            "motor: {on_activate: {log: started}}",
+            above="discovery: {kind: peers, address: 10.0.0.5, start: true}",
+        ),
+        ["discovery-setting"],
+    ),
+    "a misspelled key of discovery is not also missing": (
+        system(
+            "motor: {on_activate: {log: started}}",
+            above="discovery: {kind: server, addres: 10.0.0.5}",
+        ),
+        ["unknown-key"],
+    ),
+    "a misspelled key of an executable is not also missing": (
+        system("motor: {executable: {package: demo_nodes_cpp, nam: talker}}"),
+        ["unknown-key"],
+    ),
+    "misspelled feedback does not make an action a service": (
+        system(
+            "server: {action_servers: {go: {type: composer_interfaces/action/Navigate, "
+            "external: true, feedback: {steps: 3, period_ms: 100}, result: {success: true}}}}"
+        ),
+        ["unknown-key"],
+    ),
+    "a connection with an invalid name leaves no client without a server": (
+        system(
+            "server: {services: {ask: {type: std_srvs/srv/Trigger, respond: {success: true}}}}",
+            "user: {clients: {ask: {type: std_srvs/srv/Trigger}}}",
+            connections=(
+                "{service: 'a b', server: server.ask}",
+                "{service: /ask, clients: user.ask}",
+            ),
+        ),
+        ["invalid-ros-name"],
+    ),
+    "a topic with the endpoints of a service is one mistake": (
+        system(
+            "server: {services: {ask: {type: std_srvs/srv/Trigger, respond: {success: true}}}}",
+            "user: {clients: {ask: {type: std_srvs/srv/Trigger}}}",
+            connections=("{topic: /ask, server: server.ask, clients: user.ask}",),
+        ),
+        ["unknown-key"],
+    ),
+    "a service with the endpoints of a topic is one mistake": (
+        system(
+            TALKER,
+            LISTENER,
+            connections=("{service: /chatter, from: talker.chatter, to: listener.chatter}",),
+        ),
+        ["unknown-key"],
+    ),
+    "an invalid namespace separates nodes": (
+        system(
+            "talker: {publishers: {chatter: {type: std_msgs/msg/String, qos: command}}}",
+            "listener: {subscriptions: {in: {type: std_msgs/msg/String, topic: /a/chatter, "
+            "qos: command}}}",
+            above="namespace: a-b",
+        ),
+        ["invalid-namespace"],
+    ),
+    "a variable of copies that is unknown does not make their names equal": (
+        system(
+            "motor_${side}: {for_each: {sides: [left, right]}, "
+            'on_activate: {log: "started ${side}"}}'
+        ),
+        ["unknown-variable"],
+    ),
+    "a node that is unknown in two connections is one mistake": (
+        system(
+            TALKER,
+            "listener: {subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}, "
+            "other: {type: std_msgs/msg/String, qos: command}}}",
+            connections=(
+                "{topic: /chatter, from: talker.chatter, to: listner.chatter}",
+                "{topic: /other, to: listner.other}",
+            ),
+        ),
+        ["unknown-node"],
+    ),
+    "a publisher in place of a subscription is not also connected twice": (
+        system(
+            TALKER,
+            "relay: {publishers: {out: {type: std_msgs/msg/String, qos: command}}}",
+            connections=(
+                "{topic: /a, from: talker.chatter, to: relay.out}",
+                "{topic: /b, from: relay.out}",
+            ),
+        ),
+        ["wrong-port-kind"],
+    ),
+    "an unknown variable may be the unused one": (
+        system(
+            'motor: {timers: {tick: {rate_hz: "${start}", log: tick}}}',
+            above="variables: {begin: 10}",
+        ),
+        ["unknown-variable"],
+    ),
+    "a frame that is its own parent is not also unknown": (
+        system(
+            "mounts: {transforms: {static: {odom: {parent: odom, translation_m: {x: 1.0}}}}}",
+            "viewer: {external: true, transforms: {lookup: [map, odom]}}",
+        ),
+        ["frame-cycle"],
+    ),
     "a variable without a value is not checked": (
         system('motor: {namespace: "${where}", timers: {tick: {rate_hz: "${rate}", log: tick}}}'),
         ["unknown-variable", "unknown-variable"],
@@ -158,26 +319,77 @@ def test_a_mistake_is_reported_once(text: str, rules: list[str], tmp_path: Path)
     assert rules_broken(text, tmp_path) == rules
 
 
-def test_a_mistake_in_a_node_type_is_reported_once_for_all_instances(tmp_path: Path) -> None:
-    (tmp_path / "nodes").mkdir()
-    (tmp_path / "nodes" / "talker.yaml").write_text(
-        "node: talker\n"
-        "publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}\n"
-        "timers: {tick: {period_ms: 100, publish: {chatter: {dat: hello}}}}\n",
-        encoding="utf-8",
+def test_a_warning_does_not_hide_errors(tmp_path: Path) -> None:
+    of_program = (
+        "{external: true, publishers: {out: {type: std_msgs/msg/String, qos: sensor_data}}}"
     )
-    text = system("a: {type: talker}", "b: {type: talker}", "c: {type: talker, namespace: left}")
-    assert rules_broken(text, tmp_path) == ["unknown-field"]
+    offered = "{type: std_msgs/msg/String, qos: {reliability: best_effort}, external: true}"
+    requested = "{type: std_msgs/msg/String, qos: {reliability: reliable}, log: text}"
+    text = system(
+        f"program: {of_program}",
+        "reader: {subscriptions: {in: {type: std_msgs/msg/String, qos: sensor_data, log: text}}}",
+        f"first: {{publishers: {{other: {offered}}}}}",
+        f"second: {{subscriptions: {{other: {requested}}}}}",
+        connections=("{topic: /a, from: program.out, to: reader.in, qos: command}",),
+    )
+    assert sorted(rules_broken(text, tmp_path)) == ["outside-qos", "qos-incompatible"]
 
 
-def test_a_node_type_alone_needs_no_connections(tmp_path: Path) -> None:
-    text = (
-        "node: relay\nvariables: {message_type: {description: The type.}}\n"
-        "parameters: {rate_hz: {type: double}}\n"
-        "subscriptions:\n"
-        "  input: {type: '${message_type}', qos: command, publish: {output: '{message}'}}\n"
-        "publishers: {output: {type: '${message_type}', qos: command}}\n"
-    )
-    path = tmp_path / "relay.yaml"
-    path.write_text(text, encoding="utf-8")
-    assert load(path).diagnostics == []
+MOUNTS = "mounts: {transforms: {static: {odom: {parent: odom, translation_m: {x: 1.0}}}}}"
+UNHEARD = "other: {subscriptions: {scan: {type: std_msgs/msg/String, qos: command, log: text}}}"
+INDEPENDENT = {
+    "a frame that is looked up without a frame of the cycle": (
+        system(
+            MOUNTS,
+            "arm: {transforms: {static: {hand: {parent: wrist, translation_m: {x: 1.0}}}}}",
+            "viewer: {external: true, transforms: {lookup: [gripper, wrist]}}",
+        ),
+        ["frame-cycle", "unknown-frame"],
+    ),
+    "a port that has nothing to do with the misspelled reference": (
+        system(
+            TALKER,
+            LISTENER,
+            UNHEARD,
+            connections=("{topic: /a, from: talkr.chatter, to: listener.chatter}",),
+        ),
+        ["subscription-without-publisher", "unknown-node"],
+    ),
+    "a port outside of the invalid namespace": (
+        system(
+            TALKER.replace("{pub", "{namespace: a-b, pub"),
+            LISTENER.replace("type", "topic: /a/chatter, type"),
+            UNHEARD,
+        ),
+        ["invalid-namespace", "subscription-without-publisher"],
+    ),
+    "the best effort commands of another node": (
+        system(
+            "program: {external: true, publishers: "
+            "{out: {type: std_msgs/msg/String, qos: sensor_data}}}",
+            "reader: {subscriptions: {in: {type: std_msgs/msg/String, qos: sensor_data, "
+            "log: text}}}",
+            "driver: {publishers: {cmd_vel: {type: std_msgs/msg/String, qos: sensor_data, "
+            "external: true}}}",
+            connections=("{topic: /a, from: program.out, to: reader.in, qos: command}",),
+        ),
+        ["outside-qos", "unreliable-command"],
+    ),
+    "an executor that other processes share": (
+        system(
+            "motor: {process: remotes, on_activate: {log: started}}",
+            "left: {process: other, executor: fast, on_activate: {log: started}}",
+            "right: {executor: fast, on_activate: {log: started}}",
+            above="processes: {remote: {memory_mb: 100}, other: {memory_mb: 100}}\n"
+            "executors: {fast: {kind: single_threaded}}",
+        ),
+        ["split-executor", "unknown-process"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "rules"), INDEPENDENT.values(), ids=INDEPENDENT.keys())
+def test_what_does_not_follow_from_a_mistake_is_reported(
+    text: str, rules: list[str], tmp_path: Path
+) -> None:
+    assert sorted(rules_broken(text, tmp_path)) == rules

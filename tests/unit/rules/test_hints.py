@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from composer.diagnostics import Severity
+from composer.loading import load
 from tests.unit.support.checking import diagnostics_in
 
 SCAN = "type: sensor_msgs/msg/LaserScan"
@@ -125,3 +127,28 @@ def test_reliable_subscriptions_are_labeled(tmp_path: Path) -> None:
     assert [(label.message, label.span.line) for label in diagnostic.related] == [
         ("'map.scan' requests it", 7)
     ]
+
+
+def test_definitions_without_a_package_xml(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "interfaces" / "x_msgs" / "msg").mkdir(parents=True)
+    (tmp_path / "interfaces" / "x_msgs" / "msg" / "State.msg").write_text("bool ok\n")
+    (tmp_path / "systems").mkdir()
+    path = tmp_path / "systems" / "x.yaml"
+    path.write_text(
+        "system: x\nnodes:\n  n:\n    publishers: "
+        "{out: {type: x_msgs/msg/State, qos: state, external: true}}\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    hints = [d.hint for d in load(path).diagnostics if d.rule.name == "unknown-interface"]
+    assert hints == ["'interfaces/x_msgs' has no package.xml: add one that names 'x_msgs'"]
+
+
+@pytest.mark.parametrize("package", ["y" * 3000, "y/" * 1500, "Y" * 150])
+def test_the_hint_about_an_unknown_type_is_short(tmp_path: Path, package: str) -> None:
+    port = f"{{type: {package}/msg/State, qos: state, external: true}}"
+    text = f"system: x\nnodes:\n  n:\n    publishers: {{out: {port}}}\n"
+    hints = [
+        item.hint for item in diagnostics_in(text, tmp_path) if item.severity is Severity.ERROR
+    ]
+    assert hints
+    assert max(len(str(hint)) for hint in hints) < 400

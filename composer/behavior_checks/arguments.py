@@ -1,0 +1,220 @@
+"""Checks the arguments of calls against the functions of a behavior, and against the API."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import importlib
+import inspect
+import math
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+
+from composer import behavior
+from composer.behavior_source import Function
+from composer.behavior_source.method_body import dotted
+from composer.behavior_types.bindings import is_class_method, is_static
+from composer.behavior_types.own_classes import fields_of_class, has_fields
+from composer.behavior_types.values import OwnClass
+from composer.diagnostics import suggestion
+from composer.fast_dataclass import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """The parameters of a function, without ``self``.
+
+    ``positional`` may be given by position or name, the first ``positional_only`` only by
+    position, and ``keywords`` only by name. ``required`` have no default.
+    """
+
+    name: str
+    positional: tuple[str, ...]
+    keywords: tuple[str, ...]
+    required: frozenset[str]
+    positional_only: int = 0
+    takes_more: bool = False  # *arguments
+    takes_keywords: bool = False  # **arguments
+
+    def bound(self, call: ast.Call) -> Iterator[tuple[str, ast.expr]]:
+        """Yield the parameters that a call sets, each with its argument."""
+        if not any(isinstance(argument, ast.Starred) for argument in call.args):
+            yield from zip(self.positional, call.args, strict=False)
+        for keyword in call.keywords:
+            if keyword.arg is not None:
+                yield keyword.arg, keyword.value
+
+    def partial(self) -> Signature:
+        """Return the parameters of a call that may leave out any of them."""
+        return replace(self, required=frozenset())
+
+    def problem(self, call: ast.Call) -> tuple[str, ast.expr | ast.keyword, str | None] | None:
+        """Return why a call fails, the node that is wrong and a hint; None if it may be right."""
+        unpacks = any(isinstance(argument, ast.Starred) for argument in call.args)
+        unpacks_map = any(keyword.arg is None for keyword in call.keywords)
+        if not unpacks and not self.takes_more and len(call.args) > len(self.positional):
+            return self._too_many(call)
+        names = (*self.positional[self.positional_only :], *self.keywords)
+        for keyword in call.keywords:
+            if keyword.arg is not None and keyword.arg not in names and not self.takes_keywords:
+                message = f"'{self.name}' has no argument '{keyword.arg}'"
+                return message, keyword, suggestion(keyword.arg, names)
+        given = {name for name, _ in self.bound(call)}
+        missing = [name for name in (*self.positional, *self.keywords) if name in self.required]
+        missing = [name for name in missing if name not in given]
+        if missing and not unpacks and not unpacks_map:
+            listed = " and ".join(f"'{name}'" for name in missing)
+            plural = "s" if len(missing) > 1 else ""
+            return f"'{self.name}' needs the argument{plural} {listed}", call.func, None
+        return None
+
+    def _too_many(self, call: ast.Call) -> tuple[str, ast.expr, str | None]:
+        most = len(self.positional)
+        takes = "no argument" if most == 0 else f"{most} argument{'s' if most > 1 else ''}"
+        first = call.args[most]
+        return f"'{self.name}' takes {takes}, not {len(call.args)}", first, None
+
+
+def signature_of(function: Function, *, is_bound: bool, name: str = "") -> Signature | None:
+    """Return the parameters of a function; None if a decorator may change them.
+
+    If ``is_bound``, its first parameter is the object, except in a static method.
+    """
+    if is_static(function):
+        is_bound = False
+    elif function.decorator_list and not (is_bound and is_class_method(function)):
+        return None
+    arguments = function.args
+    positional = [argument.arg for argument in (*arguments.posonlyargs, *arguments.args)]
+    without_default = len(positional) - len(arguments.defaults)
+    required = positional[:without_default]
+    required += [
+        argument.arg
+        for argument, default in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True)
+        if default is None
+    ]
+    first = 1 if is_bound else 0
+    return Signature(
+        name or function.name,
+        tuple(positional[first:]),
+        tuple(argument.arg for argument in arguments.kwonlyargs),
+        frozenset(required) - frozenset(positional[:first]),
+        max(len(arguments.posonlyargs) - first, 0),
+        arguments.vararg is not None,
+        arguments.kwarg is not None,
+    )
+
+
+def constructor(own: OwnClass) -> Signature | None:
+    """Return the parameters of the constructor of a class; None if they are not known.
+
+    The class has no bases and decorators, or it is a dataclass or a named tuple.
+    """
+    definition = own.definition
+    if has_fields(own):
+        return _of_fields(own)
+    if definition.node.bases or definition.node.decorator_list or definition.node.keywords:
+        return None
+    methods = {method.name: method.node for method in definition.methods}
+    if "__new__" in methods:
+        return None
+    found = methods.get("__init__")
+    if "__init__" not in methods:
+        return Signature(definition.name, (), (), frozenset())
+    return signature_of(found, is_bound=True, name=definition.name) if found is not None else None
+
+
+def _of_fields(own: OwnClass) -> Signature | None:
+    """Return the parameters that a dataclass or a named tuple has for its fields."""
+    names, required = [], []
+    for field in fields_of_class(own):
+        match field.value:
+            case None:
+                required.append(field.name)
+            case ast.Call(func=function, keywords=keywords) if dotted(function).endswith("field"):
+                given = {keyword.arg for keyword in keywords}
+                if given & {"init", "kw_only", None}:
+                    return None
+                if not given & {"default", "default_factory"}:
+                    required.append(field.name)
+        names.append(field.name)
+    return Signature(own.definition.name, tuple(names), (), frozenset(required))
+
+
+#: Methods whose signature Python does not report.
+_WITHOUT_ARGUMENTS = frozenset({(deque, "pop"), (deque, "popleft"), (dict, "popitem")})
+
+
+@cache
+def method_signature(python: type, name: str) -> Signature | None:
+    """Return the parameters of a method of a class of Python; None if they are not known."""
+    if (python, name) in _WITHOUT_ARGUMENTS:
+        return Signature(name, (), (), frozenset())
+    found = _signature(getattr(python, name, None), name)
+    if found is None or not found.positional:
+        return None
+    first, *rest = found.positional
+    return Signature(
+        name,
+        tuple(rest),
+        found.keywords,
+        found.required - {first},
+        max(found.positional_only - 1, 0),
+        found.takes_more,
+        found.takes_keywords,
+    )
+
+
+#: Modules of the standard library whose functions have signatures.
+_LIBRARY = frozenset({"copy", "json", "random"})
+
+
+@cache
+def library_signature(name: str) -> Signature | None:
+    """Return the parameters of a built-in function or one of the library; None if unknown."""
+    module, _, last = name.rpartition(".")
+    home = {"": builtins, "math": math}.get(module)
+    if module in _LIBRARY:
+        home = importlib.import_module(module)
+    found = getattr(home, last, None)
+    return None if isinstance(found, type) else _signature(found, name)
+
+
+def _signature(function: object, name: str) -> Signature | None:
+    if not callable(function):
+        return None
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return None
+    kinds = inspect.Parameter
+    by_position = {kinds.POSITIONAL_ONLY, kinds.POSITIONAL_OR_KEYWORD}
+    return Signature(
+        name,
+        tuple(item.name for item in parameters if item.kind in by_position),
+        tuple(item.name for item in parameters if item.kind is kinds.KEYWORD_ONLY),
+        frozenset(
+            item.name
+            for item in parameters
+            if item.default is kinds.empty and item.kind in (*by_position, kinds.KEYWORD_ONLY)
+        ),
+        sum(item.kind is kinds.POSITIONAL_ONLY for item in parameters),
+        any(item.kind is kinds.VAR_POSITIONAL for item in parameters),
+        any(item.kind is kinds.VAR_KEYWORD for item in parameters),
+    )
+
+
+@cache
+def api_signature(class_name: str, method: str) -> Signature:
+    """Return the parameters of a method of the API for behaviors."""
+    parameters = inspect.signature(getattr(getattr(behavior, class_name), method)).parameters
+    items = [item for name, item in parameters.items() if name != "self"]
+    by_name = [item for item in items if item.kind is inspect.Parameter.KEYWORD_ONLY]
+    return Signature(
+        method,
+        tuple(item.name for item in items if item not in by_name),
+        tuple(item.name for item in by_name),
+        frozenset(item.name for item in items if item.default is inspect.Parameter.empty),
+    )

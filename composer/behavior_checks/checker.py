@@ -1,0 +1,398 @@
+"""Checks the methods of a behavior against its node and the definitions of messages."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from composer.behavior_checks.arguments import api_signature, constructor, signature_of
+from composer.behavior_checks.attributes import attribute_problem
+from composer.behavior_checks.awaiting import (
+    missing_await,
+    pending_value,
+    unawaited,
+    used_without_await,
+)
+from composer.behavior_checks.calls import call_problems
+from composer.behavior_checks.changing_attributes import changing_attributes
+from composer.behavior_checks.classes import class_problems
+from composer.behavior_checks.collection_calls import (
+    key_problems,
+    method_problems,
+    stored_problems,
+)
+from composer.behavior_checks.elements import element_problems, size_problem
+from composer.behavior_checks.field_values import field_problem
+from composer.behavior_checks.fitting import argument_problem, value_problem
+from composer.behavior_checks.formats import text_problems
+from composer.behavior_checks.iteration import iteration_problems
+from composer.behavior_checks.misspelled_attributes import misspelled_attributes
+from composer.behavior_checks.node_classes import missing_constructors, undeclared_parameters
+from composer.behavior_checks.operations import (
+    annotations_by_name,
+    annotations_of,
+    operation_problems,
+    returned_exceptions,
+    uncallable,
+)
+from composer.behavior_checks.parts import outside_functions, possible_values, scalar_name
+from composer.behavior_checks.problems import CodeProblem, Kind, distinct
+from composer.behavior_checks.rclpy_calls import rclpy_call, transition_problems
+from composer.behavior_checks.returns import must_return, return_problems
+from composer.behavior_source import BehaviorSource, Function, Module
+from composer.behavior_source.flow import returned_values
+from composer.behavior_source.receivers import lacks_self
+from composer.behavior_source.spans import attribute_span, span_of, start_span
+from composer.behavior_types.annotations import annotated
+from composer.behavior_types.api_values import api_parameters
+from composer.behavior_types.bindings import assigned_pairs, nodes_of
+from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.handlers import Handler
+from composer.behavior_types.hosted import HostedTypes, rclpy_function
+from composer.behavior_types.inference import BehaviorTypes
+from composer.behavior_types.objects import fields_expected
+from composer.behavior_types.values import (
+    ApiMethod,
+    ApiValue,
+    Collection,
+    CollectionMethod,
+    InterfaceClass,
+    ModuleFunction,
+    OwnClass,
+    OwnMethod,
+    Parameters,
+    Pending,
+    Ports,
+    Self,
+    Value,
+)
+from composer.diagnostics import suggestion
+from composer.fast_dataclass import dataclass
+from composer.field_types import ANYTHING
+from composer.interfaces import Action, Field, FieldType, Interfaces, Message, Service
+from composer.model import Node
+from composer.source import Span
+
+#: Attributes of awaitables that code may use instead of awaiting them.
+_OF_AWAITABLES = frozenset({"add_done_callback", "cancel", "close", "done", "exception", "send"})
+
+
+def behavior_problems(
+    node: Node, source: BehaviorSource, interfaces: Interfaces
+) -> Iterator[CodeProblem]:
+    """Yield the problems in the behavior or the class of a node, in methods of its own project.
+
+    A missing attribute is reported once, where it is first used.
+    """
+    is_hosted = node.hosted_class is not None
+    types = (HostedTypes if is_hosted else BehaviorTypes)(node, source, interfaces)
+    types.infer()
+    if isinstance(types, HostedTypes):
+        yield from missing_constructors(types)
+        yield from undeclared_parameters(types)
+        yield from transition_problems(types)
+    missing: set[str] = set()
+    for checker in _checkers(types, source):
+        try:
+            problems = list(distinct(checker.problems()))
+        except RecursionError:  # too deeply nested to be checked
+            continue
+        for problem in problems:
+            if problem.kind is not Kind.ATTRIBUTE or problem.message not in missing:
+                yield problem
+            if problem.kind is Kind.ATTRIBUTE:
+                missing.add(problem.message)
+    yield from changing_attributes(types)
+    yield from class_problems(types)
+    yield from misspelled_attributes(source)
+
+
+def _checkers(types: BehaviorTypes, source: BehaviorSource) -> Iterator[_FunctionChecker]:
+    own = {id(known) for _, known in source.own_classes}
+    for home, known in source.own_classes:
+        for method in known.methods:
+            scope = types.scope(method, home)
+            handler = types.handlers.get(method.name)
+            if scope is None or method.node is None:
+                continue
+            if not lacks_self(method.node, len(handler.arguments) if handler else None):
+                yield _FunctionChecker(types, scope, method.node, handler)
+    for home in source.own_modules:
+        yield _FunctionChecker(types, types.at_module(home), outside_functions(home))
+        for item in home.tree.body:
+            if isinstance(item, Function):
+                yield _FunctionChecker(types, types.function(item, home), item)
+        for known in home.classes.values():
+            for method in known.methods if id(known) not in own else ():
+                if method.node is not None:
+                    scope = types.function(method.node, home, OwnClass(known, home))
+                    yield _FunctionChecker(types, scope, method.node)
+
+
+@dataclass(frozen=True, slots=True)
+class _FunctionChecker:
+    types: BehaviorTypes
+    scope: FunctionTypes
+    function: Function
+    handler: Handler | None = None
+
+    def problems(self) -> Iterator[CodeProblem]:
+        """Yield the problems of the function."""
+        wrong = next(self._annotations(), None)
+        if wrong is not None:
+            yield wrong
+        else:
+            yield from self._returned()
+        yield from returned_exceptions(self.function, self.scope)
+        for annotation in annotations_of(self.function):
+            for node in ast.walk(annotation):
+                if isinstance(node, ast.Attribute):
+                    yield from self._attribute(node)
+        for pending in used_without_await(self.function, self.scope):
+            yield missing_await(pending, self.function, self.scope)
+        for node in nodes_of(self.function):
+            match node:
+                case ast.Attribute():
+                    yield from self._attribute(node)
+                case ast.Subscript():
+                    yield from self._index(node)
+                case ast.Call():
+                    yield from self._call(node)
+                case ast.Assign(targets=[target], value=value):
+                    for part, given in assigned_pairs(target, value):
+                        yield from self._assignment(part, given)
+                case ast.AnnAssign(annotation=annotation, value=ast.expr() as value):
+                    yield from self._annotated(annotation, value)
+            yield from unawaited(node, self.function, self.scope)
+            yield from operation_problems(node, self.scope)
+            yield from text_problems(node, self.scope)
+            yield from element_problems(node, self.function, self.scope)
+            yield from iteration_problems(node, self.scope)
+
+    # --- attributes
+
+    def _attribute(self, node: ast.Attribute) -> Iterator[CodeProblem]:
+        owner = self.scope.type_of(node.value)
+        if isinstance(owner, Pending):
+            if node.attr not in _OF_AWAITABLES:
+                yield missing_await(owner, self.function, self.scope)
+            return
+        found = attribute_problem(self.types, owner, node.attr)
+        if found is not None:
+            kind, message, hint = found
+            span = attribute_span(node, self.scope.home.source)
+            if kind is Kind.VALUE:  # the value is wrong where it was stored
+                span = self._span(self._origin(node.value))
+            yield CodeProblem(kind, message, span, hint, about=scalar_name(node.value, owner))
+
+    def _origin(self, node: ast.expr) -> ast.expr:
+        """Return the expression that a name was assigned, if there is exactly one."""
+        name = node.id if isinstance(node, ast.Name) else ""
+        bindings = self.scope.bindings.names.get(name, [])
+        only = bindings[0].expression if len(bindings) == 1 else None
+        return only if only is not None else node
+
+    def _index(self, node: ast.Subscript) -> Iterator[CodeProblem]:
+        owner, index = self.scope.type_of(node.value), node.slice
+        if isinstance(owner, Collection) and owner.python is dict:
+            yield from key_problems(index, owner, self.scope)
+        name = index.value if isinstance(index, ast.Constant) else None
+        if isinstance(name, str) and isinstance(owner, Ports | Parameters):
+            found = attribute_problem(self.types, owner, name)
+            if found is not None:
+                yield CodeProblem(found[0], found[1], self._span(index), found[2])
+
+    # --- calls
+
+    def _call(self, node: ast.Call) -> Iterator[CodeProblem]:
+        called = rclpy_function(node, self.scope)
+        if called is not None:
+            yield from rclpy_call(node, called, self.scope, self._value)
+            return
+        match self.scope.type_of(node.func):
+            case InterfaceClass(definition=Message() as message):
+                yield from self._constructor(node, message)
+            case InterfaceClass(definition=Service() | Action() as definition):
+                parts = "Request" if isinstance(definition, Service) else "Goal"
+                name = definition.name.rpartition("/")[2]
+                problem = f"{definition.name} cannot be created"
+                hint = f"create {name}.{parts}()"
+                yield CodeProblem(Kind.VALUE, problem, self._span(node.func), hint)
+            case ApiMethod(owner=owner, member=member):
+                signature = api_signature(owner.class_name, member.name)
+                types = api_parameters(owner.class_name, member.name, self.types.interfaces)
+                found = list(call_problems(node, signature, self.scope, types))
+                yield from found
+                expected = self._expected(owner, member.name)
+                if expected is not None and node.args and not found:
+                    yield from self._value(node.args[0], expected)
+            case OwnMethod(method=method, home=home) if method.node is not None:
+                if not lacks_self(method.node):
+                    yield from self._own_call(node, method.node, home, is_bound=True)
+            case ModuleFunction(node=function, home=home, is_bound=is_bound):
+                yield from self._own_call(node, function, home, is_bound=is_bound)
+            case OwnClass() as own:
+                parameters = constructor(own)
+                if parameters is not None:
+                    fields = fields_expected(self.scope, own)
+                    yield from call_problems(node, parameters, self.scope, fields)
+            case CollectionMethod(owner=collection, name=name):
+                yield from method_problems(node, collection, name, self.scope)
+            case other:
+                yield from self._element_added(node)
+                reason = uncallable(other)
+                if reason is not None:
+                    yield CodeProblem(Kind.VALUE, reason[0], self._span(node.func), reason[1])
+
+    def _own_call(
+        self, node: ast.Call, function: Function, home: Module, *, is_bound: bool
+    ) -> Iterator[CodeProblem]:
+        signature = signature_of(function, is_bound=is_bound)
+        if signature is not None:
+            expected = annotations_by_name(function, home, self.types)
+            yield from call_problems(node, signature, self.scope, expected)
+
+    def _element_added(self, node: ast.Call) -> Iterator[CodeProblem]:
+        """Check what ``append`` and ``insert`` add to a list in a message."""
+        if isinstance(node.func, ast.Attribute) and node.func.attr in {"append", "insert"}:
+            array = self.scope.type_of(node.func.value)
+            if isinstance(array, FieldType) and array.is_array and node.args:
+                yield from self._value(node.args[-1], array.element)
+
+    def _constructor(self, node: ast.Call, message: Message) -> Iterator[CodeProblem]:
+        for argument in node.args:
+            if not isinstance(argument, ast.Starred):
+                problem = f"{message.name} takes keyword arguments only"
+                fields = ", ".join(f"{name}=..." for name in message.field_names[:3])
+                hint = f"fields: {fields}" if fields else None
+                yield CodeProblem(Kind.VALUE, problem, self._span(argument), hint)
+                return
+        for keyword in node.keywords:
+            if keyword.arg is None:
+                continue
+            field = message.field(keyword.arg)
+            if field is not None:
+                yield from self._field(keyword.value, field)
+            elif keyword.arg != "check_fields":
+                problem = f"{message.name} has no field '{keyword.arg}'"
+                hint = suggestion(keyword.arg, message.field_names)
+                span = start_span(keyword, len(keyword.arg), self.scope.home.source)
+                yield CodeProblem(Kind.FIELD, problem, span, hint)
+                return  # more of them come from the wrong class
+
+    def _expected(self, owner: ApiValue, name: str) -> Message | None:
+        """Return the message that the first argument of a method of the API must be."""
+        port = owner.port
+        definition = self.types.interfaces.find(port.interface.value) if port else None
+        match name, definition:
+            case "publish", Message() as message:
+                return message
+            case "call", Service() as service:
+                return service.request
+            case "send_goal", Action() as action:
+                return action.goal
+            case "publish_feedback", Action() as action:
+                return action.feedback
+            case _:
+                return None
+
+    # --- values
+
+    def _assignment(self, target: ast.expr, value: ast.expr) -> Iterator[CodeProblem]:
+        if isinstance(target, ast.Subscript):
+            yield from stored_problems(target, value, self.scope)
+            return
+        if not isinstance(target, ast.Attribute):
+            if isinstance(target, ast.Tuple) and isinstance(self.scope.type_of(value), Pending):
+                yield from pending_value(value, self.function, self.scope)
+            return
+        owner = self.scope.type_of(target.value)
+        if isinstance(owner, Self):
+            expected = self.types.annotation(target.attr)
+            wrong = argument_problem(value, self.scope.type_of(value), expected, self.scope.type_of)
+            if wrong is not None:
+                problem = f"attribute '{target.attr}': {wrong}"
+                yield CodeProblem(Kind.VALUE, problem, self._span(value))
+            return
+        message = owner if isinstance(owner, Message) else None
+        field = message.field(target.attr) if message is not None else None
+        if field is not None:
+            yield from self._field(value, field)
+
+    def _annotated(self, annotation: ast.expr, value: ast.expr) -> Iterator[CodeProblem]:
+        expected = self.scope.annotated(annotation, self.scope.home)
+        found = self.scope.type_of(value)
+        wrong = argument_problem(value, found, expected, self.scope.type_of)
+        if wrong is not None:
+            yield CodeProblem(Kind.VALUE, wrong, self._span(value))
+
+    def _returned(self) -> Iterator[CodeProblem]:
+        """Check what a function returns; None has a rule of its own in handlers of services."""
+        returns = self.handler.returns if self.handler is not None else ANYTHING
+        if isinstance(returns, Message):
+            for value in returned_values(self.function):
+                yield from self._value(value, returns)
+        if isinstance(self.types, HostedTypes):
+            yield from must_return(self.function, self.scope, returns)
+            return
+        is_service = self.handler is not None and len(self.handler.arguments) > 1
+        if is_service and isinstance(returns, Message):
+            return
+        yield from return_problems(self.function, self.scope, self.handler)
+
+    def _field(self, node: ast.expr, field: Field) -> Iterator[CodeProblem]:
+        problem = field_problem(node, field, self.scope)
+        if problem is not None:
+            yield problem
+        else:
+            yield from self._value(node, field.type)
+
+    def _value(self, node: ast.expr, expected: Value) -> Iterator[CodeProblem]:
+        for part in possible_values(node, self.scope):
+            found = list(self._part(part, expected))
+            yield from found
+            if found:
+                return  # the other parts have the same cause
+
+    def _part(self, node: ast.expr, expected: Value) -> Iterator[CodeProblem]:
+        found = self.scope.type_of(node)
+        if isinstance(found, Pending):
+            yield missing_await(found, self.function, self.scope)
+            return
+        if isinstance(node, ast.List | ast.Tuple) and isinstance(expected, FieldType):
+            is_checked = expected.is_array and expected.name != "byte"
+            items = [item for item in node.elts if not isinstance(item, ast.Starred)]
+            items = items if is_checked else []
+            wrong = (problem for item in items for problem in self._value(item, expected.element))
+            first = next(wrong, None)  # the others have the same cause
+            if first is not None:
+                yield first
+                return
+        problem = value_problem(node, found, expected, self.types.interfaces)
+        if problem is None and isinstance(expected, FieldType):
+            size = size_problem(node, expected)
+            problem = (size, None) if size is not None else None
+        if problem is not None:
+            yield CodeProblem(Kind.VALUE, problem[0], self._span(node), problem[1])
+
+    # --- annotations
+
+    def _annotations(self) -> Iterator[CodeProblem]:
+        arguments = self.function.args
+        positional = (*arguments.posonlyargs, *arguments.args)[1:]
+        given = self.handler.arguments if self.handler is not None else ()
+        for argument, type_ in zip(positional, given, strict=False):
+            if argument.annotation is None or not isinstance(type_, Message):
+                continue
+            scope = self.scope
+            home, node = scope.home, self.types.node
+            found = annotated(argument.annotation, home, node, self.types.interfaces)
+            if isinstance(found, Message) and found != type_:
+                yield CodeProblem(
+                    Kind.ANNOTATION,
+                    f"'{self.function.name}' gets a {type_.name}, not a {found.name}",
+                    self._span(argument.annotation),
+                )
+
+    def _span(self, node: ast.expr) -> Span:
+        return span_of(node, self.scope.home.source)

@@ -1,0 +1,41 @@
+"""Checks the fields of dataclasses."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from composer.behavior_checks.fitting import shown
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source import Module
+from composer.behavior_source.spans import span_of
+from composer.behavior_types.inference import BehaviorTypes
+from composer.behavior_types.own_classes import fields_of_class, is_dataclass
+from composer.behavior_types.values import Collection, OwnClass
+
+#: What a dataclass refuses as a default, because all of its objects would share it.
+_SHARED = (dict, list, set)
+
+
+def class_problems(types: BehaviorTypes) -> Iterator[CodeProblem]:
+    """Yield the problems of the dataclasses in the files of a behavior."""
+    for home in types.source.own_modules:
+        for definition in home.classes.values():
+            own = OwnClass(definition, home)
+            if is_dataclass(own):
+                yield from _defaults(own, home, types)
+
+
+def _defaults(own: OwnClass, home: Module, types: BehaviorTypes) -> Iterator[CodeProblem]:
+    scope = types.at_module(home)
+    for field in fields_of_class(own):
+        if field.value is None:
+            continue
+        found = scope.type_of(field.value)
+        if isinstance(found, Collection) and found.python in _SHARED:
+            name = found.python.__name__
+            plain = not isinstance(field.value, ast.Call) and found.is_empty
+            factory = name if plain else f"lambda: {ast.unparse(field.value)}"
+            message = f"{shown(found)} cannot be the default of field '{field.name}'"
+            hint = f"write field(default_factory={factory})"
+            yield CodeProblem(Kind.VALUE, message, span_of(field.value, home.source), hint)

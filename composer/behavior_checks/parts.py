@@ -1,0 +1,64 @@
+"""The code of a file outside functions, and the parts of an expression that may be its value."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from functools import lru_cache
+from types import GeneratorType
+
+from composer.behavior_source import Module
+from composer.behavior_types.bindings import How
+from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.values import Collection, Value
+from composer.interfaces import FieldType
+
+
+@lru_cache(maxsize=128)
+def outside_functions(home: Module) -> ast.FunctionDef:
+    """Return the statements of a module and of its classes, outside functions, as a function."""
+    body: list[ast.stmt] = [
+        item
+        for statement in home.tree.body
+        for item in (statement.body if isinstance(statement, ast.ClassDef) else (statement,))
+        if isinstance(item, ast.Assign | ast.AnnAssign)
+    ]
+    nothing = ast.arguments(
+        posonlyargs=[], args=[], kwonlyargs=[], kw_defaults=[], defaults=[], vararg=None, kwarg=None
+    )
+    return ast.FunctionDef(
+        name="", args=nothing, body=body, decorator_list=[], returns=None, lineno=1, col_offset=0
+    )
+
+
+def possible_values(node: ast.expr, scope: FunctionTypes) -> Iterator[ast.expr]:
+    """Yield the expressions that an expression may have the value of."""
+    match node:
+        case ast.IfExp(body=first, orelse=second):
+            yield from (*possible_values(first, scope), *possible_values(second, scope))
+        case ast.BoolOp(op=ast.Or(), values=values):
+            yield from (part for value in values for part in possible_values(value, scope))
+        case ast.BoolOp(values=[*first, last]):
+            # an empty list is a possible value; a message is never false
+            yield from (value for value in first if _may_be_empty(scope.type_of(value)))
+            yield from possible_values(last, scope)
+        case ast.Name(id=name) if len(bindings := scope.bindings.names.get(name, [])) == 1:
+            only = bindings[0]
+            is_choice = isinstance(only.expression, ast.IfExp) and only.how is How.VALUE
+            if is_choice and only.expression is not None and not only.positions:
+                yield from possible_values(only.expression, scope)
+            else:
+                yield node
+        case _:
+            yield node
+
+
+def _may_be_empty(type_: Value) -> bool:
+    is_array = isinstance(type_, FieldType) and type_.is_array
+    return is_array or (isinstance(type_, Collection) and type_.python is not GeneratorType)
+
+
+def scalar_name(node: ast.expr, type_: Value) -> str:
+    """Return the name of a number or a text, "" for anything else."""
+    is_single = isinstance(type_, FieldType) and type_.is_primitive and not type_.is_array
+    return node.id if isinstance(node, ast.Name) and is_single else ""

@@ -1,0 +1,80 @@
+"""A problem in the code of a behavior."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from enum import Enum
+
+from composer.fast_dataclass import dataclass
+from composer.source import Span
+
+
+class Kind(Enum):
+    """The kinds of problems; each has its rule."""
+
+    FIELD = "a message, service or action without a field or part of that name"
+    VALUE = "a value that does not fit a field or a port"
+    ATTRIBUTE = "an attribute that self, its ports or its parameters do not have"
+    AWAIT = "an asynchronous call that is not awaited"
+    IMPORT = "an import that fails"
+    NOT_INSTALLED = "an import of a module that is not installed here"
+    INTERNAL = "an import of an internal module of the composer"
+    NAME = "a name that is not defined"
+    FRAME = "a frame ID that begins with a slash"
+    CALL = "a call with arguments that the function does not take"
+    UNUSED = "a comparison or a function whose value is not used"
+    ASYNCIO = "an awaited function of asyncio"
+    RETURN = "a function that may not return what its annotation says"
+    INDEX = "an element that an array parameter does not have"
+    CHANGED = "an attribute that gets a value of another kind"
+    ANNOTATION = "a handler that annotates its argument with another type"
+    SIGNATURE = "a callback that does not accept the arguments it is called with"
+    PARAMETER = "a parameter that a class reads, but does not declare"
+    CONSTRUCTOR = "a constructor that does not call that of Node"
+
+
+@dataclass(frozen=True, slots=True)
+class CodeProblem:
+    """A problem, its location in Python and a hint.
+
+    ``about`` is the name of what has the wrong value, by default the text at its location.
+    ``lines`` are the first and last line of a function that lacks names because of the problem.
+    """
+
+    kind: Kind
+    message: str
+    span: Span
+    hint: str | None = None
+    about: str = ""
+    lines: tuple[int, int] | None = None
+
+
+#: The kinds of which one wrong value causes several.
+_OF_VALUES = frozenset({Kind.CALL, Kind.FIELD, Kind.VALUE})
+
+
+def distinct(problems: Iterable[CodeProblem]) -> Iterator[CodeProblem]:
+    """Yield the problems in a function without those that another one has caused.
+
+    These are further uses of the same wrong value, and the parts of an expression that is wrong.
+    """
+    blamed: set[str] = set()
+    wrong: list[Span] = []
+    for problem in problems:
+        if problem.kind in _OF_VALUES:
+            about = problem.about or _named(problem.span)
+            if about in blamed or any(_is_within(problem.span, other) for other in wrong):
+                continue
+            blamed.update({about} - {""})
+            wrong.append(problem.span)
+        yield problem
+
+
+def _named(span: Span) -> str:
+    text = span.file.line(span.line)[span.column - 1 : span.column - 1 + span.length]
+    return text if text.replace(".", "").isidentifier() else ""
+
+
+def _is_within(span: Span, other: Span) -> bool:
+    end = other.column + other.length
+    return span.line == other.line and other.column <= span.column < end

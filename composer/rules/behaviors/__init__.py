@@ -1,0 +1,1 @@
+"""Python behaviors: their classes, handlers and callbacks."""

@@ -1,0 +1,1 @@
+"""Ports without a counterpart, and counterparts that disturb each other."""

@@ -1,0 +1,1 @@
+"""Nodes that are programs of their own: executables, and what they cannot do."""

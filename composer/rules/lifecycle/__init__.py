@@ -1,0 +1,1 @@
+"""Dependencies between nodes, and what happens when a node fails."""

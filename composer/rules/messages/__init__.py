@@ -1,0 +1,1 @@
+"""Interfaces and the values of their fields."""

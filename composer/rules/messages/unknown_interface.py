@@ -1,0 +1,90 @@
+"""An interface type that does not exist."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_unresolved
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, shown
+from composer.interfaces import InvalidDefinition
+from composer.interfaces.index import similar_interface
+from composer.model import Port
+from composer.source import shown_path
+
+RULE = register(
+    Rule(
+        code="RC301",
+        name="unknown-interface",
+        severity=Severity.ERROR,
+        summary=(
+            "A port's type is neither installed nor defined in an interface package of the project."
+        ),
+        why="Without the definition, the port cannot be created, and its uses cannot be checked.",
+        bad="""\
+system: types
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/Strin, qos: command, external: true}}
+""",
+        good="""\
+system: types
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Look up the type of every port."""
+    hints: dict[tuple[str, str], str | None] = {}
+    for node in context.system.nodes:
+        for port in node.ports:
+            name = port.interface
+            if is_unresolved(name.value) or context.interfaces.find(name.value) is not None:
+                continue
+            problem = context.interfaces.problem(name.value)
+            if problem is not None:
+                yield _invalid(context, port, problem)
+                continue
+            key = (name.value, port.kind.channel.interface_folder)
+            if key not in hints:
+                hints[key] = _hint(context, port)
+            yield Diagnostic(
+                RULE,
+                f"there is no {_word(port)} type '{name}'",
+                name.span,
+                hint=hints[key],
+            )
+
+
+def _invalid(context: Context, port: Port, problem: InvalidDefinition) -> Diagnostic:
+    """Report an error in a definition: in its file, if that is one of the project."""
+    used = port.interface.span
+    if context.interfaces.source_folder(problem.name) is None or not problem.path:
+        return Diagnostic(RULE, str(problem), used, hint=f"see {shown(problem.place, limit=300)}")
+    label = Label(used, f"'{port.name}' has this type")
+    return Diagnostic(RULE, str(problem), problem.span, (label,))
+
+
+def _word(port: Port) -> str:
+    return {"msg": "message"}.get(port.kind.channel.interface_folder, port.kind.channel.value)
+
+
+def _hint(context: Context, port: Port) -> str | None:
+    folder = port.kind.channel.interface_folder
+    name = port.interface.value
+    package, slash, rest = name.partition("/")
+    known = context.interfaces.names(folder)
+    full = f"{package}/{folder}/{rest.rpartition('/')[2]}"
+    if full in known:
+        return f"write '{full}'"
+    incomplete = context.interfaces.folder_without_manifest(package)
+    if incomplete is not None:
+        return f"'{shown_path(incomplete)}' has no package.xml: add one that names '{package}'"
+    hint = similar_interface(full if slash else name, known)
+    if hint is not None or not slash:
+        return hint or f"include the package, as in std_msgs/{folder}/Name"
+    source = "or put its source into the folder 'interfaces'"
+    return f"install the package '{shown(package)}', {source}"

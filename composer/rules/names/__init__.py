@@ -1,0 +1,1 @@
+"""Names that are invalid in ROS, that collide, or that surprise."""

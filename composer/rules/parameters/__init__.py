@@ -1,0 +1,1 @@
+"""Types, ranges and declarations of parameters."""

@@ -1,0 +1,1 @@
+"""The Python code of behaviors: syntax, imports, names and types."""

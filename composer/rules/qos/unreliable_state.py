@@ -1,0 +1,64 @@
+"""A transient-local endpoint that is best effort."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.model import ChannelKind
+from composer.qos import Durability, QosProfile, Reliability
+
+RULE = register(
+    Rule(
+        code="RC532",
+        name="unreliable-state",
+        severity=Severity.WARNING,
+        summary="A publisher or subscription is transient local, but best effort.",
+        why=(
+            "Messages from before a subscription existed are sent to it as lost ones are: again. "
+            "Best effort sends nothing again, so late joiners do not get the last message."
+        ),
+        bad="""\
+system: state
+nodes:
+  robot:
+    publishers:
+      mode:
+        type: std_msgs/msg/String
+        qos: {durability: transient_local, reliability: best_effort}
+        external: true
+""",
+        good="""\
+system: state
+nodes:
+  robot:
+    publishers:
+      mode:
+        type: std_msgs/msg/String
+        qos: {durability: transient_local, reliability: reliable}
+        external: true
+""",
+    )
+)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Check the QoS of every publisher and subscription; a shared profile is reported once."""
+    for node in context.system.nodes:
+        for port in node.ports:
+            qos = port.qos
+            if port.kind.channel is ChannelKind.TOPIC and qos.known and _is_lost(qos.profile):
+                yield Diagnostic(
+                    RULE,
+                    "'transient_local' has no effect with 'best_effort': late joiners get nothing",
+                    qos.policy_span("reliability"),
+                    hint="use 'reliable', or 'volatile'",
+                )
+
+
+def _is_lost(profile: QosProfile) -> bool:
+    return (profile.durability, profile.reliability) == (
+        Durability.TRANSIENT_LOCAL,
+        Reliability.BEST_EFFORT,
+    )

@@ -1,0 +1,1 @@
+"""Periods, latencies, and the load of executors."""
