@@ -89,7 +89,18 @@ def join(namespace: str, relative: str) -> str:
     if relative.startswith("/"):
         return relative
     base = "/" + namespace.strip("/")
-    return f"{base.rstrip('/')}/{relative}" if relative else base
+    return join_node_name(base, relative) if relative else base
+
+
+def join_node_name(namespace: str, name: str) -> str:
+    """Return the full name of a node."""
+    return f"{namespace.rstrip('/')}/{name}"
+
+
+def split_node_name(full_name: str) -> tuple[str, str]:
+    """Return the namespace and the name of a node."""
+    namespace, _, name = full_name.rpartition("/")
+    return namespace or "/", name
 
 
 def is_hidden(name: str) -> bool:

@@ -18,7 +18,7 @@ from composer.fast_dataclass import dataclass
 from composer.names import namespace_problem
 from composer.project import OUTSIDE_HINT, Project
 from composer.schema.kinds import SYSTEM, check_kind
-from composer.source import Located, SourceFile
+from composer.source import Located, SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, Tree
 
 _PREFIX = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -33,6 +33,7 @@ class Include:
     placement: Placement
     arguments: dict[str, Entry]
     overrides: Mapping | None
+    naming: Span  # of what decides the names of its nodes: its prefix, or the file
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,13 +52,14 @@ def read_include(tree: Tree, diagnostics: list[Diagnostic]) -> Include | None:
     if file is None or _is_opaque(file.value):
         return None
     if entry is None:
-        return Include(file, Placement(), {}, None)
+        return Include(file, Placement(), {}, None, file.span)
     variables, overrides = entry.get("variables"), entry.get("overrides")
     return Include(
         file,
         Placement(_prefix(entry, diagnostics), _namespace(entry, diagnostics)),
         {item.name: item for item in variables} if isinstance(variables, Mapping) else {},
         overrides if isinstance(overrides, Mapping) else None,
+        file.span if (prefix := entry.get("prefix")) is None else prefix.span,
     )
 
 

@@ -69,9 +69,14 @@ class IncludeResolver:
             for item in (includes.items if isinstance(includes, Sequence) else ())
             if (part := self._part(item, file)) is not None
         ]
-        # The copies of an include with an error may have the same names because of it.
-        conflicts: list[Diagnostic] = [] if self.is_partial else self.diagnostics
-        return self._expand_wildcards(join_parts(expanded, parts, conflicts))
+        conflicts: list[Diagnostic] = []
+        joined = join_parts(expanded, parts, conflicts)
+        # The copies of an include with an error may have the same names because of it, and an
+        # entry with an error may differ from another one because of it.
+        if not self.is_partial:
+            wrong = {_line(item) for item in self.diagnostics}
+            self.diagnostics += (item for item in conflicts if not _lines(item) & wrong)
+        return self._expand_wildcards(joined)
 
     def _part(self, item: Tree, includer: SystemFile) -> Part | None:
         include = read_include(item, self.diagnostics)
@@ -102,7 +107,7 @@ class IncludeResolver:
             tree = apply_overrides(tree, include.overrides, file.source, diagnostics)
             diagnostics += check_schema(tree, SYSTEM)
         merged = add_namespace(tree, include.placement, self._folder(), file.path.parent)
-        return Part(merged, span)
+        return Part(merged, include.naming)
 
     def _is_cycle(self, file: SystemFile) -> bool:
         """Return whether ``file`` is being merged already, and report the cycle."""
@@ -157,6 +162,16 @@ def _cycle(frames: list[_Frame]) -> Diagnostic:
 def system_file(tree: Mapping, source: SourceFile, folder: Path) -> SystemFile:
     """Return the file of the including system."""
     return SystemFile(folder / Path(source.path).name, source, tree)
+
+
+def _line(diagnostic: Diagnostic) -> tuple[str, int]:
+    return diagnostic.primary.file.path, diagnostic.primary.line
+
+
+def _lines(conflict: Diagnostic) -> set[tuple[str, int]]:
+    """Return the lines of the entries in conflict, as they are usually written."""
+    spans = (conflict.primary, *(label.span for label in conflict.related))
+    return {(span.file.path, span.line) for span in spans}
 
 
 def _is_in_section(span: Span, name: str, tree: Mapping) -> bool:

@@ -17,6 +17,7 @@ _MAPS = {
     "qos_profiles": "QoS profile",
     "executors": "executor",
     "processes": "process",
+    "hosts": "host",
     "nodes": "node",
     "chains": "chain",
 }
@@ -26,12 +27,13 @@ _SEVERAL = 2
 _SYSTEM_SETTINGS: dict[tuple[str, ...], ScalarValue] = {
     ("lifecycle", "implied_dependencies"): True,
     ("delivery",): "auto",
+    ("discovery", "kind"): "multicast",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A merged file, and the place that includes it."""
+    """A merged file, and the place that decides the names of its nodes."""
 
     tree: Mapping
     span: Span

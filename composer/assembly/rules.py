@@ -70,8 +70,8 @@ INCLUDE_CONFLICT = register(
         name="include-conflict",
         summary="Two files of a system define the same name differently.",
         why=(
-            "QoS profiles, executors, processes and chains are shared by all files of a system. "
-            "One definition would silently win; use 'overrides' of the include to choose."
+            "QoS profiles, executors, processes, hosts and chains are shared by all files of a "
+            "system. One definition would silently win; use 'overrides' of the include to choose."
         ),
         bad="""\
 # file: fleet.yaml

@@ -4,6 +4,9 @@ The model does not check anything. A reference to a missing entity stays as writ
 report it.
 """
 
+from composer.model.channels import Channel, PortOfNode, channels
+from composer.model.discovery import Discovery, DiscoveryKind
+from composer.model.hosts import Host
 from composer.model.implementation import (
     BehaviorReference,
     Executable,
@@ -48,7 +51,6 @@ from composer.model.supervision import (
 from composer.model.system import (
     DEFAULT_EXECUTOR,
     Chain,
-    Channel,
     Connection,
     Dependency,
     Endpoint,
@@ -56,14 +58,22 @@ from composer.model.system import (
     ExecutorKind,
     NamedQos,
     Node,
-    PortOfNode,
     PrimaryState,
     QosReference,
     Remapping,
     System,
     UnknownKey,
     UnmatchedParameters,
-    channels,
+)
+from composer.model.transforms import (
+    POSE_TYPES,
+    TF_STATIC_TOPIC,
+    TF_TOPIC,
+    TF_TYPE,
+    DynamicTransform,
+    StaticTransform,
+    Transforms,
+    transform_ports,
 )
 
 __all__ = [
@@ -71,6 +81,10 @@ __all__ = [
     "DEFAULT_INTROSPECTION",
     "DEFAULT_SUPERVISION",
     "DRIVEN_BY_MANAGER",
+    "POSE_TYPES",
+    "TF_STATIC_TOPIC",
+    "TF_TOPIC",
+    "TF_TYPE",
     "USE_SIM_TIME",
     "BehaviorReference",
     "Chain",
@@ -79,6 +93,9 @@ __all__ = [
     "Connection",
     "Delivery",
     "Dependency",
+    "Discovery",
+    "DiscoveryKind",
+    "DynamicTransform",
     "Endpoint",
     "Event",
     "Executable",
@@ -87,6 +104,7 @@ __all__ = [
     "ExecutorKind",
     "External",
     "FeedbackSteps",
+    "Host",
     "HostedClass",
     "ImplementationKind",
     "Introspection",
@@ -112,13 +130,16 @@ __all__ = [
     "Remapping",
     "RestartBudget",
     "Send",
+    "StaticTransform",
     "Supervision",
     "System",
     "Timer",
     "TimerClock",
+    "Transforms",
     "UnknownKey",
     "UnmatchedParameters",
     "Watch",
     "channels",
     "member_system",
+    "transform_ports",
 ]

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from heapq import heappop, heappush
 
 from composer.fast_dataclass import dataclass
+from composer.model.channels import channels
 from composer.model.ports import ChannelKind
-from composer.model.system import PrimaryState, System, channels
+from composer.model.system import PrimaryState, System
 
 
 @dataclass(frozen=True, slots=True)

@@ -173,6 +173,8 @@ class Port:
     delivery: Delivery | None = None  # set by its connection; None: the system's
     isolation: Isolation = Isolation.SHARE
     required: bool | None = None  # whether another endpoint must exist; None: not set
+    connected_at: Span | None = field(default=None, compare=False)  # the name of its connection
+    declared_qos: Qos | None = field(default=None, compare=False)  # if its connection sets another
     description: str = ""
 
     def reaction(self, event: Event) -> Reaction | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ from composer.fast_dataclass import dataclass
 from composer.source import Located, Span
 
 if TYPE_CHECKING:
-    from composer.model.system import System
+    from composer.model.system import Node, PrimaryState, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,26 +32,32 @@ class Process:
     host: Located[str] | None = None
 
 
-def member_system(system: System, process: str) -> System:
+def member_system(
+    system: System, process: str, goals: Mapping[str, PrimaryState] | None = None
+) -> System:
     """Return the part of a system that one of its processes runs, as a system of its own.
 
     The process that runs the whole system coordinates it: it decides when nodes of this part are
     brought up, and how their failures are handled. So they have no dependencies here, stay
-    unconfigured at first, and are only taken down if they fail.
+    unconfigured at first, and are only taken down if they fail. ``goals`` are the states in which
+    nodes of the whole system start: the highest that the coordinating process brings them to.
     """
+    limits = goals or {}
     nodes = tuple(
         replace(
             node,
             process=None,
             depends_on=(),
-            autostart=None,
+            autostart=_located(node, limits.get(node.name.value)),
             supervision=replace(node.supervision, on_failure=None),
         )
         for node in system.nodes
         if node.process is not None and node.process.value == process
     )
+    discovery = system.discovery and replace(system.discovery, start=False)
     return replace(
         system,
+        discovery=discovery,
         name=system.name.map(lambda name: f"{name}/{process}"),
         nodes=nodes,
         connections=(),
@@ -58,3 +65,7 @@ def member_system(system: System, process: str) -> System:
         supervision=replace(system.supervision, on_failure=None),
         processes=(),
     )
+
+
+def _located(node: Node, goal: PrimaryState | None) -> Located[PrimaryState] | None:
+    return None if goal is None else node.name.map(lambda _: goal)

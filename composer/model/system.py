@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 from composer.fast_dataclass import dataclass
+from composer.model.discovery import Discovery
+from composer.model.hosts import Host
 from composer.model.implementation import (
     BehaviorReference,
     Executable,
@@ -33,6 +35,8 @@ from composer.model.ports import (
 )
 from composer.model.processes import Process
 from composer.model.supervision import DEFAULT_SUPERVISION, Supervision
+from composer.model.transforms import Transforms
+from composer.names import join_node_name
 from composer.source import Located, SourceFile, Span
 from composer.tree import Plain
 
@@ -121,8 +125,11 @@ class Node:
     executable: Executable | None = None
     external: External | None = None  # takes precedence over the implementation of its type
     parameters: tuple[Parameter, ...] = ()
+    #: With the values of parameter files that the system replaces.
+    overridden_parameters: tuple[Parameter, ...] = field(default=(), compare=False)
     ports: tuple[Port, ...] = ()
     timers: tuple[Timer, ...] = ()
+    transforms: Transforms | None = None
     state: tuple[tuple[Located[str], Plain], ...] = ()
     reactions: tuple[tuple[Event, Reaction], ...] = ()
     remappings: tuple[Remapping, ...] = ()
@@ -134,6 +141,7 @@ class Node:
     supervision: Supervision = DEFAULT_SUPERVISION
     introspection: Introspection = DEFAULT_INTROSPECTION
     unknown: tuple[UnknownKey, ...] = ()
+    given: tuple[Located[str], ...] = field(default=(), compare=False)  # the keys of its entry
     complete: bool = True  # False: its type is unknown or invalid
     _ports: dict[str, Port] = field(init=False, repr=False, compare=False)
 
@@ -166,11 +174,24 @@ class Node:
     @property
     def full_name(self) -> str:
         """The full name of the node in ROS."""
-        return f"{self.namespace.value.rstrip('/')}/{self.ros_name.value}"
+        return join_node_name(self.namespace.value, self.ros_name.value)
 
     def port(self, name: str) -> Port | None:
         """Return the port called ``name``, or None."""
         return self._ports.get(name)
+
+    @property
+    def all_ports(self) -> tuple[Port, ...]:
+        """The ports, and those on /tf and /tf_static that follow from ``transforms``."""
+        return self.ports if self.transforms is None else self.ports + self.transforms.ports
+
+    @property
+    def visible_ports(self) -> tuple[Port, ...]:
+        """The same, as ROS tools see them: the manager listens to /tf for our own nodes."""
+        kinds = (ImplementationKind.BEHAVIOR, ImplementationKind.DECLARATIVE)
+        if self.transforms is None or self.implementation not in kinds:
+            return self.all_ports
+        return self.ports + self.transforms.publishers
 
     def ports_of(self, *kinds: PortKind) -> tuple[Port, ...]:
         """Return the ports of the given kinds, in order."""
@@ -311,6 +332,8 @@ class System:
     qos_references: tuple[QosReference, ...] = ()
     executors: tuple[Executor, ...] = ()
     processes: tuple[Process, ...] = ()
+    hosts: tuple[Host, ...] = ()
+    discovery: Discovery | None = None
     autostart: PrimaryState = PrimaryState.ACTIVE
     supervision: Supervision = DEFAULT_SUPERVISION
     implied_dependencies: bool = True
@@ -333,46 +356,3 @@ class System:
         """Return the port of an endpoint, or None."""
         node = self.node(endpoint.node)
         return node.port(endpoint.port) if node is not None else None
-
-
-@dataclass(frozen=True, slots=True)
-class PortOfNode:
-    """A port together with its node."""
-
-    node: Node
-    port: Port
-
-
-@dataclass(frozen=True, slots=True)
-class Channel:
-    """A topic, service or action with all ports of the system that use it."""
-
-    kind: ChannelKind
-    name: str
-    sources: tuple[PortOfNode, ...]  # publishers or servers
-    sinks: tuple[PortOfNode, ...]  # subscriptions or clients
-
-    @property
-    def ends(self) -> tuple[PortOfNode, ...]:
-        """All ports of the channel, sources first."""
-        return self.sources + self.sinks
-
-
-_SOURCES = (PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER)
-
-
-def channels(nodes: Iterable[Node]) -> tuple[Channel, ...]:
-    """Return all topics, services and actions of the nodes, sorted by kind and name."""
-    ends: dict[tuple[ChannelKind, str], list[PortOfNode]] = {}
-    for node in nodes:
-        for port in node.ports:
-            ends.setdefault((port.kind.channel, port.full_name), []).append(PortOfNode(node, port))
-    return tuple(
-        Channel(
-            kind,
-            name,
-            tuple(end for end in joined if end.port.kind in _SOURCES),
-            tuple(end for end in joined if end.port.kind not in _SOURCES),
-        )
-        for (kind, name), joined in sorted(ends.items())
-    )

@@ -15,9 +15,11 @@ from composer.plan.reconciliation import (
     reconcile,
 )
 from composer.plan.steps import Plan, Step, TransitionName
+from composer.plan.system_goals import STOPPED, SystemGoals, parse_goals, system_goals
 from composer.plan.transitions import plan_transitions
 
 __all__ = [
+    "STOPPED",
     "Decision",
     "DesiredState",
     "Fault",
@@ -25,14 +27,17 @@ __all__ = [
     "Plan",
     "Restart",
     "Step",
+    "SystemGoals",
     "TransitionName",
     "blocked_nodes",
     "bring_up",
     "decide",
     "desired_states",
+    "parse_goals",
     "plan_transitions",
     "reconcile",
     "start_causes",
     "start_goals",
+    "system_goals",
     "tear_down",
 ]

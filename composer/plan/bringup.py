@@ -21,14 +21,18 @@ def bring_up(system: System, autostart: PrimaryState | None = None) -> Plan:
     return plan_transitions(system, states, start_goals(system, goal), start_causes(system, goal))
 
 
-def tear_down(system: System) -> Plan:
+def tear_down(system: System, process: str | None = None) -> Plan:
     """Return the plan that deactivates, cleans up and shuts down every node.
+
+    With ``process``, those that this process of the system runs, in the order of the whole system.
 
     Each phase runs in reverse bring-up order. The plan assumes a system that is fully up; skip the
     steps that a node's current state does not allow.
     """
     edges = dependency_edges(system)
     order = nodes_of(system, reversed(in_dependency_order(system, edges)))
+    if process is not None:
+        order = tuple(node for node in order if node.process and node.process.value == process)
     return build_plan(
         (
             Phase("deactivate", order, downward(edges, PrimaryState.ACTIVE)),

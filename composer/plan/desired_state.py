@@ -28,6 +28,7 @@ class FaultKind(StrEnum):
     CALLBACK = "callback"  # took too long and was interrupted
     ERRORS = "errors"  # too many of them
     ENDED = "ended"  # a process or an external node, by itself
+    ABSENT = "absent"  # ended, and only what has started it can start it again
     LOST = "lost"  # a callback does not return and cannot be interrupted
 
 
@@ -64,7 +65,7 @@ class DesiredState:
 
     ``serial`` is the number of the last external transition or failure; ``moved`` and ``failed``
     are the numbers of the last external transition of each node, and of the failure that keeps it
-    down.
+    down. ``activity`` is that of the system with these goals: "running", "paused" or "reset".
     """
 
     goals: Mapping[str, PrimaryState]
@@ -75,6 +76,7 @@ class DesiredState:
     serial: int = 0
     moved: Mapping[str, int] = field(default_factory=dict)
     failed: Mapping[str, int] = field(default_factory=dict)
+    activity: str = "running"
 
     @property
     def next_restart(self) -> Restart | None:
@@ -90,16 +92,20 @@ class DesiredState:
         return self.failed.get(failed, 0) >= self.moved.get(node, 0)
 
     def with_goals(
-        self, goals: Mapping[str, PrimaryState], since: int | None = None
+        self,
+        goals: Mapping[str, PrimaryState],
+        since: int | None = None,
+        activity: str = "",
     ) -> DesiredState:
-        """Return a copy with new goals for some of the nodes.
+        """Return a copy with new goals for some of the nodes, and perhaps another activity.
 
         ``since`` is the serial number at which the goals were requested: nodes that have been moved
         externally after that keep theirs.
         """
         since = self.serial if since is None else since
         new = {name: goal for name, goal in goals.items() if not self.has_moved(name, since)}
-        return replace(self, goals={**self.goals, **new})
+        merged = {**self.goals, **new}
+        return replace(self, goals=merged, activity=activity or self.activity)
 
     def move(self, node: str, state: PrimaryState) -> DesiredState:
         """Return a copy after an external transition: the new state is the goal of the node.

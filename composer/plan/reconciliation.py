@@ -33,13 +33,18 @@ class Decision:
 
 
 def decide(system: System, desired: DesiredState, fault: Fault, now_s: float) -> Decision | None:
-    """Return how to handle ``fault``; None if the node is unknown or already kept down."""
+    """Return how to handle ``fault``; None if the node is unknown or already kept down.
+
+    An absent node cannot be restarted, and is isolated until it returns.
+    """
     node = system.node(fault.node)
     if node is None or fault.node in desired.down:
         return None
     policy = node.supervision.policy
     if policy is not OnFailure.RESTART:
         return Decision(policy, fault.text)
+    if fault.kind is FaultKind.ABSENT:
+        return Decision(OnFailure.ISOLATE, fault.text)
     if fault.kind is FaultKind.LOST:
         return Decision(OnFailure.SHUTDOWN, f"{fault.text}; it cannot be restarted")
     restart = node.supervision.restart
@@ -54,6 +59,8 @@ def decide(system: System, desired: DesiredState, fault: Fault, now_s: float) ->
 
 def desired_states(system: System, desired: DesiredState) -> Mapping[str, PrimaryState]:
     """Return the desired state of every node while the failed ones are kept down."""
+    if not desired.down:
+        return desired.goals
     blocked = blocked_nodes(system, desired)
     goals = dict(desired.goals)
     for name, goal in desired.goals.items():
@@ -70,6 +77,8 @@ def blocked_nodes(system: System, desired: DesiredState) -> Mapping[str, str]:
     A node that an external transition has moved since the failure is not among them.
     """
     blocked: dict[str, str] = {}
+    if not desired.down:
+        return blocked
     for name, needs in _needs(system):
         for edge in needs:
             if name in desired.down or name in blocked:
@@ -89,13 +98,14 @@ def reconcile(
 
     ``why`` is the cause of each step that is not caused by a failed node.
     """
+    goals = desired_states(system, desired)
+    if all(goals.get(name, at) is at for name, at in states.items()):
+        return Plan(())
     blocked = blocked_nodes(system, desired)
     causes = {node.name.value: why for node in system.nodes}
     causes |= {name: f"it needs {failed}, which is down" for name, failed in blocked.items()}
     causes |= desired.down
-    return plan_transitions(
-        system, states, _reachable(system, states, desired_states(system, desired)), causes
-    )
+    return plan_transitions(system, states, _reachable(system, states, goals), causes)
 
 
 def _reachable(

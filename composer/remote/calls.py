@@ -14,9 +14,9 @@ from rclpy.task import Future
 
 from composer.fast_dataclass import dataclass
 from composer.remote.graph_names import type_mismatch_hint
+from composer.remote.messages.values import build_message, class_of
 from composer.remote.requests import ServiceCaller
 from composer.remote.session import Deadline, NoResponseError, RosError, Session
-from composer.remote.values import build_message, class_of
 
 _STATUS = {
     GoalStatus.STATUS_SUCCEEDED: "succeeded",

@@ -5,24 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from composer.fast_dataclass import dataclass
 from composer.names import is_hidden
 from composer.remote.name_matching import find_node, full_name, not_found_error
 from composer.remote.session import Deadline, RosError, Session
 from composer.runtime.process.query_socket import NameAndTypes, visible
+from composer.runtime.ros.action_info import ActionInfo, action_info
 from composer.runtime.ros.node_info import NodeInfo, node_info
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True)
-class ActionInfo:
-    """The nodes with a server or client of an action."""
-
-    name: str
-    types: tuple[str, ...]
-    servers: tuple[str, ...]
-    clients: tuple[str, ...]
 
 
 class GraphNames:
@@ -51,7 +41,8 @@ class GraphNames:
     def action(self, name: str) -> ActionInfo:
         """Return the servers and clients of an action. Raises NotFoundError."""
         types = self.types("action", name)
-        return self._settled(lambda: self._action_info(full_name("action", name), types))
+        absolute = full_name("action", name)
+        return self._settled(lambda: action_info(self._graph, absolute, types))
 
     def find_node(self, name: str) -> str:
         """Return the full name of the node that ``name`` refers to. Raises NotFoundError."""
@@ -89,14 +80,6 @@ class GraphNames:
 
     def _nodes(self) -> tuple[str, ...]:
         return tuple(name for name, _ in self._graph.names("node"))
-
-    def _action_info(self, name: str, types: tuple[str, ...]) -> ActionInfo:
-        servers, clients = [], []
-        for node in self._nodes():
-            info = node_info(self._graph, node, hidden=True)
-            servers += [node for found, _ in info.action_servers if found == name]
-            clients += [node for found, _ in info.action_clients if found == name]
-        return ActionInfo(name, types, tuple(servers), tuple(clients))
 
 
 def type_mismatch_hint(session: Session, kind: str, name: str, type_name: str) -> str | None:

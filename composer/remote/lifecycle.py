@@ -18,7 +18,6 @@ from rclpy.type_support import check_is_valid_srv_type
 
 from composer.fast_dataclass import dataclass
 from composer.remote.name_matching import check_all_respond, find_node, not_found_error
-from composer.remote.proxies import LIFECYCLE, Proxies
 from composer.remote.requests import (
     Call,
     call_all_with_retries,
@@ -26,6 +25,7 @@ from composer.remote.requests import (
     call_with_retries,
 )
 from composer.remote.session import Deadline, NoResponseError, RosError, Session
+from composer.remote.systems.proxies import LIFECYCLE, Proxies
 
 PRIMARY_STATES = ("unconfigured", "inactive", "active", "finalized")
 _PATTERN = re.compile(r"[*?\[]")

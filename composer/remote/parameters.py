@@ -16,7 +16,6 @@ from rclpy.parameter import Parameter
 
 from composer.diagnostics import suggestion
 from composer.remote.graph_names import GraphNames
-from composer.remote.proxies import PARAMETERS, Proxies
 from composer.remote.requests import (
     Call,
     call_all_with_retries,
@@ -24,6 +23,7 @@ from composer.remote.requests import (
     call_with_retries,
 )
 from composer.remote.session import Deadline, NoResponseError, RosError, Session
+from composer.remote.systems.proxies import PARAMETERS, Proxies
 from composer.runtime.ros.manager_protocol import full_parameter_name
 from composer.runtime.ros.parameter_description import ParameterDescription
 from composer.runtime.ros.parameter_values import NOT_SET, description, plain_value

@@ -17,6 +17,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from composer.runtime.process import dds_profiles, start_refused
@@ -131,6 +133,22 @@ class Session:
         self._executor.shutdown(timeout_sec=1.0)
         self.node.destroy_node()
         self._context.try_shutdown()
+
+    def subscribe(
+        self,
+        message_type: type[Any],
+        topic: str,
+        callback: Callable[[Any], None],
+        qos: QoSProfile,
+        *,
+        raw: bool = False,
+    ) -> Subscription:
+        """Call ``callback(message)`` for each message; with ``raw``, for its serialized bytes."""
+        return self.node.create_subscription(message_type, topic, callback, qos, raw=raw)
+
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """Destroy a subscription of :meth:`subscribe`."""
+        self.node.destroy_subscription(subscription)
 
     def others(self) -> tuple[NodeName, ...]:
         """Return name and namespace of every known node except those of commands."""

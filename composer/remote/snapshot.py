@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Self, TypeAlias
+from collections.abc import Mapping, Sequence
+from typing import Self
 
 from lifecycle_msgs.srv import GetState
 from rcl_interfaces.srv import GetParameters, ListParameters
@@ -12,11 +12,11 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.model import PortKind
 from composer.names import is_hidden
-from composer.remote.proxies import LIFECYCLE, PARAMETERS, Proxies
-from composer.remote.rate_sampling import RateMeter
+from composer.remote.messages.rate_sampling import RateMeter
 from composer.remote.requests import ServiceCaller
 from composer.remote.session import Deadline, Session
-from composer.runtime.ros.graph import RosGraph
+from composer.remote.systems.proxies import LIFECYCLE, PARAMETERS, Proxies
+from composer.runtime.ros.endpoints_by_node import endpoints, node_names, visible_topics
 from composer.runtime.ros.manager_protocol import full_parameter_name
 from composer.runtime.ros.parameter_values import plain_value
 from composer.tree import Plain
@@ -25,8 +25,6 @@ from composer.tree import Plain
 _RESPONSE_S = 2.0
 _STATE_TYPE = "lifecycle_msgs/srv/GetState"
 _LIST_TYPE = "rcl_interfaces/srv/ListParameters"
-
-_Ends: TypeAlias = dict[str, list[ObservedEndpoint]]
 
 
 class GraphObserver:
@@ -49,7 +47,7 @@ class GraphObserver:
         session = self._session
         graph = session.graph
         ends = dict(session.wait_until_settled(lambda: endpoints(graph), deadline))
-        counts = Counter(_names(graph))
+        counts = Counter(node_names(graph))
         services = _services(ends)
         self._proxies.discover(self._response_deadline(deadline))
         states = self._states(services, deadline) | self._proxy_states()
@@ -82,7 +80,7 @@ class GraphObserver:
         """
         if measure_s <= 0.0:
             return {}
-        with RateMeter(self._session, _topics(self._session.graph)) as meter:
+        with RateMeter(self._session, visible_topics(self._session.graph)) as meter:
             return meter.measure(min(measure_s, deadline.left_s))
 
     def _states(
@@ -172,48 +170,3 @@ def _offering(services: dict[str, dict[str, str]], last: str, type_name: str) ->
         for node, offered in services.items()
         if offered.get(f"{node}/{last}") == type_name
     }
-
-
-def endpoints(graph: RosGraph) -> tuple[tuple[str, tuple[ObservedEndpoint, ...]], ...]:
-    """Return the nodes discovered so far with their endpoints, as a hashable value."""
-    ends = _endpoints_by_node(graph)
-    return tuple((name, tuple(ends[name])) for name in sorted(ends))
-
-
-def _endpoints_by_node(graph: RosGraph) -> _Ends:
-    ends: _Ends = {name: [] for name in _names(graph)}
-    for topic, types in _topics(graph).items():
-        info = graph.topic(topic, types)
-        for kind, found in (
-            (PortKind.PUBLISHER, info.publishers),
-            (PortKind.SUBSCRIPTION, info.subscriptions),
-        ):
-            for end in found:
-                if end.node in ends:
-                    ends[end.node].append(ObservedEndpoint(kind, topic, end.type, end.qos))
-    for name, of_node in ends.items():
-        of_node.extend(_services_and_actions(graph, name))
-        of_node.sort(key=lambda end: (list(PortKind).index(end.kind), end.name, end.type))
-    return ends
-
-
-def _services_and_actions(graph: RosGraph, full_name: str) -> Iterator[ObservedEndpoint]:
-    namespace, _, name = full_name.rpartition("/")
-    node = (name, namespace or "/")
-    for kind, query in (
-        (PortKind.SERVICE, graph.services_of),
-        (PortKind.CLIENT, graph.clients_of),
-        (PortKind.ACTION_SERVER, graph.action_servers_of),
-        (PortKind.ACTION_CLIENT, graph.action_clients_of),
-    ):
-        for found, types in query(node):
-            if not is_hidden(found):
-                yield from (ObservedEndpoint(kind, found, type_name) for type_name in types)
-
-
-def _names(graph: RosGraph) -> list[str]:
-    return [f"{namespace.rstrip('/')}/{name}" for name, namespace in graph.nodes()]
-
-
-def _topics(graph: RosGraph) -> dict[str, tuple[str, ...]]:
-    return {name: types for name, types in sorted(graph.topics()) if not is_hidden(name)}

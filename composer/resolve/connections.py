@@ -20,6 +20,7 @@ from composer.model import (
 from composer.names import join
 from composer.resolve.qos import QosTable, implicit_qos
 from composer.resolve.tree_values import choice, entries, is_opaque, key, number, text, texts
+from composer.source import Span
 from composer.tree import Entry, Mapping, Sequence, Tree
 
 T = TypeVar("T")
@@ -37,6 +38,7 @@ class PortConnection:
 
     kind: ChannelKind
     full_name: str
+    span: Span  # of the name
     qos: Qos | None
     delivery: Delivery | None = None
     isolation: Isolation | None = None
@@ -60,6 +62,7 @@ def read_connections(
         given = (
             connection.kind,
             full_name(connection.name.value, namespace),
+            connection.name.span,
             _profile(item, connection.kind, qos),
             connection.delivery.value if connection.delivery else None,
             connection.isolation.value if connection.isolation else None,
@@ -95,6 +98,7 @@ def connection_of(port: Port, port_connections: Iterable[PortConnection]) -> Por
     return PortConnection(
         first.kind,
         first.full_name,
+        first.span,
         _first(connection.qos for connection in same),
         _first(connection.delivery for connection in same),
         _first(connection.isolation for connection in same),

@@ -10,6 +10,7 @@ from composer.model import (
     Port,
     PortKind,
     Timer,
+    Transforms,
     UnknownKey,
 )
 from composer.resolve.implementation import Implementation, read_implementation
@@ -18,6 +19,7 @@ from composer.resolve.ports import read_ports, read_timers
 from composer.resolve.qos import QosTable
 from composer.resolve.reactions import NODE_EVENTS, Events, node_reactions
 from composer.resolve.source_folders import SourceFolders
+from composer.resolve.transforms import merged_transforms, read_transforms
 from composer.resolve.tree_values import entries, key, plain_text
 from composer.source import Located
 from composer.tree import Entry, Mapping, Plain, Tree, plain
@@ -35,6 +37,7 @@ class Declaration:
     state: tuple[tuple[Located[str], Plain], ...]
     reactions: Events
     introspection: Tree | None = None
+    transforms: Transforms | None = None
 
 
 def declare(
@@ -50,12 +53,14 @@ def declare(
         state=tuple((key(entry), plain(entry.value)) for entry in entries(tree.get("state"))),
         reactions=node_reactions(tree, diagnostics),
         introspection=tree.get("introspection"),
+        transforms=read_transforms(tree.entry("transforms")),
     )
 
 
 _REFINED_SECTIONS = (*(kind.section for kind in PortKind), "timers")
 _REPLACED_KEYS = ("description", *(name for name, _ in NODE_EVENTS))
 _OVERLAID_KEYS = ("state", "arguments", "executable")
+_TRANSFORMS = "transforms"
 _PERIOD_KEYS = frozenset(unit.value for unit in PeriodUnit)
 
 
@@ -65,6 +70,7 @@ def refines(instance: Mapping) -> bool:
         entry.name in _REFINED_SECTIONS
         or entry.name in _REPLACED_KEYS
         or entry.name in _OVERLAID_KEYS
+        or entry.name == _TRANSFORMS
         for entry in instance
     )
 
@@ -83,6 +89,8 @@ def refined(declared: Mapping, instance: Mapping) -> Mapping:
         elif entry.name in _OVERLAID_KEYS:
             name = entry.name
             changed[name] = _overlaid(changed[name], entry) if name in changed else entry
+        elif entry.name == _TRANSFORMS:
+            changed[_TRANSFORMS] = merged_transforms(changed.get(_TRANSFORMS), entry)
         elif entry.name in _REPLACED_KEYS:
             changed[entry.name] = entry
     return Mapping(tuple(changed.values()), declared.span)

@@ -19,6 +19,7 @@ from composer.model import (
     PrimaryState,
     Remapping,
     Supervision,
+    Transforms,
     UnknownKey,
 )
 from composer.names import expand_name, join
@@ -89,13 +90,22 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
     known = frozenset(parameter.name.value for parameter in declared.parameters)
     has_use_sim_time = type_entry is None and USE_SIM_TIME in known
     given = {} if has_use_sim_time else {item.name: item for item in context.use_sim_time}
-    given |= context.parameter_files.given(join(namespace.value, ros_name), known)
+    full_name = join(namespace.value, ros_name)
+    given |= context.parameter_files.given(full_name, known)
+    own_values: dict[str, Entry] = {}
     if type_entry is not None:
-        given |= {item.name: item for item in entries(tree.get("parameters"))}
+        own_values = {item.name: item for item in entries(tree.get("parameters"))}
+    given |= own_values
     given |= context.overrides.by_node.get(entry.name, {})
     own = with_use_sim_time(declared.parameters, given)
     parameters, unknown = with_values(own, given, complete=made.complete)
+    in_file = context.parameter_files.named(full_name)
+    overridden = {name: item for name, item in in_file.items() if name in own_values}
+    replaced, _ = with_values(
+        (item for item in own if item.name.value in overridden), overridden, complete=False
+    )
     remappings = _remappings(tree.get("remappings"))
+    names = NodeNames(entry.name, ros_name, namespace.value)
     lifecycle = tree.get("lifecycle")
     external = read_external(tree.entry("external"))
     lifecycle = lifecycle if isinstance(lifecycle, Mapping) else Mapping((), tree.span)
@@ -113,13 +123,10 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         executable=declared.implementation.executable,
         external=external,
         parameters=parameters,
-        ports=place_ports(
-            declared.ports,
-            NodeNames(entry.name, ros_name, namespace.value),
-            remappings,
-            context.port_connections,
-        ),
+        overridden_parameters=replaced,
+        ports=place_ports(declared.ports, names, remappings, context.port_connections),
         timers=declared.timers,
+        transforms=place_transforms(declared.transforms, names, remappings),
         state=declared.state,
         reactions=declared.reactions,
         remappings=remappings,
@@ -135,6 +142,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
             declared.introspection, context.introspection, tree.get("introspection")
         ),
         unknown=(*made.unknown, *unknown),
+        given=tuple(map(key, tree)),
         complete=made.complete,
     )
 
@@ -184,6 +192,15 @@ def place_ports(
     )
 
 
+def place_transforms(
+    transforms: Transforms | None, names: NodeNames, remappings: Iterable[Remapping]
+) -> Transforms | None:
+    """Return the frames of a node with the full names of /tf and /tf_static in that node."""
+    if transforms is None:
+        return None
+    return replace(transforms, ports=place_ports(transforms.ports, names, remappings, {}))
+
+
 def _place_port(
     port: Port,
     port_connections: Iterable[PortConnection],
@@ -197,7 +214,9 @@ def _place_port(
     return replace(
         port,
         full_name=connection.full_name,
+        connected_at=connection.span,
         qos=connection.qos or port.qos,
+        declared_qos=None if connection.qos is None else port.qos,
         delivery=connection.delivery,
         isolation=connection.isolation or port.isolation,
     )

@@ -35,6 +35,7 @@ def _restart(entry: Entry | None, default: RestartBudget) -> RestartBudget:
         return default
     tree = entry.value
     attempts = integer(tree.get("max_attempts"))
+    backoff = tree.get("backoff_ms") or tree.get("backoff_max_ms")
 
     def milliseconds(name: str, fallback: float) -> float:
         found = number(tree.get(name))
@@ -46,6 +47,7 @@ def _restart(entry: Entry | None, default: RestartBudget) -> RestartBudget:
         backoff_ms=milliseconds("backoff_ms", default.backoff_ms),
         backoff_max_ms=milliseconds("backoff_max_ms", default.backoff_max_ms),
         span=entry.key.span,
+        backoff_span=None if backoff is None else backoff.span,
     )
 
 

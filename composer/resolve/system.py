@@ -17,7 +17,16 @@ from composer.model import (
 from composer.names import join
 from composer.resolve.connections import read_chains, read_connections
 from composer.resolve.declaration import declare
-from composer.resolve.node import NodeNames, SystemContext, place_ports, resolve_node, state
+from composer.resolve.discovery import read_discovery
+from composer.resolve.hosts import read_hosts
+from composer.resolve.node import (
+    NodeNames,
+    SystemContext,
+    place_ports,
+    place_transforms,
+    resolve_node,
+    state,
+)
 from composer.resolve.node_options import read_introspection, read_supervision
 from composer.resolve.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides
@@ -91,6 +100,8 @@ def resolve_system(
         qos_references=tuple(qos.references),
         executors=tuple(_executor(entry) for entry in entries(tree.get("executors"))),
         processes=processes,
+        hosts=read_hosts(tree.get("hosts")),
+        discovery=read_discovery(tree.entry("discovery")),
         autostart=autostart.value if autostart is not None else PrimaryState.ACTIVE,
         supervision=system_supervision,
         delivery=delivery.value if delivery is not None else Delivery.AUTO,
@@ -116,6 +127,7 @@ def resolve_node_type(
     given = overrides.by_node.get(name.value, {})
     own = with_use_sim_time(declared.parameters, given)
     parameters, unknown = with_values(own, given, complete=True)
+    names = NodeNames(name.value, name.value, namespace.value)
     alone = Node(
         name=name,
         namespace=namespace,
@@ -125,10 +137,9 @@ def resolve_node_type(
         hosted_class=declared.implementation.hosted_class,
         executable=declared.implementation.executable,
         parameters=parameters,
-        ports=place_ports(
-            declared.ports, NodeNames(name.value, name.value, namespace.value), (), {}
-        ),
+        ports=place_ports(declared.ports, names, (), {}),
         timers=declared.timers,
+        transforms=place_transforms(declared.transforms, names, ()),
         state=declared.state,
         reactions=declared.reactions,
         introspection=read_introspection(declared.introspection),

@@ -10,11 +10,11 @@
 See docs/decisions/0051-run-logs.md.
 """
 
-from composer.run_log.reading import follow, read
 from composer.run_log.record import Record
 from composer.run_log.rotation import RotatingFile
 from composer.run_log.runs import Run, RunFolder, find_runs
 from composer.run_log.selection import Selection, parse_since
+from composer.run_log.system_log import SystemLog
 
 __all__ = [
     "Record",
@@ -22,8 +22,7 @@ __all__ = [
     "Run",
     "RunFolder",
     "Selection",
+    "SystemLog",
     "find_runs",
-    "follow",
     "parse_since",
-    "read",
 ]

@@ -1,9 +1,8 @@
-"""Read the records of a run, and follow them."""
+"""Read the records of a run, also while it goes on."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -11,50 +10,41 @@ from composer.run_log.record import Record, parse_line
 from composer.run_log.rotation import log_files
 from composer.run_log.runs import Run
 
-_POLL_S = 0.1
 
+class RunReader:
+    """Reads the records of a run, each of them once."""
 
-def read(run: Run) -> Iterator[Record]:
-    """Yield the records that are in the files of a run now. Raises OSError."""
-    for path in log_files(run.folder):
-        try:
-            with path.open("rb") as file:
-                yield from _records(_LineReader(file).lines())
-        except FileNotFoundError:  # removed just now, as the oldest file
-            continue
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._path: Path | None = None
+        self._lines: _LineReader | None = None
 
-
-def follow(run: Run, wait: Callable[[float], None] = time.sleep) -> Iterator[Record]:
-    """Yield the records of a run until its process has ended. Raises OSError.
-
-    ``wait(seconds)`` is called while there are no new ones.
-    """
-    last: Path | None = None
-    while True:
-        is_running = run.is_running()  # first: what it wrote before its end is read below
-        for path in _files_after(run, last):
-            last = path
+    def new(self) -> Iterator[Record]:
+        """Yield the records that have been written since the last call. Raises OSError."""
+        while True:
+            later = self._later_files()  # first: a file with a successor does not grow any more
+            if self._lines is not None:
+                for line in self._lines.lines():
+                    if (record := parse_line(line)) is not None:
+                        yield record
+            if not later:
+                return
+            self.close()
+            self._path = later[0]
             try:
-                with path.open("rb") as file:
-                    yield from _records(_grown_lines(run, path, file, wait))
+                self._lines = _LineReader(self._path.open("rb"))
             except FileNotFoundError:  # removed just now, as the oldest file
                 continue
-        if not is_running and not _files_after(run, last):
-            return
-        if last is None:
-            wait(_POLL_S)
 
+    def close(self) -> None:
+        """Close the file that is being read."""
+        if self._lines is not None:
+            self._lines.close()
+            self._lines = None
 
-def _grown_lines(
-    run: Run, path: Path, file: BinaryIO, wait: Callable[[float], None]
-) -> Iterator[bytes]:
-    """Yield the lines of a file until the next one exists or the process has ended."""
-    reader = _LineReader(file)
-    yield from reader.lines()
-    while not _files_after(run, path) and run.is_running():
-        wait(_POLL_S)
-        yield from reader.lines()
-    yield from reader.lines()
+    def _later_files(self) -> list[Path]:
+        files = log_files(self._run.folder)
+        return [file for file in files if self._path is None or file.name > self._path.name]
 
 
 class _LineReader:
@@ -72,10 +62,6 @@ class _LineReader:
                 line, self._incomplete = self._incomplete, b""
                 yield line
 
-
-def _records(lines: Iterator[bytes]) -> Iterator[Record]:
-    return (record for line in lines if (record := parse_line(line)) is not None)
-
-
-def _files_after(run: Run, path: Path | None) -> list[Path]:
-    return [file for file in log_files(run.folder) if path is None or file.name > path.name]
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()

@@ -10,6 +10,7 @@ import socket
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from composer.fast_dataclass import dataclass
 from composer.run_log.rotation import log_files
@@ -36,12 +37,18 @@ class Run:
 
     @property
     def is_of_part(self) -> bool:
-        """Whether the run is that of a process of a system, whose log has these lines as well."""
-        try:
-            about = json.loads((self.folder / _ABOUT).read_text(encoding="utf-8"))
-            return about.get("part") is True
-        except (OSError, ValueError, AttributeError):
-            return False
+        """Whether the run is that of a process of a system."""
+        return self.about().get("part") is True
+
+    @property
+    def host(self) -> str:
+        """The name of the computer that wrote the log."""
+        return str(self.about().get("host", ""))
+
+    @property
+    def whole_system(self) -> str:
+        """The full name of the system, if the run is that of a process of it."""
+        return self.system.rpartition("/")[0]
 
     @property
     def started(self) -> datetime:
@@ -53,6 +60,20 @@ class Run:
     def pid(self) -> str:
         """The id of the process."""
         return self.name.rpartition("-")[2]
+
+    def written_ns(self) -> int:
+        """Return when the last line was written, since the Unix epoch; 0 if there is none."""
+        files = log_files(self.folder)
+        with suppress(OSError):
+            return files[-1].stat().st_mtime_ns if files else 0
+        return 0
+
+    def about(self) -> dict[str, Any]:
+        """Return what the run says about itself; nothing if that cannot be read."""
+        with suppress(OSError, ValueError):
+            about = json.loads((self.folder / _ABOUT).read_text(encoding="utf-8"))
+            return about if isinstance(about, dict) else {}
+        return {}
 
     def is_running(self) -> bool:
         """Say whether the process that writes the log is running, on this computer."""
@@ -69,11 +90,13 @@ class Run:
 class RunFolder:
     """The folder of a run that starts now, locked as long as the process runs."""
 
-    def __init__(self, logs: Path, system: str, *, part: bool = False) -> None:
+    def __init__(
+        self, logs: Path, system: str, *, part: bool = False, forwarded: bool = False
+    ) -> None:
         """Create a folder below ``logs``, and remove the oldest runs of the system.
 
-        ``system`` is the full name of the system, or of a process of it if it is a ``part``. Raises
-        OSError.
+        ``system`` is the full name of the system, or of a process of it if it is a ``part``. Its
+        lines are ``forwarded`` if the run of the whole system logs them as well. Raises OSError.
         """
         parent = logs / FOLDER / _folder_name(system)
         parent.mkdir(parents=True, exist_ok=True)
@@ -82,7 +105,8 @@ class RunFolder:
         self.path.mkdir()
         # Not inherited by processes that user code forks, as a lock of flock() would be.
         self._about = (self.path / _ABOUT).open("x", encoding="utf-8")
-        about = {"system": system, "host": socket.gethostname(), "pid": os.getpid(), "part": part}
+        about = {"system": system, "host": socket.gethostname(), "pid": os.getpid()}
+        about |= {"part": part, "forwarded": forwarded}
         self._about.write(f"{json.dumps(about)}\n")
         self._about.flush()
         with suppress(OSError):  # a file system without locks: the run does not look running
@@ -99,16 +123,45 @@ def find_runs(logs: Path, system: str | None = None) -> list[Run]:
     """Return the runs below ``logs`` in the order of their start.
 
     ``system`` selects those of the systems with that full name or last part; by default, all but
-    those of processes that are parts of systems.
+    those of processes that are parts of systems. If there are only parts of a system, as on a
+    computer that runs no other of its processes, they are returned.
     """
-    runs = []
-    with suppress(OSError):
-        for folder in (logs / FOLDER).iterdir():
-            name = "/" + folder.name.replace(".", "/")
-            if system is None or name == system or name.endswith(f"/{system}"):
-                found = _runs_in(folder, name)
-                runs += found if system else [run for run in found if not run.is_of_part]
+    runs: list[Run] = []
+    parts: list[Run] = []
+    for name, folder in _systems(logs):
+        found = _runs_in(folder, name)
+        if system is not None and _has_name(name, system):
+            runs += found
+        elif system is None or _has_name(name.rpartition("/")[0], system):
+            parts += [run for run in found if run.is_of_part]
+            runs += [run for run in found if system is None and not run.is_of_part]
+    whole = {run.system for run in runs}
+    runs += [run for run in parts if run.whole_system not in whole]
     return sorted(runs, key=lambda run: run.name)
+
+
+def find_parts(logs: Path, whole: Run) -> list[Run]:
+    """Return the runs of processes of a system whose lines its own run does not log."""
+    own = {"part": True, "forwarded": False, "host": whole.host}
+    return [
+        run
+        for name, folder in _systems(logs)
+        if name.rpartition("/")[0] == whole.system
+        for run in _runs_in(folder, name)
+        if own.items() <= run.about().items()
+    ]
+
+
+def _systems(logs: Path) -> list[tuple[str, Path]]:
+    """Return the full names of systems and processes, and the folders of their runs."""
+    with suppress(OSError):
+        folders = sorted((logs / FOLDER).iterdir())
+        return [("/" + folder.name.replace(".", "/"), folder) for folder in folders]
+    return []
+
+
+def _has_name(full_name: str, name: str) -> bool:
+    return full_name == name or full_name.endswith(f"/{name}")
 
 
 def _runs_in(folder: Path, system: str) -> list[Run]:

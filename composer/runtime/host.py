@@ -2,7 +2,8 @@
 
 ::
 
-    from composer.runtime.host import Host, HostOptions
+    from composer.runtime.host import Host
+    from composer.runtime.host_options import HostOptions
     from composer.runtime.process import start_refused
 
     host = Host(system, bring_up(system), tear_down(system), HostOptions(run_for_s=5.0), report)
@@ -19,12 +20,11 @@ several threads, one call at a time.
 
 from __future__ import annotations
 
+import gc
 import math
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
 from functools import partial
 
 import rclpy
@@ -32,18 +32,26 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import get_rmw_implementation_identifier, try_shutdown
 
-from composer.model import LogLevel, Node, PrimaryState, Process, System
+from composer.model import LogLevel, Node, System
 from composer.model.dependencies import dependency_edges, in_dependency_order
 from composer.names import join
 from composer.plan import Fault, Plan
-from composer.runtime.executors.process_limits import memory_excess, place_process
+from composer.runtime.children.discovery_server import discovery_servers
+from composer.runtime.executors.process_limits import (
+    memory_excess,
+    place_process,
+    switch_threads_sooner,
+)
+from composer.runtime.host_options import HostOptions
 from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
 from composer.runtime.manager.other_instances import Instance
-from composer.runtime.node.managed_node import NodeListener
+from composer.runtime.node.managed_node import ManagedNode, NodeListener
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
+from composer.runtime.process.dds_interfaces import use_interfaces
 from composer.runtime.process.dds_profiles import use_large_system_profile
 from composer.runtime.process.dds_segment import segment_for_large_messages
+from composer.runtime.process.discovery import active_variables
 from composer.runtime.process.environment import ROS_ARGUMENTS, prepare_environment
 from composer.runtime.process.fast_exit import leave_ros_graph, supports_fast_exit
 from composer.runtime.process.instance_lock import already_running, hold_instance_lock
@@ -56,6 +64,7 @@ from composer.runtime.supervision.health_monitor import HealthMonitor
 from composer.runtime.supervision.main_queue import Command, Item, MainQueue
 from composer.runtime.supervision.node_listener import SupervisionListener
 from composer.runtime.supervision.node_set import CreationFailed, NodeSet, NodeSetOptions
+from composer.runtime.supervision.start import SystemStart
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
 
@@ -66,41 +75,7 @@ _URGENT_S = 0.2
 _FEW_NODES = 20
 #: Joining the ROS graph takes a tenth of a second, on a busy machine some tenths.
 _SHORTEST_START_LIMIT_S = 5.0
-
-
-@dataclass(frozen=True, slots=True)
-class HostOptions:
-    """How a system is run.
-
-    ``run_for_s`` is how long it runs, ``bring_up_within_s`` the limit of the whole bring-up,
-    ``stop_within_s`` that of the tear-down. ``transition_timeout_s`` overrides the system's.
-    ``tracing`` records callback timings, also of callbacks without a ``budget_ms``;
-    ``check_mutation`` checks after each callback whether it has modified a message.
-    ``fail_on_error`` makes errors of user code and failed calls a failure of the run.
-
-    ``process`` is set if the system is the part of another one that a process of it runs;
-    ``member_command`` starts such processes of this system, with ``--process NAME`` after it.
-
-    ``end_within(seconds)`` has to end the process after that time, whatever hangs in it; None
-    cancels that. It is called with ``grace_s`` as soon as the system stops, and never canceled
-    then: the end of Python may hang as well. It also limits each call of the start that may never
-    return from the middleware. ``ends_process`` promises that the process ends after the run, by
-    ``os._exit`` if the outcome requires it.
-    """
-
-    run_for_s: float | None = None
-    log_level: LogLevel = LogLevel.INFO
-    bring_up_within_s: float = math.inf
-    transition_timeout_s: float | None = None
-    stop_within_s: float = 1.7
-    grace_s: float = 10.0
-    end_within: Callable[[float | None], None] = lambda _: None
-    tracing: bool = True
-    check_mutation: bool = False
-    fail_on_error: bool = False
-    ends_process: bool = False
-    process: Process | None = None
-    member_command: Sequence[str] = ()
+_GOALS_ARRIVE_WITHIN_S = 0.2
 
 
 class Host:
@@ -115,13 +90,12 @@ class Host:
         report: Report | None = None,
     ) -> None:
         self._system = system
-        self._up = up
         self._down = down
         self._options = options or HostOptions()
         self._main_queue: MainQueue[Item] = MainQueue()
         self._reporter = Reporter(report)
         order = in_dependency_order(system, dependency_edges(system))
-        self._status = Status(system, order)
+        self._status = Status(system, order, self._options.started_by)
         self._node_set = NodeSet(
             system,
             self._make_listener,
@@ -137,6 +111,9 @@ class Host:
         )
         self._supervisor = Supervisor(
             system, self._node_set, self._main_queue, self._status, self._reporter
+        )
+        self._start = SystemStart(
+            system, up, self._node_set, self._supervisor, self._main_queue, self._reporter
         )
         self._commands = Commands(system, self._node_set, self._supervisor, self._status)
         self._failed = False
@@ -159,22 +136,30 @@ class Host:
 
         Raises StartRefused if the environment does not allow a start, or the system runs already.
         """
-        prepare_environment()
+        prepare_environment(self._system.discovery)
         if self._uses_fast_exit:
             use_large_system_profile(os.environ)
+        self._node_set.warnings += use_interfaces(self._system.discovery, os.environ)
         namespace = join(self._system.namespace, self._system.name.value)
-        signals = stop_signals(
-            self.stop, self._main_queue.wakeup, ends_process=self._options.ends_process
-        )
+        ends_process = self._options.ends_process
+        signals = stop_signals(self.stop, self._main_queue.wakeup, ends_process=ends_process)
+        if ends_process:  # the process is not that of a program that runs a system
+            switch_threads_sooner()
         if self._options.process is not None:
             self._node_set.warnings += place_process(self._options.process)
-        with hold_instance_lock(namespace), signals:
+        queue = self._main_queue
+        wait = partial(queue.wait, lambda: queue.stopping, stoppable=True)
+        servers = discovery_servers(self._system.discovery, os.environ, self._reporter.log, wait)
+        lock = hold_instance_lock(namespace, active_variables(self._system.discovery, os.environ))
+        with lock, signals, servers:
             self._limit_start()
             try:
                 with self._segment():
                     manager = self._join(namespace)
                 self._run(manager)
             finally:
+                if ends_process:
+                    gc.unfreeze()
                 if not self._has_left_graph:  # otherwise there is nothing left to shut down
                     try_shutdown()
         return self._outcome()
@@ -196,6 +181,8 @@ class Host:
             callbacks=self._node_set.callbacks,
             chains=self._node_set.chains,
             nodes=lambda: {node.full_name: node for node in tuple(self._node_set.nodes.values())},
+            recreate=self._recreate,
+            expect_end=self._keep_entities,
             write_log=self._reporter.log,
         )
         use_sim_time = self._system.use_sim_time
@@ -246,7 +233,12 @@ class Host:
             return False
         for warning in self._node_set.warnings:
             self._reporter.log(LogLevel.WARN, "composer", warning)
+        if self._options.ends_process:
+            # What is there now stays to the end. A search for reference cycles in it takes 0.1 s.
+            gc.freeze()
+            gc.enable()
         self._is_created = True
+        self._update_status()  # reports of the first second have counters, too
         return True
 
     def _bring_up_and_supervise(self) -> None:
@@ -260,27 +252,10 @@ class Host:
             monitor.stop()
 
     def _bring_up(self) -> bool:
-        serial = self._supervisor.desired.serial
-        failed = self._supervisor.bring_up(self._up, serial, self._options.bring_up_within_s)
-        if failed is not None:
-            self._fail(f"{failed.partition(':')[0]} failed")
-        if self._main_queue.stopping:
-            return False
-        self._supervisor.set_goals(self._reached(), serial)
-        self._status.set_activity("running")
-        self._reporter.report(
-            events.BroughtUp(
-                self._reporter.elapsed_s, self._node_set.active(), len(self._node_set.nodes)
-            )
-        )
-        return True
-
-    def _reached(self) -> Mapping[str, PrimaryState]:
-        """Return the states that the bring-up has reached, also of nodes that have failed since."""
-        states = self._node_set.states()
-        planned = self._up.states_after(states)
-        failed = self._supervisor.desired.unhandled.keys() & planned.keys()
-        return {**states, **{name: planned[name] for name in failed}}
+        problem = self._start.run(self._options.bring_up_within_s)
+        if problem is not None:
+            self._fail(problem)
+        return not self._main_queue.stopping
 
     def _supervise(self) -> None:
         run_for_s = self._options.run_for_s
@@ -307,11 +282,15 @@ class Host:
         else:
             self._main_queue.put(command)
 
+    def _recreate(self, node: ManagedNode) -> str | None:
+        return self._node_set.recreate(node.model.name.value, lambda: False)
+
     def _on_older_instance(self, namespace: str, instance: Instance) -> None:
         if not self._main_queue.stopping:
             self._fail(str(already_running(namespace, instance.host, instance.pid)))
 
     def _update_status(self) -> None:
+        self._options.on_alive()
         nodes = tuple(self._node_set.nodes.items())
         statistics = {name: node.statistics for name, node in nodes}
         self._status.measure(statistics, self._node_set.reported_figures())
@@ -335,18 +314,24 @@ class Host:
         self._failed = self._failed or self._supervisor.has_failed_nodes
         self._status.set_activity("stopping")
         self._reporter.report(events.Stopping(self._reporter.elapsed_s, self._stop_reason))
-        if self._uses_fast_exit and supports_fast_exit():
-            self._node_set.keep_entities()
+        self._keep_entities()
         stop_within_s = self._options.stop_within_s
         self._tear_down_end_s = time.monotonic() + stop_within_s
         self._node_set.limit_end(self._tear_down_end_s)
+        self._node_set.other_processes.drop_goals()
         if self._is_created:
             limit_s = _STEP_SHARE * stop_within_s
             if not self._supervisor.tear_down(self._down, self._tear_down_end_s, limit_s):
                 self._failed = True
+        self._node_set.other_processes.wait_for_goals(time.monotonic() + _GOALS_ARRIVE_WITHIN_S)
         self._summary = self._node_set.summaries()
         if self._options.fail_on_error and any(node.errors for node in self._summary):
             self._failed = True
+
+    def _keep_entities(self) -> None:
+        """Leave the entities of the nodes to the end of the process, if that is faster."""
+        if self._uses_fast_exit and supports_fast_exit():
+            self._node_set.keep_entities()
 
     def _close(self, manager: ManagerNode) -> None:
         for item in (*self._shutdown_commands, *self._main_queue.drain()):

@@ -72,6 +72,10 @@ class ParameterFiles:
         in_order = sorted(found.items(), key=lambda item: item[1][0])
         return {parameter: entry for parameter, (_, entry) in in_order}
 
+    def named(self, full_name: str) -> dict[str, Entry]:
+        """Return the values in sections without wildcards for the node ``full_name``."""
+        return {name: entry for name, (_, entry) in self._values.get(full_name, {}).items()}
+
     def all_values(self, full_name: str) -> dict[str, Entry]:
         """Return all values for a node whose parameters are not known, by parameter."""
         found: dict[str, tuple[int, Entry]] = {}

@@ -72,24 +72,35 @@ class CallbackQueue(Generic[T]):
         return removed
 
     def _run(self) -> None:
-        """Work on the waiting items until one has to be awaited or none is left."""
-        while True:
-            with self._lock:
-                if not self._waiting:
-                    self._busy = False
-                    return
-                item = self._waiting.popleft()
-            coroutine = self._work(item)
-            if coroutine is not None:
-                self._spawn(coroutine)
-                return
+        """Work on the first item; the others follow, each with a turn of the strand."""
+        if self._work_on_first():
+            self._context.strand.post(self._run)
+
+    def _work_on_first(self) -> bool:
+        """Work on the first item, if any; return whether the next one can follow."""
+        with self._lock:
+            if not self._waiting:
+                self._busy = False
+                return False
+            item = self._waiting.popleft()
+        coroutine = self._work(item)
+        if coroutine is not None:
+            self._spawn(coroutine)
+            return False
+        return self._goes_on()
+
+    def _goes_on(self) -> bool:
+        with self._lock:
+            self._busy = bool(self._waiting)
+            return self._busy
 
     def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> None:
         task = self._context.spawn(self._context.strand.wrap(coroutine))
         task.add_done_callback(self._next)
 
     def _next(self, _: object) -> None:
-        self._context.strand.post(self._run)
+        if self._goes_on():
+            self._context.strand.post(self._run)
 
 
 class SingleThreadQueue(CallbackQueue[T]):
@@ -110,6 +121,11 @@ class SingleThreadQueue(CallbackQueue[T]):
         else:
             self._busy = False
         return None
+
+    def _run(self) -> None:
+        """Work on the waiting items until one has to be awaited or none is left."""
+        while self._work_on_first():
+            pass
 
 
 class ReentrantQueue(CallbackQueue[T]):

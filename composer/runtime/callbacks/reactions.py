@@ -24,6 +24,13 @@ class ReactionClient(Protocol):
         """Send it; the port's own reactions handle the response."""
 
 
+class MessageReaction(Protocol):
+    """What a message triggers before the handler is called."""
+
+    def run(self, *, message: Any) -> Any:
+        """Run it."""
+
+
 #: The characters and items of a state variable. A reaction that appends to its own state, such as
 #: the text of each message, would otherwise use up the memory.
 MAX_STATE_SIZE = 1_000_000

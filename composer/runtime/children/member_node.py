@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 from time import monotonic
 from typing import Any
 
+from rcl_interfaces.msg import SetParametersResult
+
 from composer.model import Node
-from composer.runtime.children.member_process import (
-    MemberProcess,
-    MemberState,
-    ProcessUnavailable,
-)
+from composer.runtime.children.member_context import ProcessUnavailable
+from composer.runtime.children.member_process import STARTS_WITHIN_S, MemberProcess
+from composer.runtime.children.member_report import MemberState
 from composer.runtime.children.outside_node import (
     ACTIVE,
     INACTIVE,
@@ -21,11 +24,12 @@ from composer.runtime.children.outside_node import (
     TransitionRefused,
 )
 from composer.runtime.children.remote_lifecycle import GOALS, PRIMARY_STATES
+from composer.runtime.executors.futures import Future
+from composer.runtime.executors.tasks import within
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 
-#: A report follows a successful response at once; each second there is one in any case.
+#: A report follows a successful response soon; each second there is one in any case.
 _REPORTED_WITHIN_S = 2.0
-_STARTS_WITHIN_S = 30.0
 #: The states of the node in which a transition has nothing to do: a process that ran before the
 #: coordinating one keeps its nodes as they are.
 _DONE = {
@@ -48,13 +52,17 @@ class MemberNode(OutsideNode):
         super().__init__(model, context)
         self._process = process
         self._reported = ""  # the last primary state
+        self._is_moving = False  # according to the last report
+        self._awaited: tuple[str, Future[None]] | None = None  # the goal of a transition
+        self._after: Sequence[str] = ()
         self._has_failed = False
+        self._is_lost = False  # its process has ended, and its return has not been reported
         process.add(self)
 
     @property
     def transition_timeout_s(self) -> float:
         """How long a transition may take, including the start of the process."""
-        return self._timeout_s + _STARTS_WITHIN_S + _REPORTED_WITHIN_S
+        return self._timeout_s + STARTS_WITHIN_S + _REPORTED_WITHIN_S
 
     @property
     def pid(self) -> int | None:
@@ -64,11 +72,27 @@ class MemberNode(OutsideNode):
     @property
     def figures(self) -> Mapping[str, Any]:
         """Its rates and counters, by the names of the fields of ``NodeStatus``."""
-        reported = self._process.state(self.full_name)
-        return {} if reported is None else reported.figures
+        return self._process.figures(self.full_name).current
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Its counters since this process knows it."""
+        return self._process.figures(self.full_name).since_start
+
+    @property
+    def is_absent(self) -> bool:
+        """Whether its process is awaited, because something else starts it."""
+        return self._process.is_absent
 
     def destroy(self) -> None:
         """Do nothing: the node belongs to its process."""
+
+    async def run_step_after(
+        self, after: Sequence[str], transition: str, is_outdated: Callable[[], bool]
+    ) -> TransitionOutcome:
+        """Run the ``transition`` of a plan; its process lets the nodes ``after`` move before it."""
+        self._after = after
+        return await self.run_step(transition, is_outdated)
 
     async def _work(self, transition: str) -> None:
         try:
@@ -76,58 +100,132 @@ class MemberNode(OutsideNode):
                 await self._prepare()
             await self._request(transition)
         except ProcessUnavailable as error:
+            self._is_lost = True
             if transition in ("cleanup", "shutdown"):
                 return  # without its process, the node is down
             raise TransitionRefused(str(error), UNCONFIGURED) from error
-        if transition == "shutdown":
-            self._process.end_if_done()
 
     async def _prepare(self) -> None:
         """Make sure that the process runs, and that the node can be configured."""
         await self._process.ensure()
-        if self._has_failed and self._reported in (INACTIVE, ACTIVE):
-            await self._process.kill(f"{self.full_name} hangs")
+        if self._has_failed:
+            if not await self._is_taken_down():
+                await self._process.kill(f"{self.full_name} hangs")
             await self._process.ensure()
+
+    async def _is_taken_down(self) -> bool:
+        """Wait until reports say that its process has taken the failed node down.
+
+        A node hangs that does not begin to move, or moves for longer than a transition may take.
+        """
+        is_down = await self._until(self._is_down, monotonic() + _REPORTED_WITHIN_S)
+        if not is_down and self._is_moving:
+            is_down = await self._until(self._is_down, monotonic() + self._timeout_s)
+        return is_down
+
+    def _is_down(self) -> bool:
+        return not self._is_moving and self._reported not in (INACTIVE, ACTIVE)
 
     async def _request(self, transition: str) -> None:
         is_left = transition == "shutdown" and self._process.pid is None
         if is_left or self._reported in _DONE[transition]:
             return  # a process that was not started here may be used again
-        end_s = monotonic() + self._timeout_s
-        if self._end_s is not None:
-            end_s = min(end_s, self._end_s)
-        success = await self._process.change(self.full_name, transition, end_s)
-        goal = GOALS[transition]
-        reported_s = monotonic() + _REPORTED_WITHIN_S
-        await self._until(lambda: self._reported == goal or not success, reported_s)
-        if not success:
-            state = self._reported or UNCONFIGURED
-            raise TransitionRefused(f"refused, or failed: it is {state}; see its log", state)
+        goal, reported = GOALS[transition], Future[None]()
+        self._awaited = goal, reported
+        try:
+            result = self._process.request(self.full_name, transition, self._after)
+            self._after = ()
+            await self._finish(result, reported)
+        finally:
+            self._awaited = None
+        self._reported, self._is_moving = goal, False
+
+    async def _finish(self, result: Future[SetParametersResult], reported: Future[None]) -> None:
+        """Wait for the end of a transition: a report, or a response, perhaps that of many nodes."""
+        either: Future[None] = Future()
+        for future in (result, reported):
+            future.add_done_callback(lambda _: either.set_result(None))
+        await self._wait_for(either)
+        if reported.done():
+            return
+        response = result.result()
+        if not response.successful:
+            raise TransitionRefused(response.reason, self._reported or UNCONFIGURED)
+        if self._awaited == (FINALIZED, reported):  # the last report has the final counters
+            left_s = math.inf if self._end_s is None else self._end_s - monotonic()
+            wait_s = min(_REPORTED_WITHIN_S, left_s / 2.0)  # the node is down without it, too
+            with suppress(TimeoutError):
+                await within(self.loop, reported, max(0.0, wait_s))
+
+    async def _wait_for(self, future: Future[None]) -> None:
+        """Wait while nodes of the process move: this one may have to wait for others.
+
+        Raises ProcessUnavailable.
+        """
+        start_s = monotonic()
+        while not future.done():
+            start_s = max(start_s, self._process.moved_s)
+            self.transition_started_s = start_s
+            end_s = start_s + self._timeout_s
+            if self._end_s is not None:
+                end_s = min(end_s, self._end_s)
+            if monotonic() >= end_s:
+                raise ProcessUnavailable(f"{self._process} does not respond")
+            woken: Future[None] = Future()
+            future.add_done_callback(partial(_wake, woken))
+            with suppress(TimeoutError):
+                await within(self.loop, woken, end_s - monotonic())
+
+    def _on_settled(self) -> None:
+        if self._state == FINALIZED:
+            self._process.end_if_done()
 
     def on_report(self, reported: MemberState) -> None:
-        """Follow the state of the node."""
+        """Follow the state of the node, by a report that includes all responses."""
         state, before = reported.state, self._reported
         is_primary = state in PRIMARY_STATES
+        self._is_moving = not is_primary
         if is_primary:
             self._reported = state
+        if self._awaited is not None and self._awaited[0] == state:
+            self._awaited[1].set_result(None)
         failed_now = bool(reported.held_down) and not self._has_failed
         self._has_failed = bool(reported.held_down)
         if self._lock.is_held:
             return
-        if failed_now:
+        has_moved = is_primary and state not in (self._state, before) and before == self._state
+        if failed_now or (has_moved and self._has_failed):  # again, without a report in between
             self._fail(reported.held_down)  # its process takes it down
-        elif is_primary and state not in (self._state, before) and before == self._state:
+        elif has_moved:
             self._follow(state)
 
     def on_process_end(self, reason: str) -> None:
         """Report the end of the process as a failure of the node."""
-        self._reported, self._has_failed = "", False
+        self._reported, self._is_moving, self._has_failed = "", False, False
         if not self._lock.is_held and self._state in (INACTIVE, ACTIVE):
-            self._fail(reason)
+            self._is_lost = True
+            self._state = UNCONFIGURED
+            self._listener.on_ended(reason, UNCONFIGURED, is_awaited=self.is_absent)
 
     def on_process_return(self) -> None:
-        """Use the node again: its process is there again."""
+        """Use the node again, in the state in which its process has kept it."""
+        if not self._is_lost:
+            return
+        self._is_lost = False
+        if not self._lock.is_held and self._reported in (INACTIVE, ACTIVE):
+            self._state = self._reported
+            self._listener.on_transition_end(
+                TransitionOutcome("return", self._state, success=True, external=False)
+            )
         self._listener.on_returned()
+
+    def take_over(self) -> None:
+        """Use the node in the state in which an earlier coordinating process has left it."""
+        self._is_lost = True
+        if self._process.is_absent:
+            self._listener.on_ended(f"{self._process} does not run", UNCONFIGURED, is_awaited=True)
+        else:
+            self.on_process_return()
 
     def _follow(self, state: str) -> None:
         """Report a transition that another tool has requested from the node itself."""
@@ -140,3 +238,7 @@ class MemberNode(OutsideNode):
         self._state = state
         self.activations += state == ACTIVE
         self._listener.on_transition_end(TransitionOutcome(transition, state, success=True))
+
+
+def _wake(sleeper: Future[None], _: object) -> None:
+    sleeper.set_result(None)

@@ -1,106 +1,85 @@
 """A process of the system that runs some of its nodes: started, observed, and asked to move them.
 
 It is ``compose run SYSTEM --process NAME``, with a manager node of its own. The states of its nodes
-are in its reports; requests for transitions go to the manager's service. If it runs already, or
-belongs to another computer, it is awaited instead of started.
+are in its reports; requests for transitions go to the manager's service.
+
+The process with the instance lock runs the nodes, whatever has started it. One that was not started
+here is used as it is, and from then on only awaited: what has started it may start it again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from time import monotonic
-from typing import Any, Protocol
+from typing import Any
+from uuid import uuid4
 
 from diagnostic_msgs.msg import DiagnosticArray
-from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
-from rclpy.node import Node as RosNode
+from rcl_interfaces.msg import SetParametersResult
 
 from composer.model import LogLevel, Process
-from composer.runtime.children.child_processes import Child, ChildProcesses, Command, StartFailed
+from composer.runtime.children.child_processes import Child, Command, StartFailed
+from composer.runtime.children.member_context import Member, MemberContext, ProcessUnavailable
+from composer.runtime.children.member_report import (
+    MemberReport,
+    MemberState,
+    NodeFigures,
+    parse_report,
+)
+from composer.runtime.children.member_requests import MemberRequests
 from composer.runtime.children.output import parse_line
+from composer.runtime.children.remote_lifecycle import PRIMARY_STATES
 from composer.runtime.executors.exceptions import printable
 from composer.runtime.executors.futures import Future
-from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
-from composer.runtime.metrics.numbers import finite
 from composer.runtime.node.outcome import FINALIZED
 from composer.runtime.process.environment import CONSOLE_FORMAT
-from composer.runtime.process.instance_lock import local_systems
-from composer.runtime.ros.manager_protocol import CHANGE_STATE, NAME, STATE_QOS, STATE_TOPIC
+from composer.runtime.process.instance_lock import ALREADY_RUNS, STARTED_BY_VARIABLE, is_held
+from composer.runtime.ros.manager_protocol import CHANGE_STATES, NAME, STATE_QOS, STATE_TOPIC
 
-_POLL_S = 0.01
 #: How long a process may take to import ROS, join the graph and report, on a busy machine.
-_STARTS_WITHIN_S = 30.0
+STARTS_WITHIN_S = 30.0
+_POLL_S = 0.01
+#: How often to look whether another process holds the instance lock.
+_LOCK_POLL_S = 0.1
 _CHECK_PERIOD_S = 0.5
 #: Managers report every second.
 _REPORTS_WITHIN_S = 5.0
 _ENDS_WITHIN_S = 1.0
 _KILLED_WITHIN_S = 0.5
-#: The logger of ``compose run``. What it says of states, the process that coordinates says as well.
-_COMPOSE = "compose"
-
-
-class ProcessUnavailable(Exception):
-    """The process cannot be started, or has ended; the text is the reason."""
-
-
-@dataclass(frozen=True, slots=True)
-class MemberState:
-    """A node as its process reports it: its state, and why it is held down, if it has failed.
-
-    ``figures`` are rates and counters, by the names of the fields of ``NodeStatus``.
-    """
-
-    state: str
-    held_down: str
-    figures: Mapping[str, Any] = field(default_factory=dict)
-
-
-class Member(Protocol):
-    """A node of the process. Called on the loop."""
-
-    @property
-    def full_name(self) -> str:
-        """Its name in reports."""
-
-    def on_report(self, reported: MemberState) -> None:
-        """Receive its state, with each report."""
-
-    def on_process_end(self, reason: str) -> None:
-        """Receive that the process has ended or does not report any more."""
-
-    def on_process_return(self) -> None:
-        """Receive that a process that something else has started is there again."""
-
-
-@dataclass(frozen=True, slots=True)
-class MemberContext:
-    """What a process of the system needs from the one that coordinates it.
-
-    ``namespace`` is that of the coordinating manager; ``command`` starts ``compose run`` with the
-    same system; ``is_local`` is whether the process belongs to this computer.
-    """
-
-    loop: Loop
-    manager: RosNode
-    children: ChildProcesses
-    namespace: str
-    command: Sequence[str]
-    is_local: bool
-    write_log: Callable[[LogLevel, str, str], None]
+_COMPOSER = "composer"
 
 
 @dataclass(slots=True)
 class _Life:
-    """One life of the process: its child, if it was started here, and what it reported."""
+    """One life of the process, as a child or started elsewhere, and its last report.
+
+    ``started_by`` is in all reports of that child. ``lost`` is why its nodes have failed, although
+    it may still run. ``holds_lock`` is whether it holds the instance lock on this computer.
+    ``answered`` are the numbers of the last reports before the responses to requests, by node.
+    """
 
     child: Child | None = None
-    states: dict[str, MemberState] = field(default_factory=dict)
+    started_by: str = ""
+    last: MemberReport | None = None
+    reports: int = 0
     reported_s: float = 0.0
+    lost: str = ""
+    holds_lock: bool = False
+    answered: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def states(self) -> Mapping[str, MemberState]:
+        return {} if self.last is None else self.last.nodes
+
+    @property
+    def is_up(self) -> bool:
+        return self.last is not None and not self.lost
 
 
 class MemberProcess:
@@ -111,16 +90,21 @@ class MemberProcess:
         self._context = context
         self._name = f"{context.namespace}/{process.name.value}"
         self._members: dict[str, Member] = {}
+        self._figures: defaultdict[str, NodeFigures] = defaultdict(NodeFigures)
+        #: When, by ``time.monotonic()``, it last reported that a node has moved.
+        self.moved_s = 0.0
         self._life: _Life | None = None  # from the start, or the first report, to the end
+        self._may_start = bool(context.command)
+        self._refused_s = -math.inf  # when another process last reported, not the child
         self._starting: Future[None] | None = None
         self._is_ending = False
         manager = f"{self._name}/{NAME}"
-        self._client = context.manager.create_client(ChangeState, f"{manager}/{CHANGE_STATE}")
+        self.requests = MemberRequests(context.manager, context.loop, f"{manager}/{CHANGE_STATES}")
         self._reports = context.manager.create_subscription(
-            DiagnosticArray, f"{manager}/{STATE_TOPIC}", lambda _: None, STATE_QOS
+            DiagnosticArray, f"{manager}/{STATE_TOPIC}", lambda _: None, STATE_QOS, raw=True
         )
-        context.loop.add_client(self._client)
-        context.loop.add_subscription(self._reports, self._on_report)
+        context.loop.add_subscription(self._reports, self._on_message)
+        self._checked_s = monotonic()
         self._timer = context.loop.call_every(_CHECK_PERIOD_S, self._check)
 
     def add(self, member: Member) -> None:
@@ -132,9 +116,32 @@ class MemberProcess:
         """Its process id, if it was started here."""
         return None if self._life is None or self._life.child is None else self._life.child.pid
 
-    def state(self, node: str) -> MemberState | None:
-        """Return the last reported state of a node; None if the process does not run."""
-        return None if self._life is None else self._life.states.get(node)
+    @property
+    def is_absent(self) -> bool:
+        """Whether it does not run or report, and something else has to start it."""
+        return not self._may_start and (self._life is None or not self._life.is_up)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is nothing to wait for at the start: it does not run, or has reported.
+
+        A node that still moves is to be waited for.
+        """
+        life = self._life
+        if life is None or life.last is None:
+            has_child = life is not None and life.child is not None
+            return has_child or (self._may_start and not is_held(self._name))
+        is_settled = all(node.state in PRIMARY_STATES for node in life.states.values())
+        return is_settled and life.reports > 1  # the first one may be an old one that was latched
+
+    def keep_goals(self, goals: str) -> None:
+        """Let the process keep the goals of the system."""
+        if self._life is not None and self._life.is_up:
+            self.requests.keep(goals)
+
+    def figures(self, node: str) -> NodeFigures:
+        """Return the rates and counters of a node."""
+        return self._figures[node]
 
     def start_soon(self) -> None:
         """Start the process unless it runs: all at once, not each with its first node."""
@@ -152,7 +159,7 @@ class MemberProcess:
         """
         while self._starting is not None:
             await self._starting
-        if self._life is not None and self._life.states:
+        if self._life is not None and self._life.is_up:
             return
         self._starting = Future()
         try:
@@ -161,25 +168,20 @@ class MemberProcess:
             starting, self._starting = self._starting, None
             starting.set_result(None)
 
-    async def change(self, node: str, transition: str, end_s: float) -> bool:
-        """Request a transition of a node; return whether it succeeded.
+    def request(
+        self, node: str, transition: str, after: Sequence[str] = ()
+    ) -> Future[SetParametersResult]:
+        """Request a transition of a node, after those of others; return the future of its result.
 
-        Raises ProcessUnavailable if the process ends, or does not respond until ``end_s``.
+        Raises ProcessUnavailable if the process does not run; so does the future if it ends.
         """
         life = self._life
-        if life is None:
-            raise ProcessUnavailable(f"{self} does not run")
-        while not self._client.service_is_ready():
-            await self._pause(life, end_s)
-        request = ChangeState.Request(transition=Transition(label=f"{node} {transition}"))
-        future = self._client.call_async(request)
-        try:
-            while not future.done():
-                await self._pause(life, end_s)
-        finally:
-            self._client.remove_pending_request(future)
-        response: Any = future.result()
-        return bool(response.success)
+        if life is None or life.lost:
+            how = "does not run" if life is None else life.lost
+            raise ProcessUnavailable(f"{self} {how}")
+        result = self.requests.request(node, transition, after)
+        result.add_done_callback(partial(self._on_response, life, node))
+        return result
 
     async def kill(self, reason: str) -> None:
         """End a process in which a node hangs; a failure of all its nodes.
@@ -189,10 +191,7 @@ class MemberProcess:
         life = self._life
         if life is None or life.child is None:
             raise ProcessUnavailable(f"{reason}, and {self} was not started here")
-        self._context.children.end(life.child, 0.0, 0.0)
-        while not life.child.ended.done():
-            await sleep(self._context.loop, _POLL_S)
-        self._on_end(life)
+        await self._kill_child(life, life.child)
 
     def end(self) -> None:
         """End the process if it was started here, without waiting for that."""
@@ -203,126 +202,172 @@ class MemberProcess:
 
     def end_if_done(self) -> None:
         """End the process if all its nodes are shut down."""
-        states = {} if self._life is None else self._life.states
-        if all(reported.state == FINALIZED for reported in states.values()):
+        if all(member.state == FINALIZED for member in self._members.values()):
             self.end()
 
     def close(self) -> None:
         """Stop to observe the process."""
         self._timer.cancel()
-        for entity in (self._client, self._reports):
-            self._context.loop.remove(entity)
-        self._context.manager.destroy_client(self._client)
+        self.requests.close()
+        self._context.loop.remove(self._reports)
         self._context.manager.destroy_subscription(self._reports)
 
     def __str__(self) -> str:
         return f"process '{self._process.name}'"
 
+    # --- start and end
+
     async def _start(self) -> None:
         """Start the process, or wait for one that is started elsewhere."""
-        life = self._life or _Life()
-        if self._context.is_local and self._name not in local_systems():
-            life = await self._start_child()
-        end_s = monotonic() + _STARTS_WITHIN_S
-        while self._life is None or not self._life.states:
-            if life.child is not None and life.child.ended.done():
-                raise ProcessUnavailable(f"{self} {_how(life.child)}")
-            if monotonic() > end_s:
-                raise ProcessUnavailable(f"{self} has not reported within {_STARTS_WITHIN_S:g} s")
-            await sleep(self._context.loop, _POLL_S)
+        life = self._life
+        if life is not None and life.lost:
+            if life.child is None:
+                raise ProcessUnavailable(f"{self} {life.lost}")
+            await self._kill_child(life, life.child)
+        end_s = monotonic() + STARTS_WITHIN_S
+        child: Child | None = None
+        while self._life is None or not self._life.is_up:
+            if child is not None and child.ended.done():
+                if self._may_start and child.ended.result() != ALREADY_RUNS:
+                    raise ProcessUnavailable(f"{self} {_how(child)}")
+                child = None
+            if self._life is None and self._may_start and not is_held(self._name):
+                child = await self._start_child()
+            elif monotonic() > end_s:
+                raise ProcessUnavailable(f"{self} has not reported within {STARTS_WITHIN_S:g} s")
+            await sleep(self._context.loop, _LOCK_POLL_S if self._life is None else _POLL_S)
 
-    async def _start_child(self) -> _Life:
+    async def _start_child(self) -> Child:
         environment = {name.value: value for name, value in self._process.environment}
         words = (*self._context.command, "--process", self._process.name.value)
         # Its lines are parsed, whatever format those of this process have.
         usual = {"PYTHONUNBUFFERED": "1", "RCUTILS_CONSOLE_OUTPUT_FORMAT": CONSOLE_FORMAT}
-        command = Command(words, {**usual, **environment})
+        life = _Life(started_by=uuid4().hex)
+        own = {STARTED_BY_VARIABLE: life.started_by}
         self._is_ending = False
         try:
-            child = self._context.children.start(command, self._log)
+            command = Command(words, {**usual, **environment, **own})
+            life.child = child = self._context.children.start(command, self._log)
             await child.started
         except (OSError, StartFailed) as error:
             raise ProcessUnavailable(f"{self} cannot be started: {error}") from error
-        self._life = life = _Life(child)
+        self._life = life
         child.ended.add_done_callback(
             lambda _: self._context.loop.call_soon(partial(self._on_end, life))
         )
-        return life
+        return child
 
-    async def _pause(self, life: _Life, end_s: float) -> None:
-        if self._life is not life:
-            how = "" if life.child is None else _how(life.child)
-            raise ProcessUnavailable(f"{self} {how or 'does not report any more'}")
-        if monotonic() > end_s:
-            raise ProcessUnavailable(f"{self} does not respond")
-        await sleep(self._context.loop, _POLL_S)
-
-    def _on_report(self, taken: tuple[Any, Any]) -> None:
-        system, *nodes = taken[0].status or [None]
-        if system is None or _values(system).get("activity") == "starting":
-            return  # it has no nodes yet, and would refuse requests
-        life = self._life
-        if life is None:  # started elsewhere
-            if self._is_ending:
-                return
-            life = self._life = _Life()
-        was_silent = not life.states
-        life.reported_s = monotonic()
-        for status in nodes:
-            name = status.name.partition(": ")[2]
-            values = _values(status)
-            life.states[name] = MemberState(
-                values.get("state", ""), values.get("held_down", ""), _figures(values)
-            )
-        for name, reported in life.states.items():
-            member = self._members.get(name)
-            if member is not None:
-                member.on_report(reported)
-                if was_silent and life.child is None:
-                    member.on_process_return()
+    async def _kill_child(self, life: _Life, child: Child) -> None:
+        self._context.children.end(child, 0.0, 0.0)
+        while not child.ended.done():
+            await sleep(self._context.loop, _POLL_S)
+        self._on_end(life)
 
     def _on_end(self, life: _Life) -> None:
+        """Handle the end of a child."""
         if self._life is not life:
             return
         self._life = None
-        if life.child is not None and not self._is_ending:
-            self._fail(f"{self} {_how(life.child)}")
+        if monotonic() - self._refused_s < _REPORTS_WITHIN_S:
+            self._may_start = False
+        for figures in self._figures.values():
+            figures.end_life()
+        if life.child is not None:
+            self._fail(f"{self} {_how(life.child)}", is_expected=self._is_ending)
+
+    # --- reports
+
+    def _on_message(self, taken: tuple[bytes, Any]) -> None:
+        report = parse_report(taken[0])
+        life = None if report is None or report.is_starting else self._life_of(report)
+        if report is None or life is None:
+            return
+        has_returned = bool(life.lost) or (life.last is None and life.child is None)
+        before = life.states
+        if any(before.get(name, now).state != now.state for name, now in report.nodes.items()):
+            self.moved_s = monotonic()
+        life.last, life.reported_s = report, monotonic()
+        life.reports += 1
+        for name, reported in report.nodes.items():
+            self._figures[name].take(reported.figures, is_started_here=life.child is not None)
+        if report.is_stopping:
+            if not self._is_ending:
+                self._lose(life, "is shutting down")
+            return
+        life.lost = ""
+        goals = self._context.goals.on_report(report.goals)
+        if goals is not None:
+            self.requests.keep(goals)
+        for name, reported in report.nodes.items():
+            member = self._members.get(name)
+            if member is not None and report.number > life.answered.get(name, -1):
+                member.on_report(reported)
+                if has_returned:
+                    member.on_process_return()
+
+    def _on_response(self, life: _Life, node: str, done: Future[SetParametersResult]) -> None:
+        """Ignore the reports of a node from before the end of its transition."""
+        self.moved_s = monotonic()
+        if done.exception() is None and done.result().successful:
+            with suppress(ValueError):  # of another version
+                life.answered[node] = int(done.result().reason)
+
+    def _life_of(self, report: MemberReport) -> _Life | None:
+        """Return the life that a report belongs to; None if it is to be ignored."""
+        life = self._life
+        if report.started_by:  # another such child is about to end, with its coordinator
+            return life if life is not None and life.started_by == report.started_by else None
+        if life is not None and life.child is not None:
+            self._refused_s = monotonic()  # the child is about to be refused
+            return None
+        if life is None or life.last is None:
+            return None if report.is_stopping or self._is_ending else self._use(report)
+        if life.last.identity == report.identity:
+            return life
+        if not life.lost and report.started_s < life.last.started_s:
+            return None  # it has been replaced, or is about to be refused
+        self._lose(life, "has ended")
+        return self._use(report)
+
+    def _use(self, report: MemberReport) -> _Life:
+        """Use a process that was started elsewhere, and start none from now on."""
+        for figures in self._figures.values():
+            figures.end_life()
+        self._life = life = _Life(holds_lock=is_held(self._name))
+        self._may_start = False
+        text = f"{self} was not started here; it is used: host {report.host}, process {report.pid}"
+        self._context.write_log(LogLevel.INFO, _COMPOSER, text)
+        return life
 
     def _check(self) -> None:
         """Notice a process that does not report: it hangs, or is cut off."""
+        now_s = monotonic()
+        late_s = now_s - self._checked_s - _CHECK_PERIOD_S  # this process did not run, not that one
+        self._checked_s = now_s
         life = self._life
-        if life is None or not life.states or self._is_ending:
+        if life is None or not life.is_up or self._is_ending:
             return
-        if monotonic() - life.reported_s < _REPORTS_WITHIN_S:
-            return
-        self._life = None
-        if life.child is not None:
-            self._context.children.end(life.child, 0.0, 0.0)
-        self._fail(f"{self} has not reported for {_REPORTS_WITHIN_S:g} s")
+        life.reported_s += max(0.0, late_s)
+        if life.holds_lock and not is_held(self._name):
+            self._lose(life, "has ended")
+        elif now_s - life.reported_s >= _REPORTS_WITHIN_S:
+            self._lose(life, f"has not reported for {_REPORTS_WITHIN_S:g} s")
 
-    def _fail(self, reason: str) -> None:
-        for member in tuple(self._members.values()):
-            member.on_process_end(reason)
+    def _lose(self, life: _Life, reason: str) -> None:
+        """Report the failure of all nodes of a process, which may return."""
+        if not life.lost:
+            life.lost = reason
+            self._fail(f"{self} {reason}")
+
+    def _fail(self, reason: str, *, is_expected: bool = False) -> None:
+        self.requests.fail(ProcessUnavailable(reason))
+        if not is_expected:
+            for member in tuple(self._members.values()):
+                member.on_process_end(reason)
 
     def _log(self, text: str, is_error: bool) -> None:
         level, logger, message = parse_line(text, is_error=is_error)
-        if logger == _COMPOSE and level is LogLevel.INFO:
-            return
         self._context.write_log(level, logger or self._process.name.value, printable(message))
-
-
-def _values(status: Any) -> dict[str, str]:
-    return {item.key: item.value for item in status.values}
-
-
-def _figures(values: Mapping[str, str]) -> Mapping[str, Any]:
-    """Return the rates and counters in a report; none if it is not of this version."""
-    try:
-        numbers = {name: finite(values[name]) for name in ("sent_hz", "received_hz", "busy")}
-        counts = {name: int(values[name]) for name in ("errors", "overruns", "queue_drops")}
-    except (KeyError, ValueError):
-        return {}
-    return {**numbers, **counts, "slowest": values.get("slowest", "")}
 
 
 def _how(child: Child) -> str:

@@ -23,8 +23,11 @@ Work = Callable[[T], "Coroutine[Any, Any, None] | None"]
 class Strand(Protocol):
     """Runs the callbacks of one node, which must not raise."""
 
-    def post(self, call: Callable[[], object]) -> None:
-        """Run ``call`` now, or after the calls that were posted before it."""
+    def post(self, call: Callable[[], object], is_due: Callable[[], bool] | None = None) -> None:
+        """Run ``call`` now, or after the calls that were posted before it.
+
+        A call that waits may be dropped if ``is_due()`` returns false: it has nothing to do.
+        """
 
     def wrap(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
         """Return a coroutine that runs each step of ``coroutine`` on the strand."""
@@ -33,7 +36,7 @@ class Strand(Protocol):
 class InlineStrand:
     """The strand of a node whose loop has one thread, and of reentrant ports."""
 
-    def post(self, call: Callable[[], object]) -> None:
+    def post(self, call: Callable[[], object], _is_due: object = None) -> None:
         """Run ``call`` now."""
         call()
 
@@ -52,7 +55,7 @@ class SerialStrand:
         # A waiting coroutine is a future: setting its result hands the strand over.
         self._queue: deque[Callable[[], object] | Future[None]] = deque()
 
-    def post(self, call: Callable[[], object]) -> None:
+    def post(self, call: Callable[[], object], _is_due: object = None) -> None:
         """Run ``call`` now, or after the calls that were posted before it."""
         with self._lock:
             if self._is_held:
@@ -109,10 +112,23 @@ class StepScope(Protocol):
 
 def in_steps(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
     """Return a coroutine that runs each step of ``coroutine``, up to its next wait, in scope."""
-    return _InSteps(scope, coroutine)
+    return _Scoped(coroutine, _steps(scope, coroutine))
 
 
-class _InSteps(Coroutine[Any, Any, T]):
+def as_a_whole(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
+    """Return a coroutine that runs ``coroutine`` in scope from its start to its end."""
+    return _Scoped(coroutine, _whole(scope, coroutine))
+
+
+class ExclusiveStrand(SerialStrand):
+    """A strand on which a callback that awaits keeps the others waiting."""
+
+    def wrap(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
+        """Return a coroutine that holds the strand until it has ended."""
+        return as_a_whole(self, coroutine)
+
+
+class _Scoped(Coroutine[Any, Any, T]):
     """Closes the inner coroutine too if it is closed before it has begun.
 
     Otherwise Python would warn that the inner coroutine was never awaited.
@@ -120,9 +136,9 @@ class _InSteps(Coroutine[Any, Any, T]):
 
     __slots__ = ("_inner", "_steps")
 
-    def __init__(self, scope: StepScope, inner: Coroutine[Any, Any, T]) -> None:
+    def __init__(self, inner: Coroutine[Any, Any, T], steps: Generator[Any, Any, T]) -> None:
         self._inner = inner
-        self._steps = _steps(scope, inner)
+        self._steps = steps
 
     def __await__(self) -> Generator[Any, Any, T]:
         return self._steps
@@ -176,3 +192,22 @@ def _enter(scope: StepScope) -> Generator[Any, Any, None]:
         if not entered.cancel():  # it was entered already
             scope.leave()
         raise
+
+
+class _NoScope:
+    def enter(self) -> None:
+        """Begin at once."""
+
+    def leave(self) -> None:
+        """Do nothing."""
+
+
+def _whole(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
+    try:
+        yield from _enter(scope)
+        try:
+            return (yield from _steps(_NoScope(), coroutine))
+        finally:
+            scope.leave()
+    finally:
+        coroutine.close()

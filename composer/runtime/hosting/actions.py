@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Any
 
-from rclpy.action.server import CancelResponse, GoalEvent, GoalResponse
+from rclpy.action.server import CancelResponse, GoalEvent, GoalResponse, ServerGoalHandle
 from rclpy.action.server import RCLError as ActionError
 
 from composer.behavior import CallCancelled
 from composer.model import PortKind
 from composer.runtime.executors.exceptions import is_closing
 from composer.runtime.executors.futures import Cancelled, Future
+from composer.runtime.executors.strand import InlineStrand
 from composer.runtime.executors.tasks import within
 from composer.runtime.hosting.instance import Instance
 from composer.runtime.hosting.services import hosted_future
-from composer.runtime.hosting.user_code import UserFunction
+from composer.runtime.hosting.user_code import UserFunction, call_in_group
 from composer.runtime.ports.action_server import CANCEL_LIMIT_S
 
 
@@ -32,15 +34,17 @@ class HostedActionServer:
         self._server = server
         self.port = instance.ports.port(PortKind.ACTION_SERVER, full_name, server.action_type)
         self.name = self.port.name.value
-        self._context = instance.context
+        self._context = instance.context_for(server.callback_group, server)
         self._statistics = instance.context.statistics.callback(self.port.kind.value, self.name)
-        server.register_goal_callback(self._wrapped(server._goal_callback, self._accepts))
+        server.register_goal_callback(self._in_group(server._goal_callback, self._accepts))
         server.register_cancel_callback(
-            self._wrapped(server._cancel_callback, _returns(CancelResponse.REJECT))
+            self._in_group(server._cancel_callback, _returns(CancelResponse.REJECT))
         )
+        server.register_handle_accepted_callback(
+            self._in_group(server._handle_accepted_callback, self._abort_accepted)
+        )
+        # As in rclpy, the execution of a goal belongs to no callback group.
         server.register_execute_callback(self._wrapped(server._execute_callback, self._abort))
-        accepted = self._wrapped(server._handle_accepted_callback, self._abort_accepted)
-        server.register_handle_accepted_callback(lambda goal: accepted(self._gated(goal)))
         instance.context.loop.add_action_server(server)
 
     def activate(self) -> None:
@@ -87,6 +91,21 @@ class HostedActionServer:
 
     # --- callbacks
 
+    def _in_group(self, callback: Callable[[Any], Any], fallback: Callable[[Any], Any]) -> Any:
+        wrapped = self._wrapped(callback, fallback)
+        strand = self._context.strand
+        if isinstance(strand, InlineStrand):
+            return wrapped
+
+        async def call(argument: Any) -> Any:
+            result = wrapped(argument)
+            return await result if isinstance(result, Awaitable) else result
+
+        async def call_in_group(argument: Any) -> Any:
+            return await strand.wrap(call(argument))
+
+        return call_in_group
+
     def _wrapped(self, callback: Callable[[Any], Any], fallback: Callable[[Any], Any]) -> Any:
         """Return a callback whose exceptions are errors of the node, answered by ``fallback``."""
         function = UserFunction(self._instance, callback)
@@ -95,6 +114,8 @@ class HostedActionServer:
         def call(argument: Any) -> Any:
             if is_goal and not self._context.gate.incoming:
                 return self._accepts(argument)
+            if isinstance(argument, ServerGoalHandle):
+                self._gate(argument)
             try:
                 return function(argument)
             except BaseException as error:
@@ -129,8 +150,10 @@ class HostedActionServer:
             )
         return GoalResponse.REJECT
 
-    def _gated(self, goal: Any) -> Any:
-        """Make a goal publish feedback only while the node is active; return it."""
+    def _gate(self, goal: Any) -> None:
+        """Make a goal publish feedback only while the node is active."""
+        if "publish_feedback" in vars(goal):
+            return  # it was given to another callback before
         publish = goal.publish_feedback
 
         def publish_feedback(feedback: Any) -> None:
@@ -138,7 +161,6 @@ class HostedActionServer:
                 publish(feedback)
 
         goal.publish_feedback = publish_feedback
-        return goal
 
     def _abort(self, goal: Any) -> Any:
         if goal.is_active:
@@ -156,6 +178,7 @@ class HostedActionClient:
         self._instance = instance
         self._client = client
         self.port = instance.ports.port(PortKind.ACTION_CLIENT, full_name, client._action_type)
+        self._context = instance.context_for(self._client.callback_group, client)
         self._send = self._client.send_goal_async
         self._client.send_goal_async = self._send_goal
         instance.context.loop.add_action_client(client)
@@ -179,15 +202,10 @@ class HostedActionClient:
         context = self._instance.context
         if not context.gate.waiting:
             return hosted_future(self._instance, CallCancelled(context.gate.refusal))
-        function = None
         if feedback_callback is not None:
             function = UserFunction(self._instance, feedback_callback)
-
-        def on_feedback(message: Any) -> None:
-            if function is not None and context.gate.incoming:
-                context.call(function.__name__, function, message)
-
-        return self._send(goal, on_feedback if function else None, **options)
+            feedback_callback = partial(call_in_group, self._context, function)
+        return self._send(goal, feedback_callback, **options)
 
 
 def _returns(value: Any) -> Callable[[object], Any]:

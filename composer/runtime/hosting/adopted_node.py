@@ -78,6 +78,12 @@ class AdoptedNode(Node):
         if options.get("enable_logger_service"):
             self._add_logger_service(lasting)
 
+    def _declare_parameter_common(self, parameter_list: Any, descriptors: Any = None) -> Any:
+        results = super()._declare_parameter_common(parameter_list, descriptors)
+        for parameter in parameter_list:
+            self._composer_instance.declared[parameter.name] = parameter
+        return results
+
     def _add_logger_service(self, lasting: Any) -> None:
         """Let other nodes change the level of the logger, in every state."""
         instance = self._composer_instance

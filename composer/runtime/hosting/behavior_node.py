@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
-from composer.model import LogLevel
+from rclpy.parameter import Parameter
+
+from composer.model import LogLevel, Node, Port
+from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.hosting.adopted_node import AdoptedNode
-from composer.runtime.hosting.declared_ports import DeclaredPorts
+from composer.runtime.hosting.declared_ports import DeclaredPorts, report_undeclared
 from composer.runtime.hosting.dispatch import install
 from composer.runtime.hosting.instance import HostedEntities, Instance, InstanceSettings
 from composer.runtime.hosting.logger import HostedLogger
@@ -21,15 +25,19 @@ class NodeOfBehavior:
     What is created with it is gated by the lifecycle state. None of it is a declared port.
     """
 
-    def __init__(self, owner: LocalNode, level: LogLevel) -> None:
+    def __init__(self, owner: LocalNode, level: LogLevel, parameters: dict[str, Parameter]) -> None:
+        """``parameters`` were set at run time; those that are set now are added at the end."""
         install()
+        self._parameters = parameters
         context, _ = owner.contexts
         self._shared = SharedState(context.node)
         self._instance = Instance(
             owner.contexts,
-            DeclaredPorts(replace(owner.model, ports=())),
+            DeclaredPorts(
+                replace(owner.model, ports=()), partial(self._report, owner.model, context)
+            ),
             InstanceSettings(
-                overrides={},
+                overrides=dict(parameters),
                 logger=HostedLogger(context.log, context.node.get_logger().name, level),
                 action_names={},
                 finish=lambda reason: context.error_log.error("node", reason),
@@ -42,6 +50,12 @@ class NodeOfBehavior:
         AdoptedNode.__init__(node)
         self.node = node
 
+    @staticmethod
+    def _report(model: Node, context: NodeContext, port: Port) -> None:
+        declared = model.ports_of(port.kind)
+        if all(item.full_name != port.full_name for item in declared):
+            report_undeclared(context, port)
+
     @property
     def entities(self) -> HostedEntities:
         """What was created with the node."""
@@ -49,6 +63,7 @@ class NodeOfBehavior:
 
     def end(self) -> None:
         """Release the node: its handle is not valid any more."""
+        self._parameters.update(self._instance.changed_parameters())
         self._instance.ended.set()
         for executor in self._instance.executors:
             executor.shutdown(0.0)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any
 
 from composer.model import Isolation, Node, Port, PortKind, Qos
 from composer.qos import PRESETS, QosProfile
+from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.hosting.errors import HostingError
 from composer.runtime.ros.qos_profiles import own_profile
 from composer.source import Located
@@ -27,14 +28,15 @@ def interface_name(interface: Any) -> str:
 class DeclaredPorts:
     """The declared ports of a node, and which of them its class has created.
 
-    ``undeclared`` are the ports that the class has created without a declaration, and
-    ``differences`` those whose QoS is not the declared one.
+    ``on_undeclared`` is called with the first port on each name that the class creates without a
+    declaration. ``differences`` are the ports whose QoS is not the declared one.
     """
 
     node: Node
+    on_undeclared: Callable[[Port], None]
     created: set[str] = field(default_factory=set)  # names in use
-    undeclared: list[Port] = field(default_factory=list)
     differences: list[str] = field(default_factory=list)
+    _reported: set[tuple[PortKind, str]] = field(default_factory=set)
 
     def port(self, kind: PortKind, full_name: str, interface: Any, qos: Any = None) -> Port:
         """Return the port of an endpoint that the class creates, with its actual QoS.
@@ -48,8 +50,9 @@ class DeclaredPorts:
                 return self._declared(port, created, profile)
         port = self._undeclared(kind, full_name, created, profile)
         self.created.add(port.name.value)
-        if full_name not in _OF_EVERY_NODE:
-            self.undeclared.append(port)
+        if full_name not in _OF_EVERY_NODE and (kind, full_name) not in self._reported:
+            self._reported.add((kind, full_name))
+            self.on_undeclared(port)
         return port
 
     def missing(self) -> Iterator[Port]:
@@ -94,6 +97,13 @@ class DeclaredPorts:
         numbered = (f"{name}_{number}" for number in count(2))
         used = self.created | {port.name.value for port in self.node.ports}
         return name if name not in used else next(item for item in numbered if item not in used)
+
+
+def report_undeclared(context: NodeContext, port: Port) -> None:
+    """Log that a port is not declared, unless its messages are delivered in the process."""
+    if not context.router.delivers(port):
+        text = f"{port.kind} on {port.full_name} is not declared: it uses DDS ({port.interface})"
+        context.log.info(text)
 
 
 def _difference(declared: QosProfile, actual: QosProfile) -> str:

@@ -6,8 +6,9 @@ Installed once per process, before the first class is imported. Other nodes are 
 from __future__ import annotations
 
 import contextlib
+import sys
 import threading
-from functools import cache
+from functools import cache, wraps
 from typing import Any
 
 import rclpy
@@ -20,11 +21,9 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from composer.model import PortKind
-from composer.runtime.hosting.adopted_node import (
-    AdoptedLifecycleNode,
-    AdoptedNode,
-    action_name,
-)
+from composer.runtime.executors.stacks import is_internal
+from composer.runtime.hosting import adopted_node
+from composer.runtime.hosting.adopted_node import AdoptedLifecycleNode, AdoptedNode
 from composer.runtime.hosting.errors import HostingError
 from composer.runtime.hosting.instance import Instance
 from composer.runtime.hosting.user_code import current_instance, on_thread_start
@@ -54,6 +53,7 @@ def install() -> None:
 def _install_nodes() -> None:
     create_node, create_mixin = Node.__init__, LifecycleNodeMixin.__init__
 
+    @wraps(create_node)
     def init_node(self: Any, *arguments: Any, **options: Any) -> None:
         if isinstance(self, AdoptedNode):  # Node.__init__(self, 'name') instead of super()
             AdoptedNode.__init__(self, *arguments, **options)
@@ -63,6 +63,7 @@ def _install_nodes() -> None:
             raise HostingError(_SECOND_NODE.format(name=f"'{name}'"))
         create_node(self, *arguments, **options)
 
+    @wraps(create_mixin)
     def init_mixin(self: Any, **options: Any) -> None:
         if isinstance(self, AdoptedLifecycleNode):
             self.take_over_lifecycle()
@@ -84,12 +85,15 @@ def _install_actions() -> None:
 def _install_action(kind: Any, role: PortKind) -> None:
     create = kind.__init__
 
-    def init(self: Any, node: Any, action_type: Any, name: str, *args: Any, **options: Any) -> None:
+    @wraps(create)
+    def init(
+        self: Any, node: Any, action_type: Any, action_name: str, *args: Any, **options: Any
+    ) -> None:
         if not isinstance(node, AdoptedNode):
-            create(self, node, action_type, name, *args, **options)
+            create(self, node, action_type, action_name, *args, **options)
             return
         load_type_support(action_type)
-        full_name = action_name(node, role, name)
+        full_name = adopted_node.action_name(node, role, action_name)
         create(self, node, action_type, full_name, *args, **options)
         node.adopt_action(self, full_name)
 
@@ -149,7 +153,8 @@ def _install_threads() -> None:
     start = threading.Thread.start
 
     def start_thread(self: threading.Thread) -> None:
-        on_thread_start(self)
+        if not is_internal(sys._getframe(1).f_code.co_filename):  # of the composer's own
+            on_thread_start(self)
         start(self)
 
     threading.Thread.start = start_thread  # type: ignore[method-assign]

@@ -18,9 +18,9 @@ from composer.model import USE_SIM_TIME, BehaviorReference, HostedClass, LogLeve
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.strand import InlineStrand
+from composer.runtime.executors.strand import ExclusiveStrand, InlineStrand, Strand
 from composer.runtime.hosting.adopted_node import adopted, is_managed, shared_class
-from composer.runtime.hosting.declared_ports import DeclaredPorts
+from composer.runtime.hosting.declared_ports import DeclaredPorts, report_undeclared
 from composer.runtime.hosting.dispatch import install
 from composer.runtime.hosting.errors import HostingError
 from composer.runtime.hosting.instance import HostedEntities, Instance, InstanceSettings
@@ -65,6 +65,8 @@ class HostedNode(LocalNode):
         self._log_level: LogLevel = options.log_level
         self._instance: Instance | None = None
         self._shared: SharedState | None = None
+        #: Parameters that were set at run time. They keep their values, as those of other nodes do.
+        self._kept: dict[str, RosParameter] = {}
         self._overrides = {
             parameter.name.value: RosParameter(parameter.name.value, value=ros_value(parameter))
             for parameter in model.parameters
@@ -93,8 +95,8 @@ class HostedNode(LocalNode):
         node.__class__ = shared_class(cast(Any, type(node)))
         return node
 
-    def _is_serial(self, _options: NodeOptions) -> bool:
-        return True  # a callback may wait while the loop goes on
+    def _make_strand(self, _options: NodeOptions) -> Strand:
+        return ExclusiveStrand(self.loop.call_soon)  # a callback may wait while the loop goes on
 
     def _context_of_transitions(self) -> NodeContext:
         # Not on the strand of the callbacks: one of them may wait for what a transition ends.
@@ -107,7 +109,6 @@ class HostedNode(LocalNode):
         vars(self._ros)["_composer_instance"] = instance
         self._shared = SharedState(self._ros)
         await self._in_thread(instance, partial(self._construct, instance), "constructor")
-        self._report_ports(instance.ports)
 
     async def _call_user(self, transition: str) -> None:
         instance = self._instance
@@ -116,6 +117,8 @@ class HostedNode(LocalNode):
         if is_managed(type(instance.node)):
             handle = partial(self._handle, instance, transition)
             await self._in_thread(instance, handle, f"on_{transition}")
+        if transition == "configure":
+            self._report_missing(instance.ports)
         if transition in ("cleanup", "shutdown"):
             await self._in_thread(instance, instance.node.destroy_node, "destroy_node")
 
@@ -147,7 +150,7 @@ class HostedNode(LocalNode):
         if instance.node is None:
             raise HostingError("the constructor does not call super().__init__()")
 
-    def _discard(self, _outcome: TransitionOutcome | None) -> None:
+    def _discard(self, outcome: TransitionOutcome | None) -> None:
         instance, self._instance = self._instance, None
         self._entities = HostedEntities()
         if instance is None:
@@ -159,6 +162,9 @@ class HostedNode(LocalNode):
         for service in instance.lasting_services:
             self.loop.remove(service)
             self._ros.destroy_service(service)
+        has_failed = outcome is not None and outcome.transition == "configure"
+        # With values that it cannot be configured with, it would never be again.
+        self._kept = {} if has_failed else self._kept | instance.changed_parameters()
         if self._shared is not None:
             self._shared.restore()
         self._check_threads(instance.threads)
@@ -169,9 +175,9 @@ class HostedNode(LocalNode):
         logger_name = self._ros.get_logger().name
         return Instance(
             self.contexts,
-            DeclaredPorts(self.model),
+            DeclaredPorts(self.model, partial(report_undeclared, self._context)),
             InstanceSettings(
-                overrides=self._overrides,
+                overrides=self._overrides | self._kept,
                 logger=HostedLogger(self._context.log, logger_name, self._log_level),
                 action_names=action_names(self.model),
                 finish=self._finish,
@@ -210,14 +216,8 @@ class HostedNode(LocalNode):
             if follow is not None:
                 follow()
 
-    def _report_ports(self, ports: DeclaredPorts) -> None:
+    def _report_missing(self, ports: DeclaredPorts) -> None:
         log = self._context.log
-        for port in ports.undeclared:
-            if self._context.router.delivers(port):
-                continue
-            log.info(
-                f"{port.kind} on {port.full_name} is not declared: it uses DDS ({port.interface})"
-            )
         for port in ports.missing():
             log.warn(f"the class has not created {port.kind} '{port.name}' on {port.full_name}")
         for difference in ports.differences:

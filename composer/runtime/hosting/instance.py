@@ -19,8 +19,9 @@ from rclpy.service import Service
 from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.loop import Awaited
-from composer.runtime.executors.strand import InlineStrand, SerialStrand
+from composer.runtime.executors.strand import ExclusiveStrand, InlineStrand, Strand
 from composer.runtime.executors.tasks import name_of
+from composer.runtime.hosting.callback_groups import OwnGroup
 from composer.runtime.hosting.declared_ports import DeclaredPorts
 from composer.runtime.hosting.logger import HostedLogger
 from composer.runtime.node.local_node import ActionServing, RunningPort
@@ -88,6 +89,15 @@ class InstanceSettings:
     current_state: Callable[[], tuple[int, str]]
 
 
+def is_reentrant(context: NodeContext) -> bool:
+    """Return whether the callbacks of a callback group, by its context, may overlap."""
+    return type(context.group) is ReentrantCallbackGroup
+
+
+#: The groups of rclpy. Classes derived from them are groups of a class's own.
+_GROUPS = (MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup)
+
+
 class Instance:
     """What the entities of one instance share."""
 
@@ -111,6 +121,8 @@ class Instance:
         self.node: Any = None
         #: True while the constructor or a handler of a transition runs.
         self.in_transition = False
+        #: The parameters as they were declared.
+        self.declared: dict[str, Parameter] = {}
         #: Set when the instance has been destroyed.
         self.ended = threading.Event()
         #: The executors of the class's own that the node was added to.
@@ -121,7 +133,8 @@ class Instance:
         self.lasting_services: list[Service] = []
         #: The thread of the constructor or of the current handler of a transition.
         self.transition_thread: threading.Thread | None = None
-        self._contexts: dict[CallbackGroup, NodeContext] = {}
+        self._contexts: dict[object, NodeContext] = {}
+        self._own_groups: dict[CallbackGroup, OwnGroup] = {}
         self._timer_names: dict[str, int] = {}
 
     @property
@@ -129,42 +142,46 @@ class Instance:
         """The contexts of all callback groups."""
         return tuple(self._contexts.values())
 
-    def context_of(self, port: Port, group: CallbackGroup | None = None) -> NodeContext:
-        """Return the context of a port whose callbacks are in ``group``."""
-        context = self.context_for(group)
+    def context_of(self, port: Port, entity: Any) -> NodeContext:
+        """Return the context of the port of an entity of rclpy."""
+        context = self.context_for(getattr(entity, "callback_group", None), entity)
         return replace(context, gate=self._always_on_context.gate) if port.always_on else context
 
-    def context_for(self, group: CallbackGroup | None) -> NodeContext:
-        """Return the context of a callback group: callbacks of one group exclude each other."""
+    def context_for(self, group: CallbackGroup | None, entity: Any) -> NodeContext:
+        """Return the context of an entity in a callback group, which decides what runs with it."""
         if group is None or group is self.node.default_callback_group:
             return self.context
-        if group not in self._contexts:
-            if not isinstance(group, MutuallyExclusiveCallbackGroup | ReentrantCallbackGroup):
-                self.context.log.warn(
-                    f"callback group {type(group).__name__} of the class is not asked: its"
-                    " callbacks exclude each other"
-                )
-            strand = InlineStrand() if self.is_reentrant(group) else self._new_strand()
-            self._contexts[group] = replace(self.context, strand=strand, group=group)
-        return self._contexts[group]
+        # A group that the class has defined decides for each entity.
+        key = group if type(group) in _GROUPS else (group, entity)
+        if key not in self._contexts:
+            strand = self._strand(group, entity)
+            self._contexts[key] = replace(self.context, strand=strand, group=group)
+        return self._contexts[key]
 
-    def _new_strand(self) -> SerialStrand:
-        return SerialStrand(self.context.loop.call_soon)
-
-    @staticmethod
-    def is_reentrant(group: CallbackGroup | None) -> bool:
-        """Return whether callbacks of the group may overlap."""
-        return isinstance(group, ReentrantCallbackGroup)
-
-    def in_group(self, port: Port, group: CallbackGroup | None) -> Port:
-        """Return the port as its callback group makes it."""
-        return replace(port, reentrant=True) if self.is_reentrant(group) else port
+    def _strand(self, group: CallbackGroup, entity: Any) -> Strand:
+        if type(group) is ReentrantCallbackGroup:
+            return InlineStrand()
+        if type(group) is MutuallyExclusiveCallbackGroup:
+            return ExclusiveStrand(self.context.loop.call_soon)
+        if group not in self._own_groups:
+            self._own_groups[group] = OwnGroup(self, group)
+        entity.callback_group = ReentrantCallbackGroup()  # rclpy's executors would ask as well
+        return self._own_groups[group].strand(entity)
 
     def timer_name(self, callback: object) -> str:
         """Return a name for a timer that has no other one: that of its callback."""
         name = "rate" if callback is None else name_of(callback).rpartition(".")[2]
         number = self._timer_names[name] = self._timer_names.get(name, 0) + 1
         return name if number == 1 else f"{name}_{number}"
+
+    def changed_parameters(self) -> dict[str, Parameter]:
+        """Return the parameters whose values were set after their declaration."""
+        present = self.node._parameters if self.node is not None else {}
+        return {
+            name: present[name]
+            for name, declared in self.declared.items()
+            if name in present and present[name] is not declared
+        }
 
     def begin(self, entity: object, port: RunningPort, *, always_on: bool = False) -> None:
         """Add the port of an entity, and activate it if the node is active."""

@@ -39,7 +39,7 @@ class HostedPublisher(PublisherPort):
             for kind, callback in events.callbacks(PortKind.PUBLISHER).items()
         }
         self._held: deque[Any] = deque(maxlen=port.qos.profile.queue_depth)
-        super().__init__(instance.context_of(port), port)
+        super().__init__(instance.context_of(port, publisher), port)
         # An attribute of the object hides the method of the class at no cost per call.
         publisher.publish = self._publish_function()  # type: ignore[method-assign, assignment]
 

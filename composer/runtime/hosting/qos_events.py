@@ -18,6 +18,7 @@ from rclpy.event_handler import (
 
 from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.hosting.user_code import call_in_group
 from composer.runtime.ports.qos_events import QosEvents
 
 _PUBLISHER = QoSPublisherEventType
@@ -106,13 +107,7 @@ class HostedQosEvents(QosEvents):
         call_soon = self._context.loop.call_soon
 
         def on_status(status: Any) -> None:
-            call_soon(partial(self._call, callback, status))
+            call_soon(partial(call_in_group, self._context, callback, status))
 
         with suppress(UnsupportedEventTypeError):
             self._stop_watching.append(self._context.events.watch_status(endpoint, kind, on_status))
-
-    def _call(self, callback: Callable[[Any], Any], status: Any) -> None:
-        if self._context.gate.incoming:
-            rest = self._context.call(callback.__name__, callback, status)
-            if rest is not None:
-                self._context.spawn(rest)

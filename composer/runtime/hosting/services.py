@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from rclpy.client import Client
@@ -12,7 +13,7 @@ from rclpy.task import Future
 
 from composer.behavior import CallCancelled
 from composer.model import Port, PortKind
-from composer.runtime.hosting.instance import Instance
+from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.user_code import UserFunction
 from composer.runtime.ports.service import ServicePort
 
@@ -26,8 +27,9 @@ class HostedService(ServicePort):
         self.port = port
         self._given: Any = service
         callback = UserFunction(instance, service.callback)
-        context = instance.context_of(port, self._given.callback_group)
-        port = instance.in_group(port, self._given.callback_group)
+        context = instance.context_of(port, self._given)
+        if is_reentrant(context):
+            port = replace(port, reentrant=True)
         super().__init__(context, port, None, callback)
 
     def destroy(self) -> None:

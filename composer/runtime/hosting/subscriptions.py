@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from rclpy.node import Node
@@ -11,7 +12,7 @@ from rclpy.subscription import Subscription
 
 from composer.model import Port, PortKind
 from composer.runtime.executors.loop import Taken
-from composer.runtime.hosting.instance import Instance
+from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.qos_events import HostedQosEvents, PendingQosEvents
 from composer.runtime.hosting.user_code import UserFunction
 from composer.runtime.ports.mailbox import Mailbox
@@ -43,10 +44,10 @@ class HostedSubscription(SubscriptionPort):
         self._with_info = subscription._callback_type is Subscription.CallbackType.WithMessageInfo
         function = UserFunction(instance, callback)
         handler = (lambda pair: function(*pair)) if self._with_info else function
-        context = instance.context_of(port, subscription.callback_group)
-        super().__init__(
-            context, instance.in_group(port, subscription.callback_group), None, handler
-        )
+        context = instance.context_of(port, subscription)
+        if is_reentrant(context):
+            port = replace(port, reentrant=True)
+        super().__init__(context, port, None, handler)
 
     def destroy(self) -> None:
         """Destroy the subscription."""

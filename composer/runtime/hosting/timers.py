@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from rclpy.clock_type import ClockType
@@ -11,8 +12,9 @@ from rclpy.timer import Timer
 
 from composer.model import Period, PeriodUnit, TimerClock
 from composer.model import Timer as TimerModel
-from composer.runtime.hosting.instance import Instance
-from composer.runtime.hosting.user_code import UserFunction
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.hosting.instance import Instance, is_reentrant
+from composer.runtime.hosting.user_code import UserFunction, call_in_group
 from composer.runtime.ports.timer import TimerPort
 from composer.source import Located
 
@@ -72,9 +74,9 @@ class HostedTimerPort(TimerPort):
         is_canceled = Timer.is_canceled(timer)  # created without autostart
         timer.__class__ = HostedTimer
         timer._port, timer._is_canceled = self, is_canceled
-        context = instance.context_for(timer.callback_group)
+        context = instance.context_for(timer.callback_group, timer)
         self._function = UserFunction(instance, self._call_back)
-        super().__init__(context, self._model(), None, self._function)
+        super().__init__(context, self._model(context), None, self._function)
         self._name = getattr(timer.callback, "__name__", self._name)
 
     def activate(self) -> None:
@@ -115,13 +117,15 @@ class HostedTimerPort(TimerPort):
         self.restart()
 
     def _call_back(self) -> Any:
+        if not self._context.gate.incoming:
+            return None  # it waited for its callback group meanwhile
         timer = self._timer
         with timer.handle:
             timer.handle.call_timer()  # so that the class sees when the next call is due
         # Read each time: a rate sets the callback of its timer after creating it.
         return None if timer.callback is None else timer.callback()
 
-    def _model(self) -> TimerModel:
+    def _model(self, context: NodeContext) -> TimerModel:
         timer, instance = self._timer, self._instance
         span = instance.ports.node.span
         is_ros = timer.clock.clock_type == ClockType.ROS_TIME
@@ -131,7 +135,7 @@ class HostedTimerPort(TimerPort):
             Period(max(milliseconds, _SHORTEST_MS), PeriodUnit.MILLISECONDS, span),
             span,
             clock=TimerClock.ROS if is_ros else TimerClock.STEADY,
-            reentrant=instance.is_reentrant(timer.callback_group),
+            reentrant=is_reentrant(context),
         )
 
 
@@ -146,12 +150,7 @@ class HostedGuardCondition(GuardCondition):
 
     def trigger(self) -> None:
         """Call the callback soon, if the node is active then."""
-        self._instance.context.loop.call_soon(self._call)
-
-    def _call(self) -> None:
-        context = self._instance.context
-        if context.gate.incoming and self.callback is not None:
+        if self.callback is not None:
+            context = self._instance.context_for(self.callback_group, self)
             function = UserFunction(self._instance, self.callback)
-            rest = context.call(function.__name__, function)
-            if rest is not None:
-                context.spawn(rest)
+            context.loop.call_soon(partial(call_in_group, context, function))

@@ -14,6 +14,7 @@ from composer.runtime.executors.stacks import calls_user_code, is_internal, stac
 from composer.runtime.executors.strand import in_steps
 
 if TYPE_CHECKING:
+    from composer.runtime.callbacks.context import NodeContext
     from composer.runtime.hosting.instance import Instance
 
 
@@ -72,6 +73,18 @@ class UserFunction:
         finally:
             _CURRENT.instance = before
         return in_steps(_Steps(self._instance), result) if inspect.iscoroutine(result) else result
+
+
+def call_in_group(context: NodeContext, function: Callable[..., Any], *arguments: Any) -> None:
+    """Call ``function`` of a class as its callback group permits, if the node is active then."""
+
+    def call() -> None:
+        if context.gate.incoming:
+            rest = context.call(function.__name__, function, *arguments)
+            if rest is not None:
+                context.spawn(context.strand.wrap(rest))
+
+    context.strand.post(call)
 
 
 class _Steps:

@@ -35,7 +35,9 @@ def shared_channels(system: System) -> Mapping[ChannelKey, str | None]:
     """
     return {
         (channel.kind, channel.name): _dds_reason(channel, system.delivery)
-        for channel in channels(node for node in system.nodes if node.in_process)
+        for channel in channels(
+            (node for node in system.nodes if node.in_process), with_transforms=True
+        )
         if channel.sources and channel.sinks
     }
 

@@ -11,12 +11,16 @@ from rclpy.node import Node
 
 from composer.runtime.process.dds_participants import count_participants
 from composer.runtime.process.query_socket import KINDS, GraphView
+from composer.runtime.ros.action_info import action_info
+from composer.runtime.ros.endpoints_by_node import endpoints, node_names
 from composer.runtime.ros.graph import SETTLE_S, RosGraph, participant
 from composer.runtime.ros.node_info import node_info
 
 #: How long to wait for a process that has just started; commands wait longer than that.
 _COMPLETE_WITHIN_S = 0.4
 _POLL_S = 0.02
+#: Endpoints in one answer: writing it as JSON holds the GIL. Larger graphs have to be discovered.
+_MAX_ENDPOINTS = 20_000
 #: The bytes of a participant's prefix that Fast DDS derives from the computer.
 _HOST = slice(2, 4)
 
@@ -81,6 +85,36 @@ class GraphObserver:
     def node(self, name: str) -> Mapping[str, Any]:
         """Return the endpoints of a node, including hidden ones."""
         return asdict(node_info(RosGraph(self._node), name, hidden=True))
+
+    def topic(self, name: str) -> Mapping[str, Any] | None:
+        """Return the endpoints of a topic; None as for `view`, or if there is no such topic."""
+        types = self._types("topic", name)
+        return None if types is None else RosGraph(self._node).topic(name, types).plain()
+
+    def action(self, name: str) -> Mapping[str, Any] | None:
+        """Return the nodes of an action; None as for `view`, or if there is no such action."""
+        types = self._types("action", name)
+        return None if types is None else asdict(action_info(RosGraph(self._node), name, types))
+
+    def _types(self, kind: str, name: str) -> tuple[str, ...] | None:
+        view = self.view()
+        return None if view is None else dict(view[kind]).get(name)
+
+    def endpoints(self) -> dict[str, Any] | None:
+        """Return the endpoints of all nodes, and the names of all nodes; None as for `nodes`.
+
+        Some of the endpoints of a process that has just started may be missing.
+        """
+        if self.nodes() is None:
+            return None
+        graph = RosGraph(self._node)
+        found = endpoints(graph)
+        if sum(len(ends) for _, ends in found) > _MAX_ENDPOINTS:
+            return None
+        return {
+            "endpoints": {name: [end.plain() for end in ends] for name, ends in found},
+            "nodes": node_names(graph),
+        }
 
     def _are_all_known(self, graph: RosGraph, known: frozenset[bytes]) -> bool:
         """Say whether every process on this computer is known, and no ended one is."""

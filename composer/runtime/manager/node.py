@@ -40,16 +40,19 @@ from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.factory import log_exception
 from composer.runtime.executors.loop import Reply, unused_callback
 from composer.runtime.manager.graph_view import GraphObserver
+from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.manager.other_instances import Instance, OtherInstances
 from composer.runtime.manager.proxy_services import ProxyLifecycleService, ProxyParameterStore
 from composer.runtime.manager.queries import ManagerQueries
 from composer.runtime.manager.status_messages import status_message
-from composer.runtime.metrics.diagnostics import Figures, to_message
+from composer.runtime.metrics.diagnostics import Figures, to_statuses
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import ParameterServices
 from composer.runtime.process.query_socket import QuerySocket
+from composer.runtime.ros.diagnostic_arrays import Status as Diagnostic
+from composer.runtime.ros.diagnostic_arrays import write_array
 from composer.runtime.ros.manager_protocol import (
     CALLBACKS_QOS,
     CALLBACKS_TOPIC,
@@ -63,12 +66,17 @@ from composer.runtime.ros.manager_protocol import (
 from composer.runtime.ros.type_description import limit_type_descriptions
 from composer.runtime.supervision.main_queue import Command
 from composer.runtime.supervision.status import Status
+from composer.runtime.transforms.listener import TransformListeners
 
 COMMANDS = ("startup", "pause", "resume", "reset", "shutdown")
 _DIAGNOSTICS = "/diagnostics"
 _PERIOD_S = 1.0
-#: Changes within this time, as in a bring-up, become one message.
+#: Changes within this time, as in a bring-up, become one message. With many nodes, a message costs
+#: several milliseconds, so changes then wait longer: messages take at most 2 % of the time. While
+#: more changes follow, they wait for half a second.
 _BATCH_S = 0.05
+_LONGEST_BATCH_S = 0.5
+_MAX_SHARE = 0.02
 #: A stopped process does not keep others from getting the status.
 _ACKNOWLEDGED_WITHIN_S = 0.2
 _ACKNOWLEDGMENT_PERIOD_S = 0.02
@@ -84,7 +92,10 @@ class ManagerCallbacks:
     ``on_command(command)`` receives the commands; ``on_older_instance(instance)`` is called while
     the system starts if another process runs it already; ``update_status()`` updates rates and
     states; ``callbacks()`` and ``chains()`` return timings; ``nodes()`` returns the nodes by their
-    full names; ``write_log`` receives the lines of the manager's log.
+    full names; ``recreate(node)``, called on the loop of the node, replaces it by a new one if it
+    is finalized, and returns why it cannot be created, or None; ``expect_end()`` is called before
+    the last transitions that another process requests; ``write_log`` receives the lines of the
+    manager's log.
     """
 
     on_command: Callable[[Command], None]
@@ -93,6 +104,8 @@ class ManagerCallbacks:
     callbacks: Callable[[], tuple[CallbackFigures, ...]]
     chains: Callable[[], tuple[ChainFigures, ...]]
     nodes: Callable[[], Mapping[str, ManagedNode]]
+    recreate: Callable[[ManagedNode], str | None]
+    expect_end: Callable[[], None]
     write_log: Write
 
 
@@ -121,6 +134,10 @@ class ManagerNode:
         self._loop = EventLoop(NAME, log_exception)
         self._is_waiting = False  # for subscriptions that do not have the last message yet
         self._publish_due = threading.Lock()  # held while a message with changes is due
+        self._batch_s = _BATCH_S
+        self._changed_s = self._due_s = 0.0  # monotonic: the last change, when it is published
+        self._published_s = 0.0  # monotonic
+        self._number = 0  # of messages on ``state``
         self._node = Node(
             NAME,
             namespace=namespace,
@@ -134,7 +151,12 @@ class ManagerNode:
         ParameterServices(self._node, store, self._log.warn)
         self._loop.add_node(self._node)
         simulated_time = SimTimeSource(self._node, self._loop, self._log.warn)
-        self.process_context = ProcessContext(self._node, simulated_time, EventCounts(self._loop))
+        self.process_context = ProcessContext(
+            self._node,
+            simulated_time,
+            EventCounts(self._loop),
+            TransformListeners(self._node, self._loop, simulated_time, self._log.warn),
+        )
         self._clock = NodeTime(self._node, self._loop, simulated_time)
         self._node.set_parameters([Parameter(USE_SIM_TIME_NAME, value=use_sim_time)])
         self._diagnostics = self._publisher(_DIAGNOSTICS, 10, self._publish)
@@ -153,8 +175,18 @@ class ManagerNode:
             on_older=host.on_older_instance,
             on_permanent=self._warn_of_instance,
         )
-        if is_member or any(node.left_to_manager for node in status.snapshot().nodes):
-            ProxyLifecycleService(self._node, self._loop, host.nodes, self._publish)
+        if is_member:
+            callbacks = MemberCallbacks(
+                host.nodes,
+                host.recreate,
+                lambda: self._number,
+                self._publish,
+                host.expect_end,
+                status.keep_goals,
+            )
+            MemberService(self._node, self._loop, callbacks)
+        if any(node.left_to_manager for node in status.snapshot().nodes):
+            ProxyLifecycleService(self._node, self._loop, host.nodes, self._publish_first)
         self._graph = GraphObserver(self._node, self._state.topic_name)
         queries = ManagerQueries(
             self._loop,
@@ -254,15 +286,27 @@ class ManagerNode:
             *self._host.chains(),
             *self._host.callbacks(),
         )
-        message = to_message(self._status.without_nodes.system, figures)
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._callbacks.publish(message)
+        statuses = to_statuses(self._status.without_nodes.system, figures)
+        self._callbacks.publish(write_array(self._now_ns, statuses))
 
     def _publish_soon(self) -> None:
+        self._changed_s = time.monotonic()
         if self._publish_due.acquire(blocking=False):
-            self._loop.call_later(_BATCH_S, self._publish_changes)
+            self._due_s = self._changed_s + max(self._batch_s, _LONGEST_BATCH_S)
+            self._loop.call_later(self._batch_s, self._publish_changes)
+
+    def _publish_first(self) -> None:
+        """Publish the first change of a batch at once, for processes that wait for it."""
+        if time.monotonic() - self._published_s > self._batch_s:
+            self._publish()
+        else:
+            self._publish_soon()
 
     def _publish_changes(self) -> None:
+        left_s = min(self._changed_s + self._batch_s, self._due_s) - time.monotonic()
+        if left_s > 0.0:
+            self._loop.call_later(left_s, self._publish_changes)
+            return
         self._publish_due.release()
         self._publish()
 
@@ -298,14 +342,22 @@ class ManagerNode:
         self._is_waiting = False
         self._publish_now()
 
-    def _status_message(self) -> DiagnosticArray:
-        return status_message(self._status.snapshot(), self._uptime_s, self._host.chains())
+    @property
+    def _now_ns(self) -> int:
+        return int(self._node.get_clock().now().nanoseconds)
+
+    def _status_message(self) -> list[Diagnostic]:
+        chains = self._host.chains()
+        return status_message(self._status.snapshot(), self._uptime_s, chains, self._number)
 
     def _publish_now(self) -> None:
-        message = self._status_message()
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._state.publish(message)
+        start_s = time.monotonic()
+        self._number += 1
+        statuses, now_ns = self._status_message(), self._now_ns
+        self._state.publish(write_array(now_ns, statuses))
         if self._diagnostics.get_subscription_count():
-            callbacks = to_message(self._status.without_nodes.system, self._host.callbacks())
-            message.status = [*message.status, *callbacks.status]
-            self._diagnostics.publish(message)
+            statuses += to_statuses(self._status.without_nodes.system, self._host.callbacks())
+            self._diagnostics.publish(write_array(now_ns, statuses))
+        self._published_s = time.monotonic()
+        took_s = self._published_s - start_s
+        self._batch_s = min(max(_BATCH_S, took_s / _MAX_SHARE), _PERIOD_S)

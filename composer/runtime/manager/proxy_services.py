@@ -48,7 +48,7 @@ class ProxyLifecycleService:
     def __init__(
         self, node: Node, loop: EventLoop, nodes: Nodes, publish_states: Callable[[], None]
     ) -> None:
-        """Add the service to ``node``; call ``publish_states`` after each response."""
+        """Add the service to ``node``; call ``publish_states`` after each response, on the loop."""
         self._loop = loop
         self._nodes = nodes
         self._publish_states = publish_states

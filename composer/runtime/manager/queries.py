@@ -11,7 +11,6 @@ from dataclasses import asdict
 from functools import partial
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterValue
 
 from composer.runtime.executors.event_loop import EventLoop
@@ -19,7 +18,18 @@ from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.proxy_services import ProxyParameterStore
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.parameter_services import count_items, in_slices
-from composer.runtime.process.query_socket import GRAPH, NODE, NODES, PARAMETERS, STATUS, Answer
+from composer.runtime.process.query_socket import (
+    ACTION,
+    ENDPOINTS,
+    GRAPH,
+    NODE,
+    NODES,
+    PARAMETERS,
+    STATUS,
+    TOPIC,
+    Answer,
+)
+from composer.runtime.ros.diagnostic_arrays import Status
 from composer.runtime.ros.manager_protocol import full_parameter_name
 from composer.runtime.ros.parameter_description import ParameterDescription
 from composer.runtime.ros.parameter_values import description, plain_value
@@ -39,7 +49,7 @@ class ManagerQueries:
         loop: EventLoop,
         graph: GraphObserver,
         parameters: ProxyParameterStore,
-        status: Callable[[], DiagnosticArray],
+        status: Callable[[], Iterable[Status]],
         figures: Callable[[], tuple[Iterable[CallbackFigures], Iterable[ChainFigures]]],
     ) -> None:
         """``figures()`` returns the timings of callbacks and chains."""
@@ -55,6 +65,9 @@ class ManagerQueries:
             GRAPH: lambda _: self._graph.view(),
             NODES: lambda _: self._graph.nodes(),
             NODE: lambda name: self._graph.node(str(name)),
+            TOPIC: lambda name: self._graph.topic(str(name)),
+            ACTION: lambda name: self._graph.action(str(name)),
+            ENDPOINTS: lambda _: self._graph.endpoints(),
             STATUS: lambda callbacks: self._system_status(callbacks=bool(callbacks)),
             PARAMETERS: self._node_parameters,
         }
@@ -64,10 +77,7 @@ class ManagerQueries:
 
         With ``callbacks``, add the timings of callbacks and chains.
         """
-        statuses = [
-            [item.name, item.message, {value.key: value.value for value in item.values}]
-            for item in self._status().status
-        ]
+        statuses = [[item.name, item.message, item.values] for item in self._status()]
         timed, chains = self._figures() if callbacks else ((), ())
         return {
             "status": statuses,

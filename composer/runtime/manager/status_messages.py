@@ -1,57 +1,65 @@
-"""Converts the status of a system to diagnostic_msgs/msg/DiagnosticArray."""
+"""The status of a system as it is published: one diagnostic status for it and each node."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-
 from composer.runtime.metrics.figures import ChainFigures
+from composer.runtime.ros.diagnostic_arrays import Level, Status
 from composer.runtime.supervision.status import NodeStatus, SystemStatus
 
 _MAX_LENGTH = 500
 
 
 def status_message(
-    status: SystemStatus, uptime_s: float, chains: Iterable[ChainFigures]
-) -> DiagnosticArray:
-    """Return the status of a system, followed by those of its nodes."""
+    status: SystemStatus, uptime_s: float, chains: Iterable[ChainFigures], number: int
+) -> list[Status]:
+    """Return the status of a system, followed by those of its nodes.
+
+    ``number`` is that of the last message on the topic ``state``, this one included.
+    """
     nodes = (_of_node(status.system, node) for node in status.nodes)
-    return DiagnosticArray(status=[_of_system(status, uptime_s, chains), *nodes])
+    return [_of_system(status, uptime_s, chains, number), *nodes]
 
 
 def _of_system(
-    status: SystemStatus, uptime_s: float, chains: Iterable[ChainFigures]
-) -> DiagnosticStatus:
-    level = DiagnosticStatus.OK
+    status: SystemStatus, uptime_s: float, chains: Iterable[ChainFigures], number: int
+) -> Status:
+    level = Level.OK
     if status.failed:
-        level = DiagnosticStatus.ERROR
+        level = Level.ERROR
     elif not status.is_active:
-        level = DiagnosticStatus.WARN
+        level = Level.WARN
     values = {
         "activity": status.activity,
         "active": str(status.is_active).lower(),
+        "ready": str(status.is_ready).lower(),
         "host": status.host,
         "pid": str(status.pid),
         "started": f"{status.started_s:.3f}",
         "uptime": f"{uptime_s:.3f}",
+        "number": str(number),
+        "started_by": status.started_by,
     }
     values |= {f"chain {chain.chain}": chain.text for chain in chains}
-    return _status(status.system, status.system, level, status.summary, values)
+    goals = {"goals": status.goals} if status.goals else {}  # not cut either
+    name = status.system
+    return Status(level, name, _cut(status.summary), name, _cut_all(values) | goals)
 
 
-def _of_node(system: str, node: NodeStatus) -> DiagnosticStatus:
-    level = DiagnosticStatus.OK
+def _of_node(system: str, node: NodeStatus) -> Status:
+    level = Level.OK
     message = node.state
     if node.held_down:
-        level = DiagnosticStatus.ERROR
+        level = Level.ERROR
         message = f"{node.state}: {node.held_down}"
     elif node.state != "active":
-        level = DiagnosticStatus.WARN
+        level = Level.WARN
     values = {
         "state": node.state,
         "desired": node.desired,
         "depends_on": " ".join(f"{on}={state}" for on, state in node.depends_on.items()),
+        "process": node.process,
         "left_to_manager": " ".join(node.left_to_manager),
         "since": f"{node.since_s:.3f}",
         "restarts": str(node.restarts),
@@ -64,30 +72,27 @@ def _of_node(system: str, node: NodeStatus) -> DiagnosticStatus:
         "slowest": node.slowest,
         "overruns": str(node.overruns),
         "queue_drops": str(node.queue_drops),
+        "calls": str(node.calls),
+        "skipped": str(node.skipped),
         "qos_events": _pairs(node.qos_events),
     }
-    status = _status(f"{system}: {node.node}", system, level, message, values)
-    for key, counts in (("sent", node.sent), ("received", node.received)):
-        status.values.append(KeyValue(key=key, value=_pairs(counts)))
-    status.values.append(KeyValue(key="dropped", value=_pairs(node.dropped)))
-    return status
+    # A part of the name of a topic would be another name, so these are not cut.
+    counts = {
+        "sent": _pairs(node.sent),
+        "received": _pairs(node.received),
+        "dropped": _pairs(node.dropped),
+    }
+    name = f"{system}: {node.node}"
+    return Status(level, name, _cut(message), system, _cut_all(values) | counts)
 
 
 def _pairs(counts: Mapping[str, int]) -> str:
-    """Return counts by name as text, which is not cut: a part of a name would be another name."""
+    """Return counts by name as text."""
     return " ".join(f"{name}={count}" for name, count in counts.items())
 
 
-def _status(
-    name: str, system: str, level: bytes, message: str, values: dict[str, str]
-) -> DiagnosticStatus:
-    return DiagnosticStatus(
-        level=level,
-        name=name,
-        message=_cut(message),
-        hardware_id=system,
-        values=[KeyValue(key=key, value=_cut(value)) for key, value in values.items()],
-    )
+def _cut_all(values: dict[str, str]) -> dict[str, str]:
+    return {key: _cut(value) for key, value in values.items()}
 
 
 def _cut(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Converts figures of callbacks and chains to and from diagnostic_msgs/msg/DiagnosticArray."""
+"""Converts figures of callbacks and chains to and from diagnostic statuses."""
 
 from __future__ import annotations
 
@@ -6,29 +6,27 @@ from collections.abc import Callable, Iterable
 from dataclasses import fields
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.metrics.numbers import finite
+from composer.runtime.ros.diagnostic_arrays import Level, Status
 
 Figures = CallbackFigures | ChainFigures
 
 
-def to_message(system: str, figures: Iterable[Figures]) -> DiagnosticArray:
-    """Return a message with one status for each; overruns, drops and late data are warnings."""
-    return DiagnosticArray(status=[_status(system, item) for item in figures])
+def to_statuses(system: str, figures: Iterable[Figures]) -> list[Status]:
+    """Return one status for each; overruns, drops and late data are warnings."""
+    return [_status(system, item) for item in figures]
 
 
-def from_message(
-    message: DiagnosticArray,
+def from_statuses(
+    statuses: Iterable[Status],
 ) -> tuple[tuple[CallbackFigures, ...], tuple[ChainFigures, ...]]:
-    """Return the callbacks and chains of a message of :func:`to_message`.
+    """Return the callbacks and chains of statuses of :func:`to_statuses`.
 
-    Raises ValueError, KeyError or TypeError for any other message.
+    Raises ValueError, KeyError or TypeError for any others.
     """
     values = [
-        {item.key: _TYPES[item.key](item.value) for item in status.values}
-        for status in message.status
+        {key: _TYPES[key](value) for key, value in status.values.items()} for status in statuses
     ]
     return (
         tuple(CallbackFigures(**item) for item in values if "chain" not in item),
@@ -45,7 +43,7 @@ _TYPES = {
 }
 
 
-def _status(system: str, figures: Figures) -> DiagnosticStatus:
+def _status(system: str, figures: Figures) -> Status:
     if isinstance(figures, ChainFigures):
         name, is_ok, text = f"chain {figures.chain}", not figures.late, figures.text
     else:
@@ -53,13 +51,9 @@ def _status(system: str, figures: Figures) -> DiagnosticStatus:
         is_ok = not (figures.overruns or figures.dropped)
         text = f"{figures.overruns} over budget, {figures.dropped} dropped"
     values = {field.name: getattr(figures, field.name) for field in fields(figures)}
-    return DiagnosticStatus(
-        level=DiagnosticStatus.OK if is_ok else DiagnosticStatus.WARN,
-        name=f"{system}: {name}",
-        message=text,
-        hardware_id=system,
-        values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
-    )
+    level = Level.OK if is_ok else Level.WARN
+    texts = {key: _text(value) for key, value in values.items()}
+    return Status(level, f"{system}: {name}", text, system, texts)
 
 
 def _text(value: str | float) -> str:

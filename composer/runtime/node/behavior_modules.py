@@ -9,6 +9,7 @@ package for each folder, ``_composer_behavior_<digest>``: two projects may each 
 from __future__ import annotations
 
 import builtins
+import functools
 import hashlib
 import importlib
 import sys
@@ -27,6 +28,8 @@ _PREFIX = "_composer_behavior_"
 _LOCK = threading.RLock()
 #: The folders in which the modules of a package are searched, by its name.
 _folders: dict[str, tuple[Path, ...]] = {}
+#: The importers of the executed files, by the names of their modules.
+_importers: dict[str, _Importer] = {}
 
 
 def import_module(module: str, base: Path, folders: Sequence[Path]) -> ModuleType:
@@ -45,11 +48,26 @@ def _package(base: Path, folders: Sequence[Path]) -> str:
     if name not in sys.modules:
         if not any(isinstance(finder, _Finder) for finder in sys.meta_path):
             sys.meta_path.insert(0, _Finder())  # before the one that would load without _Loader
+            _find_helpers_by_name()
         package = ModuleType(name)
         package.__path__ = [str(base)]
         _folders[name] = tuple(folders)
         sys.modules[name] = package
     return name
+
+
+def _find_helpers_by_name() -> None:
+    """Let ``importlib.import_module`` in a file of a behavior find what its imports find."""
+    original = importlib.import_module
+
+    @functools.wraps(original)
+    def import_module(name: str, package: str | None = None) -> ModuleType:
+        importer = _importers.get(sys._getframe(1).f_globals.get("__name__", ""))
+        if importer is not None and not name.startswith("."):
+            name = importer.own_name(name) or name
+        return original(name, package)
+
+    importlib.import_module = import_module
 
 
 class _Finder(MetaPathFinder):
@@ -74,6 +92,7 @@ class _Loader(SourceFileLoader):
     def exec_module(self, module: ModuleType) -> None:
         """Execute the file."""
         importer = _Importer(Path(self.path).parent, module.__name__.partition(".")[0])
+        _importers[module.__name__] = importer
         module.__dict__["__builtins__"] = {**vars(builtins), "__import__": importer.import_}
         super().exec_module(module)
 
@@ -93,7 +112,7 @@ class _Importer:
         level: int = 0,
     ) -> Any:
         """Import a module as :func:`builtins.__import__` does."""
-        own = self._own_name(name) if level == 0 else None
+        own = self.own_name(name) if level == 0 else None
         if own is None:
             return builtins.__import__(name, globals, locals, fromlist or (), level)
         if fromlist:
@@ -102,7 +121,7 @@ class _Importer:
         rest = name.count(".")
         return sys.modules[own.rsplit(".", rest)[0] if rest else own]
 
-    def _own_name(self, name: str) -> str | None:
+    def own_name(self, name: str) -> str | None:
         """Return the full name of a module of the project; None for all others."""
         parts = name.split(".")
         if parts[0] in sys.stdlib_module_names or parts[0] == "composer":

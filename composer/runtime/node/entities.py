@@ -8,7 +8,11 @@ from typing import Any
 
 from composer.model import Event, Node, Port, PortKind, Reaction, Timer
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.reactions import ReactionClient, RunningReaction
+from composer.runtime.callbacks.reactions import (
+    MessageReaction,
+    ReactionClient,
+    RunningReaction,
+)
 from composer.runtime.intra_process.publisher import GatedPublisher
 from composer.runtime.node.behavior_loader import method
 from composer.runtime.node.local_node import Entities, RunningPort
@@ -20,6 +24,9 @@ from composer.runtime.ports.service import ServicePort
 from composer.runtime.ports.subscription import SubscriptionPort
 from composer.runtime.ports.timer import TimerPort
 from composer.runtime.ros.messages import interface_class
+from composer.runtime.transforms.broadcaster import Broadcasts
+from composer.runtime.transforms.listener import TransformListeners
+from composer.runtime.transforms.node_transforms import NodeTransforms
 
 
 @dataclass(slots=True)
@@ -40,6 +47,7 @@ class NodeEntities:
     timers: dict[str, TimerPort] = field(default_factory=dict)
     transitions: dict[Event, RunningReaction] = field(default_factory=dict)
     always_on: list[RunningPort] = field(default_factory=list)
+    transforms: NodeTransforms | None = None
     of_libraries: Entities | None = None  # created with the behavior's `node`
 
     @property
@@ -57,6 +65,8 @@ class NodeEntities:
         yield from self.services.values()
         yield from self.action_servers.values()
         yield from self.timers.values()
+        if self.transforms is not None:
+            yield self.transforms
         if self.of_libraries is not None:
             yield from self.of_libraries.ports
 
@@ -65,7 +75,7 @@ class NodeEntities:
         """The ports and timers that work only while the node is active."""
         return (port for port in self.ports if port not in self.always_on)
 
-    def create(self, model: Node, behavior: object | None) -> None:
+    def create(self, model: Node, behavior: object | None, listeners: TransformListeners) -> None:
         """Create the entities of ``model``; if one fails, those created before it remain.
 
         Raises MessageError, PeriodError, and exceptions of rclpy.
@@ -77,6 +87,8 @@ class NodeEntities:
             self.clients[port.name.value] = ClientPort(self._context_of(port), port)
         for port in model.ports_of(PortKind.ACTION_CLIENT):
             self.action_clients[port.name.value] = ActionClientPort(self._context_of(port), port)
+        if model.transforms is not None:
+            self.transforms = NodeTransforms(self.context, model.transforms, listeners)
         self._bind_responses(model)
         for port in model.ports_of(PortKind.SUBSCRIPTION, PortKind.SERVICE, PortKind.ACTION_SERVER):
             self._add_receiver(port, behavior)
@@ -128,7 +140,7 @@ class NodeEntities:
         handler = method(behavior, f"on_{name}")
         match port.kind:
             case PortKind.SUBSCRIPTION:
-                reaction = self._reaction(port.reaction(Event.MESSAGE))
+                reaction = self._on_message(port)
                 self.subscriptions[name] = SubscriptionPort(context, port, reaction, handler)
             case PortKind.SERVICE:
                 response_type = interface_class(port.interface.value).Response
@@ -143,6 +155,14 @@ class NodeEntities:
         self, declared: Reaction | None, response_type: Any = None
     ) -> RunningReaction | None:
         return None if declared is None else self._compile(declared, response_type)
+
+    def _on_message(self, port: Port) -> MessageReaction | None:
+        """Return what a message triggers before the handler: broadcasts, and the reaction."""
+        reaction = self._reaction(port.reaction(Event.MESSAGE))
+        if self.transforms is None:
+            return reaction
+        broadcasts = tuple(self.transforms.broadcaster.from_messages(port))
+        return Broadcasts(broadcasts, reaction) if broadcasts else reaction
 
     def _compile(self, declared: Reaction, response_type: Any = None) -> RunningReaction:
         callers: dict[str, ReactionClient] = {**self.clients, **self.action_clients}

@@ -23,7 +23,7 @@ from composer.runtime.clock.clock import NodeTime
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.strand import InlineStrand, SerialStrand
+from composer.runtime.executors.strand import InlineStrand, SerialStrand, Strand
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import Lifecycle
@@ -132,7 +132,7 @@ class LocalNode(ABC):
             loop=loop,
             clock=NodeTime(self._ros, loop, options.process.simulated_time, self._time_switched),
             gate=LifecycleGate(model.full_name, PendingFutures(loop.call_later)),
-            strand=SerialStrand(loop.call_soon) if self._is_serial(options) else InlineStrand(),
+            strand=self._make_strand(options),
             log=log,
             error_log=error_log,
             statistics=self.statistics,
@@ -232,9 +232,9 @@ class LocalNode(ABC):
     def _make_ros_node(self) -> RosNode:
         return make_ros_node(self.model)
 
-    def _is_serial(self, options: NodeOptions) -> bool:
-        """Return whether a strand has to keep callbacks apart, because the loop does not."""
-        return options.parallel
+    def _make_strand(self, options: NodeOptions) -> Strand:
+        """Return what keeps callbacks apart where the loop does not."""
+        return SerialStrand(self.loop.call_soon) if options.parallel else InlineStrand()
 
     def _context_of_transitions(self) -> NodeContext:
         """Return the context whose strand runs transitions."""

@@ -28,8 +28,11 @@ class NodeListener(Protocol):
     def on_error_limit(self, text: str) -> None:
         """Receive that the node has exceeded its ``max_errors``, once per activation."""
 
-    def on_ended(self, text: str, state: str) -> None:
-        """Receive that a node outside the process has ended by itself, and its new state."""
+    def on_ended(self, text: str, state: str, *, is_awaited: bool = False) -> None:
+        """Receive that a node outside the process has ended by itself, and its new state.
+
+        With ``is_awaited``, it cannot be started from here, and its return will be reported.
+        """
 
     def on_returned(self) -> None:
         """Receive that a node that had disappeared by itself is there again."""

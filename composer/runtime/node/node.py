@@ -63,6 +63,7 @@ class RunningNode(LocalNode):
         self._cleaned_up_behavior: Any = None  # for ``on_shutdown``
         self._make_library_node = options.make_library_node
         self._library: LibraryNode | None = None
+        self._listeners = options.process.transforms
         self._entities = NodeEntities(self._context, self._always_on_context)
         parameters = NodeParameters(
             self._ros, model.parameters, check=self._check_timers, changed=self._parameters_changed
@@ -84,7 +85,7 @@ class RunningNode(LocalNode):
         reference = self.model.behavior
         behavior = None if reference is None else self._make_behavior(reference)
         try:
-            self._entities.create(self.model, behavior)
+            self._entities.create(self.model, behavior, self._listeners)
         finally:
             if behavior is not None:
                 self._set_attributes(behavior, self._entities)
@@ -102,6 +103,8 @@ class RunningNode(LocalNode):
         behavior.publishers = named_ports("publisher", entities.senders)
         behavior.clients = named_ports("client", entities.clients)
         behavior.action_clients = named_ports("action client", entities.action_clients)
+        if entities.transforms is not None:
+            behavior.transforms = entities.transforms
         if self._make_library_node is not None and not hasattr(behavior, "node"):
             library: LibraryNode = self._make_library_node(self)
             self._library, entities.of_libraries = library, library.entities
@@ -114,6 +117,8 @@ class RunningNode(LocalNode):
     async def _call_user(self, transition: str) -> None:
         if transition == "shutdown" and self._behavior is None:
             self._behavior = self._cleaned_up_behavior
+        if transition == "activate" and self._entities.transforms is not None:
+            self._entities.transforms.begin()
         await self._call_handler(transition)
 
     async def _call_user_on_error(self, cause: BaseException) -> None:

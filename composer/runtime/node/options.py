@@ -14,6 +14,7 @@ from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.clock.sim_time import SimTimeSource
 from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.intra_process.router import LocalRouter
+from composer.runtime.transforms.listener import TransformListeners
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +24,7 @@ class ProcessContext:
     manager: RosNode
     simulated_time: SimTimeSource
     events: EventCounts
+    transforms: TransformListeners
 
 
 @dataclass(frozen=True, slots=True)

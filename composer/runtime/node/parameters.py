@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -140,10 +141,22 @@ def _declare(node: Node, parameter: Parameter) -> Any:
     if node.has_parameter(name):  # rclpy declares use_sim_time for every node
         node.undeclare_parameter(name)
     try:
-        node.declare_parameter(name, value, _descriptor(parameter))
+        if value == [] and parameter.type.value != ParameterType.BYTE_ARRAY:
+            _declare_empty(node, parameter)
+        else:
+            node.declare_parameter(name, value, _descriptor(parameter))
     except (InvalidParameterException, InvalidParameterValueException, TypeError) as error:
         raise ParameterError(f"parameter '{name}': {error}") from error
     return _plain(value)
+
+
+def _declare_empty(node: Node, parameter: Parameter) -> None:
+    """Declare an empty array, which rclpy takes for one of bytes unless its type is given."""
+    name = parameter.name.value
+    declared = _ROS_TYPES[ParameterType(parameter.type.value)]
+    node.declare_parameter(name, declared, _descriptor(replace(parameter, read_only=False)))
+    node.set_parameters([RosParameter(name, declared, [])])
+    node.describe_parameter(name).read_only = parameter.read_only
 
 
 def ros_value(parameter: Parameter) -> Any:

@@ -14,7 +14,7 @@ from rclpy.subscription import Subscription
 from composer.model import Port
 from composer.qos import Durability
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.reactions import RunningReaction
+from composer.runtime.callbacks.reactions import MessageReaction
 from composer.runtime.callbacks.timing import mutation_checked
 from composer.runtime.ports.mailbox import Mailbox, OverlappingMailbox
 from composer.runtime.ports.qos_events import QosEvents
@@ -50,7 +50,7 @@ class SubscriptionPort:
         self,
         context: NodeContext,
         port: Port,
-        reaction: RunningReaction | None,
+        reaction: MessageReaction | None,
         handler: Callable[[Any], Any] | None,
     ) -> None:
         self._context = context

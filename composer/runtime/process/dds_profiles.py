@@ -8,13 +8,16 @@ second. See docs/decisions/0024-fast-dds-profile.md and
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 
 from composer.ownership import TrustedUsers
+from composer.runtime.process.instance_lock import FOLDER_NAME
 
 _PROFILE = Path(__file__).with_name("fast_dds.xml")
 _PROFILE_FOR_LARGE_SYSTEMS = Path(__file__).with_name("fast_dds_large.xml")
+_PROFILE_FOR_DASHBOARDS = Path(__file__).with_name("fast_dds_dashboard.xml")
 _PROFILE_FOR_COMMANDS = Path(__file__).with_name("fast_dds_commands.xml")
 _PROFILE_FOR_COMMANDS_ON_LOCALHOST = Path(__file__).with_name("fast_dds_commands_localhost.xml")
 #: Read by Fast DDS 2 only; other middleware and later versions do not need the profile.
@@ -26,6 +29,8 @@ _UDP = "UDPv4"
 _RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 #: Variables that the profile for localhost does not replace.
 _OTHER_RANGE_VARIABLES = ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
+#: The names of profiles that are written at run time.
+_GENERATED = "fast_dds_"
 #: Fast DDS reads it from the current folder, also if there is a profile.
 _USER_FILE = "DEFAULT_FASTRTPS_PROFILES.xml"
 _SKIP_USER_FILE_VARIABLE = "SKIP_DEFAULT_XML_FILE"
@@ -40,6 +45,8 @@ def use_discovery_profile(environment: MutableMapping[str, str], folder: Path = 
     user_file = folder / _USER_FILE
     if TrustedUsers.starting_at(folder).other_owner(user_file) is not None:
         environment[_SKIP_USER_FILE_VARIABLE] = "1"
+    if _is_generated(environment):  # by the process that has started this one
+        environment[_VARIABLE] = str(_PROFILE)
     variables = (_VARIABLE, _OTHER_VARIABLE, _SERVER_VARIABLE)
     if any(map(environment.get, variables)):
         return
@@ -50,7 +57,22 @@ def use_discovery_profile(environment: MutableMapping[str, str], folder: Path = 
 
 def is_own_profile(environment: Mapping[str, str]) -> bool:
     """Say whether a system uses one of our profiles: the user has not configured Fast DDS."""
-    return environment.get(_VARIABLE) in (str(_PROFILE), str(_PROFILE_FOR_LARGE_SYSTEMS))
+    path = environment.get(_VARIABLE)
+    ours = (str(_PROFILE), str(_PROFILE_FOR_LARGE_SYSTEMS))
+    return path in ours or _is_generated(environment)
+
+
+def generated_profile(content: str) -> str:
+    """Return the file name of a profile that is written at run time.
+
+    It follows from the content: processes of a system share the file, also those that start later.
+    """
+    return f"{_GENERATED}{hashlib.sha256(content.encode()).hexdigest()[:16]}.xml"
+
+
+def _is_generated(environment: Mapping[str, str]) -> bool:
+    path = Path(environment.get(_VARIABLE) or "")
+    return path.parent.name == FOLDER_NAME and path.name.startswith(_GENERATED)
 
 
 def use_command_profile(environment: MutableMapping[str, str]) -> None:
@@ -78,3 +100,12 @@ def use_large_system_profile(environment: MutableMapping[str, str]) -> None:
     """
     if environment.get(_VARIABLE) == str(_PROFILE):
         environment[_VARIABLE] = str(_PROFILE_FOR_LARGE_SYSTEMS)
+
+
+def use_dashboard_profile(environment: MutableMapping[str, str]) -> None:
+    """Select the profile for a process that observes for long: it announces itself less often.
+
+    Other processes answer its first announcement, and it answers theirs.
+    """
+    if environment.get(_VARIABLE) == str(_PROFILE):
+        environment[_VARIABLE] = str(_PROFILE_FOR_DASHBOARDS)

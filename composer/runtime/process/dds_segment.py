@@ -7,12 +7,13 @@ docs/decisions/0050-shared-memory-segment.md.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from tempfile import NamedTemporaryFile
-from xml.etree import ElementTree
+from xml.sax.saxutils import escape
 
 from composer.runtime.process.dds_profiles import is_own_profile
+from composer.runtime.process.dds_xml import Profile, child, extend
 from composer.runtime.process.shared_memory import (
     LARGE_SEGMENT_BYTES,
     MEGABYTE,
@@ -24,43 +25,16 @@ from composer.runtime.process.shared_memory import (
 _PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _TRANSPORTS_VARIABLE = "FASTDDS_BUILTIN_TRANSPORTS"
 _RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-#: With one of them, rmw_fastrtps sets up the transports in a way that a profile cannot express.
-_OTHER_RANGE_VARIABLES = ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
-_NAMESPACE = "http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"
-_SEGMENT = f"""
-<transport_descriptors xmlns="{_NAMESPACE}">
-  <transport_descriptor>
-    <transport_id>shared_memory</transport_id>
-    <type>SHM</type>
-    <segment_size>{LARGE_SEGMENT_BYTES}</segment_size>
-    <maxMessageSize>65500</maxMessageSize>
-  </transport_descriptor>
-  <transport_descriptor>
-    <transport_id>udp</transport_id>
-    <type>UDPv4</type>
-  </transport_descriptor>
-</transport_descriptors>
-"""
-_TRANSPORTS = f"""
-<rtps xmlns="{_NAMESPACE}">
-  <useBuiltinTransports>false</useBuiltinTransports>
-  <userTransports>
-    <transport_id>shared_memory</transport_id>
-    <transport_id>udp</transport_id>
-  </userTransports>
-</rtps>
-"""
+_PEERS_VARIABLE = "ROS_STATIC_PEERS"
+#: With it, rmw_fastrtps sets up the transports in a way that a profile cannot express.
+_DEPRECATED_VARIABLE = "ROS_LOCALHOST_ONLY"
+#: The limit of Fast DDS without a profile.
+_MESSAGE_BYTES = 65_500
 #: What rmw_fastrtps sets for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST: a profile with that variable
 #: would have two shared memory transports. See fast_dds_commands_localhost.xml.
-_INITIAL_PEERS = f'<maxInitialPeersRange xmlns="{_NAMESPACE}">32</maxInitialPeersRange>'
-_LOCALHOST = f"""
-<builtin xmlns="{_NAMESPACE}">
-  <metatrafficUnicastLocatorList><locator/></metatrafficUnicastLocatorList>
-  <initialPeersList>
-    <locator><udpv4><address>127.0.0.1</address></udpv4></locator>
-  </initialPeersList>
-</builtin>
-"""
+_PARTICIPANTS_ON_LOCALHOST = 32
+_NO_MULTICAST = "<metatrafficUnicastLocatorList><locator/></metatrafficUnicastLocatorList>"
+_PEER = "<locator><udpv4><address>{}</address></udpv4></locator>"
 
 
 def segment_for_large_messages(
@@ -89,7 +63,7 @@ def _may_choose(environment: Mapping[str, str]) -> bool:
     if environment.get(_TRANSPORTS_VARIABLE) or not is_own_profile(environment):
         return False
     if reach == "LOCALHOST":
-        return not any(map(environment.get, _OTHER_RANGE_VARIABLES))
+        return not environment.get(_DEPRECATED_VARIABLE)
     return reach != "OFF"
 
 
@@ -101,8 +75,10 @@ def enlarged_segment(environment: MutableMapping[str, str]) -> Iterator[None]:
     own.
     """
     before = dict(environment)
-    localhost = before.get(_RANGE_VARIABLE) == "LOCALHOST"
-    content = profile_with_segment(before[_PROFILES_VARIABLE], localhost=localhost)
+    peers = None
+    if before.get(_RANGE_VARIABLE) == "LOCALHOST":
+        peers = list(filter(None, before.get(_PEERS_VARIABLE, "").split(";")))
+    content = profile_with_segment(before[_PROFILES_VARIABLE], peers)
     with ExitStack() as stack:
         with suppress(OSError):  # no folder for temporary files
             file = stack.enter_context(NamedTemporaryFile(prefix="fast_dds_", suffix=".xml"))
@@ -110,42 +86,22 @@ def enlarged_segment(environment: MutableMapping[str, str]) -> Iterator[None]:
             file.flush()
             stack.callback(environment.update, before)
             environment[_PROFILES_VARIABLE] = file.name
-            if localhost:
+            if peers is not None:
                 environment[_RANGE_VARIABLE] = "SYSTEM_DEFAULT"
         yield
 
 
-def profile_with_segment(path: str, *, localhost: bool) -> bytes:
+def profile_with_segment(path: str, peers: Sequence[str] | None) -> bytes:
     """Return the profile in the file ``path`` with a large segment, as XML.
 
-    With ``localhost``, it implements that discovery range as well.
+    With ``peers``, it also implements the discovery range LOCALHOST with these static peers.
     """
-    ElementTree.register_namespace("", _NAMESPACE)
-    root = ElementTree.parse(path).getroot()  # noqa: S314 - a file of ours
-    profiles = _child(root, "profiles")
-    descriptors = _parse(_SEGMENT)
-    profiles.insert(0, descriptors)
-    rtps = _child(_participant(profiles), "rtps")
-    rtps.extend(_parse(_TRANSPORTS))
-    if localhost:
-        descriptors[-1].append(_parse(_INITIAL_PEERS))
-        _child(rtps, "builtin").extend(_parse(_LOCALHOST))
-    text = ElementTree.tostring(root, encoding="unicode")
-    return text.encode()
-
-
-def _parse(text: str) -> ElementTree.Element:
-    return ElementTree.fromstring(text)  # noqa: S314 - a text of ours
-
-
-def _participant(profiles: ElementTree.Element) -> ElementTree.Element:
-    participant = _child(profiles, "participant")
-    participant.attrib |= {"profile_name": "composer", "is_default_profile": "true"}
-    return participant
-
-
-def _child(parent: ElementTree.Element, name: str) -> ElementTree.Element:
-    """Return the child ``name``, which is added if it is missing."""
-    tag = f"{{{_NAMESPACE}}}{name}"
-    found = parent.find(tag)
-    return ElementTree.SubElement(parent, tag) if found is None else found
+    profile = Profile(path)
+    child(profile.shared_memory, "segment_size").text = str(LARGE_SEGMENT_BYTES)
+    child(profile.shared_memory, "maxMessageSize").text = str(_MESSAGE_BYTES)
+    if peers is not None:
+        child(profile.udp, "maxInitialPeersRange").text = str(_PARTICIPANTS_ON_LOCALHOST)
+        known = "".join(_PEER.format(escape(peer)) for peer in ("127.0.0.1", *peers))
+        locators = f"<initialPeersList>{known}</initialPeersList>"
+        extend(child(profile.rtps, "builtin"), _NO_MULTICAST + locators)
+    return profile.text().encode()

@@ -10,14 +10,18 @@ import os
 import sys
 from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from composer.diagnostics import nearest
+from composer.model.hosts import HIGHEST_DOMAIN_ID, domain_problem
 from composer.runtime.process import StartRefused
 from composer.runtime.process.dds_profiles import use_discovery_profile
+from composer.runtime.process.discovery import use_discovery
 from composer.runtime.process.shared_memory import remove_incomplete_ports
 
-#: See rcl's domain_id.c; above 101 the ports of a participant may meet the ephemeral ones of Linux.
-HIGHEST_DOMAIN_ID = 232
+if TYPE_CHECKING:
+    from composer.model import Discovery
+
 DISCOVERY_RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 _DISABLED = ("", "0", "false", "no", "off")
 #: Tokens: https://docs.ros.org/en/jazzy/Tutorials/Demos/Logging-and-logger-configuration.html
@@ -62,23 +66,22 @@ def complete_environment(environment: MutableMapping[str, str]) -> None:
     environment.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", CONSOLE_FORMAT)
 
 
-def prepare_environment() -> None:
+def prepare_environment(discovery: Discovery | None = None) -> None:
     """Check and complete the environment, and remove incomplete shared memory.
 
-    Raises StartRefused. Call it before rclpy is imported: the import ends the process if the
-    middleware does not exist.
+    ``discovery`` is that of the system that this process runs. Raises StartRefused. Call it before
+    rclpy is imported: the import ends the process if the middleware does not exist.
     """
     complete_environment(os.environ)
     use_discovery_profile(os.environ)
+    use_discovery(discovery, os.environ)
     check_environment(os.environ)
     remove_incomplete_ports(int(os.environ.get("ROS_DOMAIN_ID") or 0))
 
 
 def _check_domain_id(environment: Mapping[str, str]) -> None:
     text = environment.get("ROS_DOMAIN_ID", "")
-    if not text:
-        return
-    if not (text.isascii() and text.isdigit() and int(text) <= HIGHEST_DOMAIN_ID):
+    if domain_problem(text) is not None:
         raise StartRefused(
             f"ROS_DOMAIN_ID is '{text}', which is not a domain id",
             f"set it to a number from 0 to {HIGHEST_DOMAIN_ID} (up to 101 is safe everywhere)",

@@ -12,47 +12,70 @@ import os
 import socket
 import stat
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from composer.runtime.process import StartRefused
 
+#: Identifies the start of a process of a system by the one that coordinates it. Such a process ends
+#: with ``ALREADY_RUNS``, and says nothing, if another one holds its instance lock.
+STARTED_BY_VARIABLE = "COMPOSE_STARTED_BY"
+ALREADY_RUNS = 75  # EX_TEMPFAIL of sysexits.h
+#: The name of the folder of the lock files.
+FOLDER_NAME = f"ros2-composer-{os.geteuid()}"
 _DEFAULT_DOMAIN = "0"
 _SUFFIX = ".lock"
+#: A process that only looks whether a system runs holds its lock for some microseconds.
+_LOOKED_AT_WITHIN_S = 0.05
+_POLL_S = 0.005
+#: A change of the folder is only known for certain after this time: its clock advances in steps.
+_CHANGE_IS_CERTAIN_NS = 100_000_000
+_OPEN_LOCK = os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC
 _WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
-def already_running(name: str, host: str, pid: str | int) -> StartRefused:
+class AlreadyRunning(StartRefused):
+    """Another process runs the system."""
+
+
+def already_running(name: str, host: str, pid: str | int) -> AlreadyRunning:
     """Return the error for a system that runs already. ``name`` is its manager's namespace."""
     system = name if name.count("/") > 1 else name.removeprefix("/")
-    return StartRefused(
+    return AlreadyRunning(
         f"system '{system}' already runs in ROS domain {_domain()}: host {host}, process {pid}",
         f"stop it with 'compose down {system}', or set another ROS_DOMAIN_ID or --namespace",
     )
 
 
 @contextmanager
-def hold_instance_lock(name: str) -> Iterator[None]:
+def hold_instance_lock(name: str, discovery: Mapping[str, str] | None = None) -> Iterator[None]:
     """Hold the instance lock of a system; ``name`` is the namespace of its manager.
 
-    The operating system releases it however the process ends. Raises StartRefused.
+    Commands on this computer use the variables in ``discovery`` to discover the system. The
+    operating system releases the lock however the process ends. Raises StartRefused and
+    AlreadyRunning.
     """
     lock = _open(name)
     if lock is None:
         yield
         return
     with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            host, pid = _holder(lock)
-            raise already_running(name, host, pid) from error
+        end_s = time.monotonic() + _LOOKED_AT_WITHIN_S
+        while not _is_locked(lock, fcntl.LOCK_EX):
+            if time.monotonic() > end_s:
+                holder = _holder(lock)
+                raise already_running(name, holder["host"], holder["pid"])
+            time.sleep(_POLL_S)
         lock.seek(0)
         lock.truncate()
-        json.dump({"host": socket.gethostname(), "pid": os.getpid()}, lock)
+        holder = {"host": socket.gethostname(), "pid": os.getpid(), "discovery": discovery or {}}
+        json.dump(holder, lock)
         lock.flush()
+        with suppress(OSError):  # for LocalSystems: the file may exist since long
+            os.utime(_folder(), follow_symlinks=False)
         yield
 
 
@@ -61,21 +84,98 @@ def local_systems() -> dict[str, str]:
 
     Unlike discovery, which may take seconds, this is complete at once.
     """
-    pids: dict[str, str] = {}
+    return {name: str(holder["pid"]) for name, holder in _holders()}
+
+
+class LocalSystems:
+    """The systems of :func:`local_systems`, for a process that asks again and again.
+
+    The lock files of ended systems remain, hundreds in time. All are opened again only if the
+    folder has changed, as it does when a system starts.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[str, str] = {}
+        self._changed_ns: int | None = None
+
+    def current(self) -> dict[str, str]:
+        """Return the process ids of the systems by their names."""
+        changed_ns = _changed_ns()
+        if changed_ns is None or changed_ns != self._changed_ns:
+            is_certain = changed_ns is not None and (
+                time.time_ns() - changed_ns > _CHANGE_IS_CERTAIN_NS
+            )
+            self._changed_ns = changed_ns if is_certain else None
+            self._known = local_systems()
+        else:
+            self._known = {name: pid for name, pid in self._known.items() if is_held(name)}
+        return dict(self._known)
+
+
+def local_discovery() -> dict[str, dict[str, str]]:
+    """Return the variables with which the systems of :func:`local_systems` are discovered."""
+    return {
+        name: {str(key): str(value) for key, value in found.items()}
+        for name, holder in _holders()
+        if isinstance(found := holder.get("discovery", {}), dict)
+    }
+
+
+def _holders() -> list[tuple[str, dict[str, Any]]]:
+    """Return the name and the holder of each lock that is held, sorted by name.
+
+    There is none if the folder is not safe.
+    """
     prefix = f"{_domain()}."
-    for file_name in _lock_files():
-        if not (file_name.startswith(prefix) and file_name.endswith(_SUFFIX)):
-            continue
-        name = "/" + file_name.removeprefix(prefix).removesuffix(_SUFFIX).replace(".", "/")
-        lock = _open(name)
-        if lock is None:
-            continue
-        with lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            except BlockingIOError:
-                pids[name] = _holder(lock)[1]
-    return pids
+    if _is_without_locks():
+        return []
+    found = []
+    try:
+        with _open_folder() as folder:
+            names = os.listdir(folder)  # noqa: PTH208 - may be thousands
+            ours = [name for name in names if name.startswith(prefix) and name.endswith(_SUFFIX)]
+            for file_name in sorted(ours):
+                holder = _holder_in(folder, file_name)
+                if holder is not None:
+                    name = file_name.removeprefix(prefix).removesuffix(_SUFFIX)
+                    found.append((f"/{name.replace('.', '/')}", holder))
+    except (OSError, StartRefused):
+        return []
+    return found
+
+
+def _holder_in(folder: int, file_name: str) -> dict[str, Any] | None:
+    """Return the holder of a lock file in an open folder, None if its lock is not held."""
+    try:
+        descriptor = os.open(file_name, _OPEN_LOCK, dir_fd=folder)
+    except OSError:
+        return None
+    try:
+        if _is_locked(descriptor, fcntl.LOCK_SH):
+            return None
+        with os.fdopen(descriptor, encoding="utf-8", closefd=False) as lock:
+            return _holder(lock)
+    finally:
+        os.close(descriptor)
+
+
+def is_held(name: str) -> bool:
+    """Return whether a process on this host holds the instance lock of a system."""
+    if _is_without_locks():
+        return False
+    try:
+        with _open_folder() as folder:
+            return _is_held_in(folder, _file_name(name, _SUFFIX))
+    except (OSError, StartRefused):
+        return False
+
+
+def _is_held_in(folder: int, file_name: str) -> bool:
+    descriptor = os.open(file_name, _OPEN_LOCK, dir_fd=folder)
+    try:
+        return not _is_locked(descriptor, fcntl.LOCK_SH)
+    finally:
+        os.close(descriptor)
 
 
 def socket_path(name: str) -> Path | None:
@@ -83,11 +183,36 @@ def socket_path(name: str) -> Path | None:
 
     None if there is no folder that only this user can write to.
     """
+    return private_path(_file_name(name, ".sock"))
+
+
+def private_path(file_name: str) -> Path | None:
+    """Return the path of a file in the folder of the lock files; None as for a socket."""
     try:
         with _open_folder():
-            return _folder() / _file_name(name, ".sock")
+            return _folder() / file_name
     except (OSError, StartRefused):
         return None
+
+
+def open_private(file_name: str) -> TextIO:
+    """Open a file in the folder of the lock files, to read and write; both are created if needed.
+
+    Raises OSError, and StartRefused if other users can write to the folder.
+    """
+    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+    with _open_folder() as folder:
+        descriptor = os.open(file_name, flags, 0o600, dir_fd=folder)
+    return os.fdopen(descriptor, "r+", encoding="utf-8")
+
+
+def _is_locked(lock: TextIO | int, kind: int) -> bool:
+    """Lock the file until it is closed; return False if another process has locked it."""
+    try:
+        fcntl.flock(lock, kind | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 def _domain() -> str:
@@ -96,7 +221,7 @@ def _domain() -> str:
 
 def _folder() -> Path:
     parent = os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()
-    return Path(parent, f"ros2-composer-{os.geteuid()}")
+    return Path(parent, FOLDER_NAME)
 
 
 @contextmanager
@@ -107,9 +232,12 @@ def _open_folder() -> Iterator[int]:
     symbolic link, of that name.
     """
     folder = _folder()
-    folder.mkdir(mode=0o700, exist_ok=True)
     flags = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
-    descriptor = os.open(folder, flags)
+    try:
+        descriptor = os.open(folder, flags)
+    except FileNotFoundError:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        descriptor = os.open(folder, flags)
     try:
         status = os.fstat(descriptor)
         if status.st_uid != os.geteuid() or status.st_mode & _WRITABLE_BY_OTHERS:
@@ -126,13 +254,12 @@ def _unsafe(folder: Path) -> StartRefused:
     )
 
 
-def _lock_files() -> list[str]:
-    """Return the names of the lock files, sorted; none if the folder is not safe."""
+def _changed_ns() -> int | None:
+    """Return when the folder of the lock files was changed, None if there is none."""
     try:
-        with _open_folder() as folder, os.scandir(folder) as entries:
-            return sorted(entry.name for entry in entries)
-    except (OSError, StartRefused):
-        return []
+        return _folder().lstat().st_mtime_ns
+    except OSError:
+        return None
 
 
 def _file_name(name: str, suffix: str) -> str:
@@ -144,23 +271,25 @@ def _open(name: str) -> TextIO | None:
 
     Raises StartRefused if other users can write to the folder of the lock files.
     """
-    if os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "OFF":
-        return None  # no process discovers another one
-    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+    if _is_without_locks():
+        return None
     try:
-        with _open_folder() as folder:
-            descriptor = os.open(_file_name(name, _SUFFIX), flags, 0o600, dir_fd=folder)
+        return open_private(_file_name(name, _SUFFIX))
     except OSError:
         if _folder().is_symlink():
             raise _unsafe(_folder()) from None
         return None
-    return os.fdopen(descriptor, "r+", encoding="utf-8")
 
 
-def _holder(lock: TextIO) -> tuple[str, str]:
-    """Return the host and the process id in a lock file."""
+def _is_without_locks() -> bool:
+    """Return whether no process discovers another one."""
+    return os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "OFF"
+
+
+def _holder(lock: TextIO) -> dict[str, Any]:
+    """Return what a lock file says: the host, the process id and the discovery of the system."""
     try:
         holder = json.load(lock)
-        return str(holder["host"]), str(holder["pid"])
+        return {**holder, "host": str(holder["host"]), "pid": str(holder["pid"])}
     except (ValueError, KeyError, TypeError):
-        return socket.gethostname(), "unknown"  # it is being written
+        return {"host": socket.gethostname(), "pid": "unknown"}  # it is being written

@@ -27,9 +27,12 @@ NameAndTypes = tuple[str, tuple[str, ...]]
 GraphView: TypeAlias = Mapping[str, tuple[NameAndTypes, ...]]
 
 KINDS = ("node", "topic", "service", "action")
-#: The queries: the view of the graph, its nodes, the endpoints of one node, the status of the
-#: system, and the parameters of its nodes. See :mod:`composer.runtime.manager.queries`.
-GRAPH, NODES, NODE, STATUS, PARAMETERS = "graph", "nodes", "node", "status", "parameters"
+#: The queries: the view of the graph, its nodes, the endpoints of one node, of all nodes, of a
+#: topic and of an action, the status of the system, and the parameters of its nodes. See
+#: :mod:`composer.runtime.manager.queries`.
+GRAPH, NODES, NODE, ENDPOINTS = "graph", "nodes", "node", "endpoints"
+TOPIC, ACTION = "topic", "action"
+STATUS, PARAMETERS = "status", "parameters"
 #: Processes that differ in one of these variables may see different graphs.
 _VARIABLES = (
     "RMW_IMPLEMENTATION",

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from composer.names import join_node_name
 from composer.qos import QosProfile
 from composer.runtime.ros.qos_profiles import discovered_profile
 
@@ -37,6 +39,16 @@ class EndpointInfo:
         """The node's name, for messages."""
         return "a node whose name is unknown" if self.is_nameless else self.node
 
+    def plain(self) -> dict[str, Any]:
+        """Return the endpoint as data for JSON."""
+        return {
+            "node": self.node,
+            "type": self.type,
+            "type_hash": self.type_hash,
+            "gid": self.gid,
+            "qos": _announced(self.qos),
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class TopicInfo:
@@ -46,6 +58,15 @@ class TopicInfo:
     types: tuple[str, ...]
     publishers: tuple[EndpointInfo, ...]
     subscriptions: tuple[EndpointInfo, ...]
+
+    def plain(self) -> dict[str, Any]:
+        """Return the topic and its endpoints as data for JSON."""
+        return {
+            "name": self.name,
+            "types": list(self.types),
+            "publishers": [item.plain() for item in self.publishers],
+            "subscriptions": [item.plain() for item in self.subscriptions],
+        }
 
 
 def topic_info(node: Node, name: str, types: tuple[str, ...]) -> TopicInfo:
@@ -58,12 +79,26 @@ def topic_info(node: Node, name: str, types: tuple[str, ...]) -> TopicInfo:
     )
 
 
+def _announced(profile: QosProfile) -> dict[str, Any]:
+    """Return the policies that are announced to other processes, without unset durations."""
+    policies: dict[str, Any] = {
+        "reliability": profile.reliability.value,
+        "durability": profile.durability.value,
+        "liveliness": profile.liveliness.value,
+    }
+    for name in ("deadline_ms", "lifespan_ms", "liveliness_lease_duration_ms"):
+        value = getattr(profile, name)
+        if value is not None:
+            policies[name] = value
+    return policies
+
+
 def _endpoints(infos: list[TopicEndpointInfo]) -> tuple[EndpointInfo, ...]:
     return tuple(sorted(map(_endpoint, infos), key=lambda item: (item.node, item.type)))
 
 
 def _endpoint(info: TopicEndpointInfo) -> EndpointInfo:
-    node = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+    node = join_node_name(info.node_namespace, info.node_name)
     return EndpointInfo(
         node,
         info.topic_type,

@@ -21,6 +21,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
+from composer.names import join_node_name
 from composer.runtime.process.query_socket import NameAndTypes
 from composer.runtime.ros.endpoints import UNKNOWN_NODE, TopicInfo, topic_info
 
@@ -79,7 +80,7 @@ class RosGraph:
         found: list[NameAndTypes]
         match kind:
             case "node":
-                found = [(_full_name(namespace, name), ()) for name, namespace in self.others()]
+                found = [(join_node_name(namespace, name), ()) for name, namespace in self.others()]
             case "topic":
                 found = self.topics()
             case "service":
@@ -127,7 +128,9 @@ class RosGraph:
         return [
             (name, namespace)
             for name, namespace in found
-            if self._is_valid(f"node '{_full_name(namespace, name)}'", _is_node, name, namespace)
+            if self._is_valid(
+                f"node '{join_node_name(namespace, name)}'", _is_node, name, namespace
+            )
         ]
 
     def topics(self) -> list[NameAndTypes]:
@@ -238,10 +241,6 @@ def _is_node(name: str, namespace: str) -> bool:
         return validate_node_name(name) and validate_namespace(namespace)
     except (NameValidationException, ValueError):
         return False
-
-
-def _full_name(namespace: str, name: str) -> str:
-    return f"{namespace.rstrip('/')}/{name}"
 
 
 def _listed(found: list[str]) -> str:

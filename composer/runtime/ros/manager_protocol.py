@@ -12,6 +12,16 @@ NAME = "manager"
 #: Services: std_srvs/srv/Trigger; ChangeState for nodes without lifecycle services.
 IS_ACTIVE = "is_active"
 CHANGE_STATE = "change_state"
+#: Of the processes of a system: rcl_interfaces/srv/SetParameters, with a list of texts as the value
+#: of the parameter ``steps``, or of ``last_steps`` if the process ends after them:
+#: ``deactivate /arm /gripper`` deactivates /arm after the transition of /gripper, if one was
+#: requested before. The only standard service with results for each: why it failed, or the number
+#: of the last report on ``state`` that may not include it. The parameter ``goals`` has what is
+#: requested of the whole system, which the process keeps and reports: see ``plan/system_goals.py``.
+CHANGE_STATES = "change_states"
+STEPS = "steps"
+LAST_STEPS = "last_steps"
+GOALS = "goals"
 #: rcl_interfaces/srv/SetParametersAtomically, with the full names of nodes in the parameter
 #: ``nodes``: the only standard service that takes names and returns a reason.
 RESTART = "restart"

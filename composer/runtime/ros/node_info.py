@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from composer.names import split_node_name
 from composer.runtime.process.query_socket import NameAndTypes, visible
 from composer.runtime.ros.graph import RosGraph
 
@@ -24,8 +25,7 @@ class NodeInfo:
 
 def node_info(graph: RosGraph, full_name: str, *, hidden: bool) -> NodeInfo:
     """Return the endpoints of a node; those of ROS itself only if ``hidden``."""
-    namespace, _, name = full_name.rpartition("/")
-    where = (name, namespace or "/")
+    namespace, name = split_node_name(full_name)
     queries = (
         graph.subscriptions_of,
         graph.publishers_of,
@@ -34,7 +34,7 @@ def node_info(graph: RosGraph, full_name: str, *, hidden: bool) -> NodeInfo:
         graph.action_servers_of,
         graph.action_clients_of,
     )
-    return NodeInfo(full_name, *(_sorted(query(where), hidden) for query in queries))
+    return NodeInfo(full_name, *(_sorted(query((name, namespace)), hidden) for query in queries))
 
 
 def _sorted(found: Iterable[NameAndTypes], hidden: bool) -> tuple[NameAndTypes, ...]:

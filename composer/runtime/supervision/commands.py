@@ -91,12 +91,12 @@ class Commands:
             name: goal if goal in low else PrimaryState.INACTIVE
             for name, goal in self.supervisor.desired.goals.items()
         }
-        return self._lower(goals, since, "the system is paused")
+        return self._lower(goals, since, "the system is paused", "paused")
 
     def _reset(self, since: int) -> str | None:
-        self.supervisor.set_goals({}, since, forget_failures=True)
         goals = dict.fromkeys(self.node_set.nodes, PrimaryState.UNCONFIGURED)
-        return self._lower(goals, since, "the system is reset") or self._recreate(since)
+        problem = self._lower(goals, since, "the system is reset", "reset", forget_failures=True)
+        return problem or self._recreate(since)
 
     def _restart(self, full_names: Collection[str], since: int) -> str | None:
         """Restart nodes, with the nodes that depend on them inactive meanwhile.
@@ -135,11 +135,19 @@ class Commands:
         problem = self.supervisor.bring_up(plan, since)
         if problem is not None:
             return f"{problem}; rolled back"
-        self.supervisor.set_goals(goals, since, forget_failures=forget_failures)
+        self.supervisor.set_goals(goals, since, "running", forget_failures=forget_failures)
         return self._unreached(goals)
 
-    def _lower(self, goals: Mapping[str, PrimaryState], since: int, cause: str) -> str | None:
-        self.supervisor.set_goals(goals, since)
+    def _lower(
+        self,
+        goals: Mapping[str, PrimaryState],
+        since: int,
+        cause: str,
+        activity: str,
+        *,
+        forget_failures: bool = False,
+    ) -> str | None:
+        self.supervisor.set_goals(goals, since, activity, forget_failures=forget_failures)
         failures = self.supervisor.reconcile(cause)
         return str(failures[0]) if failures else None
 

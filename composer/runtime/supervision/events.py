@@ -208,6 +208,10 @@ class Reporter:
         self.report(Logged(self.elapsed_s, logger, level, message))
 
 
+#: The counters of a :class:`NodeSummary`.
+COUNTERS = ("received", "sent", "calls", "dropped", "skipped", "errors")
+
+
 @dataclass(frozen=True, slots=True)
 class NodeSummary:
     """The final state and the counters of one node.
@@ -215,8 +219,8 @@ class NodeSummary:
     ``received`` and ``sent`` count topic messages; ``calls`` requests and goals in both directions;
     ``dropped`` messages that arrived or were sent while the node was not active, or were dropped
     from a full queue; ``skipped`` timer calls skipped because the previous one was still running;
-    ``errors`` exceptions and wrong results of user code, and failed calls. The counts of a
-    node outside the process, which is not ``in_process``, are not known, and 0.
+    ``errors`` exceptions and wrong results of user code, and failed calls. If it is not
+    ``is_counted``, as an executable, they are not known, and 0.
     """
 
     node: str
@@ -227,7 +231,7 @@ class NodeSummary:
     dropped: int
     skipped: int
     errors: int
-    in_process: bool = True
+    is_counted: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ _RECOVERED_WITHIN_S = 0.5
 
 @dataclass(slots=True)
 class _ObservedCallback:
-    """A running callback. ``since_s`` is when it was first observed."""
+    """A running callback. ``since_s`` is when it was first observed, or later after late checks."""
 
     callback: RunningCallback
     loop: str
@@ -56,6 +56,7 @@ class HealthMonitor:
         silences = {name: _NodeSilence(name, node_set) for name in node_set.nodes}
         self._silences = {name: silence for name, silence in silences.items() if silence.has_limits}
         self._period_s = _period_s(node_set)
+        self._checked_s = time.monotonic()
         self._system_is_up = False
         self._thread = threading.Thread(target=self._run, name="health monitor", daemon=True)
 
@@ -79,6 +80,7 @@ class HealthMonitor:
         while not self._end.wait(self._period_s):
             now_s = time.monotonic()
             self._serial = self._desired.value.serial
+            self._forgive_delay(now_s)
             self._check_callbacks(now_s)
             self._check_hung_loops(now_s)
             if self._system_is_up:
@@ -95,6 +97,16 @@ class HealthMonitor:
                     self._report(Fault(name, FaultKind.SILENCE, text, self._serial))
 
     # --- callbacks
+
+    def _forgive_delay(self, now_s: float) -> None:
+        """Let a late check count at most as two: what delayed it may have delayed callbacks too."""
+        late_s = now_s - self._checked_s - 2.0 * self._period_s
+        self._checked_s = now_s
+        if late_s > 0.0:
+            for observed in self._callbacks.values():
+                observed.since_s += late_s
+                if observed.interrupted_s is not None:
+                    observed.interrupted_s += late_s
 
     def _check_callbacks(self, now_s: float) -> None:
         before, self._callbacks = self._callbacks, {}

@@ -13,6 +13,7 @@ from composer.plan import Fault
 from composer.runtime.process.wakeup_pipe import WakeupPipe
 
 T = TypeVar("T")
+K = TypeVar("K")
 
 #: What remains of any time limit after a second stop request.
 _URGENT_S = 0.05
@@ -114,6 +115,14 @@ class MainQueue(Generic[T]):
             if not self.wakeup.wait(until_s):
                 break
         return self._items.popleft() if self._items and not self.stopping else None
+
+    def take_next(self, kind: type[K]) -> list[K]:
+        """Remove and return the first items, as far as they are of this kind."""
+        taken: list[K] = []
+        while self._items and isinstance(item := self._items[0], kind):
+            self._items.popleft()
+            taken.append(item)
+        return taken
 
     def wait(self, condition: Callable[[], bool], until_s: float, *, stoppable: bool) -> bool:
         """Wait for ``condition()``, at most until ``until_s`` (monotonic); return its value.

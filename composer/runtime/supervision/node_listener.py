@@ -77,12 +77,14 @@ class SupervisionListener:
         serial = self._desired.value.serial
         self._main_queue.put(Fault(self._name, FaultKind.ERRORS, text, serial))
 
-    def on_ended(self, text: str, state: str) -> None:
+    def on_ended(self, text: str, state: str, *, is_awaited: bool = False) -> None:
         """Report that a node outside the process has ended by itself, and its new state.
 
-        No plan moves the node until the supervisor has handled the fault.
+        With ``is_awaited``, it cannot be started from here, and its return will be reported. No
+        plan moves the node until the supervisor has handled the fault.
         """
-        fault = Fault(self._name, FaultKind.ENDED, text, self._desired.value.serial)
+        kind = FaultKind.ABSENT if is_awaited else FaultKind.ENDED
+        fault = Fault(self._name, kind, text, self._desired.value.serial)
         self._desired.update(lambda desired: desired.await_fault(fault))
         self._status.set_state(self._name, state)
         at_s = self._reporter.elapsed_s

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,10 +25,11 @@ from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.children.executable_node import ExecutableNode
 from composer.runtime.children.external_node import ExternalNode
 from composer.runtime.children.member_node import MemberNode
-from composer.runtime.children.member_process import MemberContext, MemberProcess
+from composer.runtime.children.other_processes import OtherProcesses
 from composer.runtime.children.outside_node import OutsideContext
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.factory import log_exception, make_loop, place_threads
+from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.hosting.behavior_node import NodeOfBehavior
 from composer.runtime.hosting.hosted_node import HostedNode
@@ -40,9 +40,9 @@ from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import ManagedNode, NodeListener
 from composer.runtime.node.node import RunningNode
 from composer.runtime.node.options import NodeOptions, ProcessContext
-from composer.runtime.node.outcome import FINALIZED
+from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.node.parameters import ParameterError
-from composer.runtime.supervision.events import NodeSummary
+from composer.runtime.supervision.events import COUNTERS, NodeSummary
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.source import Located
 
@@ -69,8 +69,8 @@ class NodeSetOptions:
 
     ``transition_timeout_s`` overrides the system's; ``tracing`` records callback timings;
     ``check_mutation`` checks whether callbacks change messages. ``namespace`` is that of the
-    manager, ``member_command`` starts the other processes of the system, and
-    ``write_log`` receives what they print.
+    manager, ``member_command`` starts the other processes of the system, which are only awaited
+    without it, and ``write_log`` receives what they print.
     """
 
     log_level: LogLevel
@@ -106,8 +106,14 @@ class NodeSet:
         self.hung: set[str] = set()
         self._keeps_entities = False
         self._children = ChildProcesses()
-        self._processes = {process.name.value: process for process in system.processes}
-        self._members: dict[str, MemberProcess] = {}
+        #: The other processes of the system, as far as nodes were created in them.
+        self.other_processes = OtherProcesses(
+            system, options.namespace, options.member_command, options.write_log
+        )
+        #: The names of the other processes, by the keys of the nodes that they run.
+        self.process_of: Mapping[str, str] = {
+            node.name.value: node.process.value for node in system.nodes if node.process is not None
+        }
         #: What Linux or the middleware does not allow, each with a hint.
         self.warnings: list[str] = []
 
@@ -132,8 +138,7 @@ class NodeSet:
             except Exception as error:
                 reason = f"cannot be created: {describe(error)}"
                 raise CreationFailed(node.full_name, reason) from error
-        for member in self._members.values():
-            member.start_soon()
+        self.other_processes.start_soon()
         for name, loop in self.loops.items():
             loop.start()
             if name in self._executors:
@@ -155,6 +160,28 @@ class NodeSet:
             if state in _PRIMARY_STATES
         }
 
+    def run_step(
+        self,
+        name: str,
+        transition: str,
+        is_outdated: Callable[[], bool],
+        after: Sequence[str] = (),
+    ) -> Future[TransitionOutcome]:
+        """Run a step of a plan, see :meth:`.ManagedLifecycle.run_step`.
+
+        A node of another process may have to wait for nodes of the same one, ``after``.
+        """
+        node = self.nodes[name]
+        if isinstance(node, MemberNode):
+            return node.loop.run_task(node.run_step_after(after, transition, is_outdated))
+        return node.loop.run_task(node.lifecycle.run_step(transition, is_outdated))
+
+    def take_over(self) -> None:
+        """Use the nodes of other processes in the states in which they are."""
+        members = [node for node in self.nodes.values() if isinstance(node, MemberNode)]
+        if members:  # all have the same loop
+            members[0].loop.run(lambda: _take_over(members))
+
     def callbacks(self) -> tuple[CallbackFigures, ...]:
         """Return the timings of the callbacks of all nodes so far."""
         return tuple(
@@ -170,20 +197,7 @@ class NodeSet:
 
     def summaries(self) -> tuple[NodeSummary, ...]:
         """Return the states and the counters of all nodes."""
-        return tuple(
-            NodeSummary(
-                node=node.full_name,
-                state=node.state,
-                received=node.statistics.received,
-                sent=node.statistics.sent,
-                calls=node.statistics.calls,
-                dropped=node.statistics.dropped,
-                skipped=node.statistics.skipped,
-                errors=node.statistics.errors,
-                in_process=node.model.in_process,
-            )
-            for node in self.nodes.values()
-        )
+        return tuple(map(_summary, self.nodes.values()))
 
     def chains(self) -> tuple[ChainFigures, ...]:
         """Return the latencies of the chains of the system."""
@@ -192,6 +206,11 @@ class NodeSet:
     def is_lost(self, name: str) -> bool:
         """Return whether the node's loop hangs, so that the node cannot do anything."""
         return self.nodes[name].loop.name in self.hung
+
+    def is_absent(self, name: str) -> bool:
+        """Return whether the node belongs to a process that is awaited, not started."""
+        node = self.nodes[name]
+        return isinstance(node, MemberNode) and node.is_absent
 
     def running_callbacks(self, name: str) -> list[RunningCallback]:
         """Return the callbacks that keep the threads of the node's loop busy, one per thread."""
@@ -207,12 +226,11 @@ class NodeSet:
         If ``is_outdated()`` on the loop of the node, do nothing. Return why the node cannot be
         created, or None.
         """
-        old = self.nodes[name]
-        if old.state != FINALIZED:
+        node = self.nodes[name]
+        if node.state != FINALIZED:
             return None
         try:
-            replaced = partial(self._replace, old, is_outdated)
-            self.nodes[name] = old.loop.run(replaced, _RECREATED_WITHIN_S)
+            node.loop.run(partial(self._replace, name, is_outdated), _RECREATED_WITHIN_S)
         except Exception as error:
             return f"cannot be created again: {describe(error)}"
         return None
@@ -221,6 +239,7 @@ class NodeSet:
         """Pass on that the system shuts down until ``end_s`` (monotonic)."""
         for node in self.nodes.values():
             node.limit_end(end_s)
+        self.other_processes.limit_end()
 
     def keep_entities(self) -> None:
         """Do not destroy entities from now on: the end of the process does."""
@@ -246,8 +265,7 @@ class NodeSet:
         Return False if some are left to the end of the process: Fast DDS takes longer for each
         endpoint the more there are, seconds for 100 nodes, and a hung loop never ends.
         """
-        for member in self._members.values():
-            member.close()
+        self.other_processes.close()
         self._children.close(end_s)
         if self._keeps_entities:
             return False
@@ -259,11 +277,12 @@ class NodeSet:
                 self.nodes[name].destroy()
         return complete
 
-    def _replace(self, old: ManagedNode, is_outdated: Callable[[], bool]) -> ManagedNode:
-        if is_outdated():
-            return old
-        old.destroy()
-        return self._make(old.model, old)
+    def _replace(self, name: str, is_outdated: Callable[[], bool]) -> None:
+        """Replace a finalized node: here, as another request may have done so by now."""
+        old = self.nodes[name]
+        if old.state == FINALIZED and not is_outdated():
+            old.destroy()
+            self.nodes[name] = self._make(old.model, old)
 
     def _make(self, node: Node, before: ManagedNode | None = None) -> ManagedNode:
         statistics = (
@@ -281,7 +300,9 @@ class NodeSet:
             log_level=self._log_level_of(node),
             transition_timeout_s=self._timeout_s(node),
             system_is_up=before is not None,
-            make_library_node=lambda owner: NodeOfBehavior(owner, self._log_level_of(node)),
+            make_library_node=partial(
+                NodeOfBehavior, level=self._log_level_of(node), parameters={}
+            ),
         )
         loop = self._loop_of(executor)
         kind = RunningNode if node.hosted_class is None else HostedNode
@@ -299,30 +320,15 @@ class NodeSet:
             log_level=self._log_level_of(node),
         )
         if node.process is not None:
-            return MemberNode(node, self._member_process(node.process.value), context)
+            process = self.other_processes.process(
+                node.process.value, context.loop, self._process, self._children
+            )
+            return MemberNode(node, process, context)
         if node.external is not None:
             return ExternalNode(node, node.external, context)
         if node.executable is not None:
             return ExecutableNode(node, node.executable, context)
         raise AssertionError(f"{node.full_name} runs in this process")
-
-    def _member_process(self, name: str) -> MemberProcess:
-        """Return a process of the system, for the first of its nodes a new one."""
-        if name not in self._members:
-            process = self._processes[name]
-            host = None if process.host is None else process.host.value
-            loop = Executor(Located(_OUTSIDE, process.span), ExecutorKind.EVENTS, process.span)
-            context = MemberContext(
-                loop=self._loop_of(loop),
-                manager=self._process.manager,
-                children=self._children,
-                namespace=self._options.namespace,
-                command=self._options.member_command,
-                is_local=host in (None, "localhost", socket.gethostname()),
-                write_log=self._options.write_log,
-            )
-            self._members[name] = MemberProcess(process, context)
-        return self._members[name]
 
     def _loop_of(self, executor: Executor) -> Loop:
         name = executor.name.value
@@ -350,6 +356,20 @@ class NodeSet:
         return self._executors.get(DEFAULT_EXECUTOR) or Executor(
             Located(DEFAULT_EXECUTOR, node.span), ExecutorKind.EVENTS, node.span
         )
+
+
+def _take_over(members: Sequence[MemberNode]) -> None:
+    for member in members:
+        member.take_over()
+
+
+def _summary(node: ManagedNode) -> NodeSummary:
+    if isinstance(node, MemberNode):
+        counts = {name: node.counts.get(name, 0) for name in COUNTERS}
+        return NodeSummary(node.full_name, node.state, is_counted=True, **counts)
+    counts = {name: getattr(node.statistics, name) for name in COUNTERS}
+    is_counted = node.model.in_process
+    return NodeSummary(node.full_name, node.state, is_counted=is_counted, **counts)
 
 
 def _log_exception(what: str, error: BaseException) -> None:

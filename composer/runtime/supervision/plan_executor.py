@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
@@ -98,13 +99,21 @@ class _RunningStep:
 
 @dataclass(slots=True)
 class _Phase:
-    """A phase that is being executed."""
+    """A phase that is being executed.
 
-    waiting: list[Step]
+    ``processes`` are the other processes of the system, by the nodes that they run. ``ended`` are
+    the numbers of steps that have ended by themselves; until ``check_s``, no other one has to be
+    looked at.
+    """
+
+    waiting: deque[Step]
     options: ExecutionOptions
-    running: list[_RunningStep] = field(default_factory=list)
+    processes: Mapping[str, str]
+    running: dict[int, _RunningStep] = field(default_factory=dict)
     done: set[int] = field(default_factory=set)
     failures: list[StepFailed] = field(default_factory=list)
+    ended: deque[int] = field(default_factory=deque)
+    check_s: float = math.inf
 
     @property
     def is_over(self) -> bool:
@@ -116,18 +125,35 @@ class _Phase:
         """Whether a failure ends the phase."""
         return bool(self.failures) and not self.options.best_effort
 
-    def take_ready(self) -> list[Step]:
-        """Remove and return the steps that can start now."""
+    def take_ready(self) -> list[tuple[Step, tuple[Step, ...]]]:
+        """Remove and return the steps that can start now, each with those that it waits for.
+
+        It may wait for steps of its own process, which keeps the order by itself.
+        """
         if self.has_failed:
             return []
-        ready: list[Step] = []
-        waiting: list[Step] = []
+        started = {number: item.step for number, item in self.running.items()}
+        ready: list[tuple[Step, tuple[Step, ...]]] = []
+        waiting: deque[Step] = deque()
         for step in self.waiting:
             keeps_order = not (waiting and self.options.best_effort)
-            is_ready = keeps_order and self.done.issuperset(step.after)
-            (ready if is_ready else waiting).append(step)
+            if keeps_order and self._can_start(step, started):
+                after = (started[number] for number in step.after if number not in self.done)
+                ready.append((step, tuple(after)))
+                started[step.number] = step
+            else:
+                waiting.append(step)
         self.waiting = waiting
         return ready
+
+    def _can_start(self, step: Step, started: Mapping[int, Step]) -> bool:
+        if self.done.issuperset(step.after):
+            return True
+        process = self.processes.get(step.node)
+        if process is None or not self.options.best_effort:
+            return False
+        left = (started.get(number) for number in step.after if number not in self.done)
+        return all(other and self.processes.get(other.node) == process for other in left)
 
 
 class PlanExecutor:
@@ -153,7 +179,7 @@ class PlanExecutor:
         options = options or ExecutionOptions()
         failures: list[StepFailed] = []
         for steps in plan.phases:
-            phase = _Phase(list(steps), options)
+            phase = _Phase(deque(steps), options, self._node_set.process_of)
             self._execute(phase)
             failures += phase.failures
             if phase.has_failed or self._is_stopped(options):
@@ -162,23 +188,30 @@ class PlanExecutor:
 
     def _execute(self, phase: _Phase) -> None:
         while not phase.is_over:
-            for step in phase.take_ready():
-                self._start(step, phase)
+            with self._node_set.other_processes.requests_together():
+                for step, after in phase.take_ready():
+                    self._start(step, after, phase)
             if not phase.running:
                 continue
             self._main_queue.wait(
-                lambda: any(item.future.done() for item in phase.running),
-                min(item.until_s for item in phase.running),
-                stoppable=phase.options.stoppable,
+                lambda: bool(phase.ended), phase.check_s, stoppable=phase.options.stoppable
             )
             if self._is_stopped(phase.options):
                 break
-            self._update_start_times(phase.running)
-            for item in tuple(phase.running):
-                if self._has_ended(item):
-                    self._end(item, phase)
+            while phase.ended:
+                self._end(phase.ended.popleft(), phase)
+            if self._main_queue.urgent or time.monotonic() >= phase.check_s:
+                self._end_late(phase)
 
-    def _update_start_times(self, running: list[_RunningStep]) -> None:
+    def _end_late(self, phase: _Phase) -> None:
+        """End the steps that have no time left."""
+        self._update_start_times(phase.running.values())
+        for number, item in tuple(phase.running.items()):
+            if self._main_queue.urgent or time.monotonic() >= item.until_s:
+                self._end(number, phase)
+        phase.check_s = min((item.until_s for item in phase.running.values()), default=math.inf)
+
+    def _update_start_times(self, running: Iterable[_RunningStep]) -> None:
         """Restart the time limit of each step with the last transition that its loop started."""
         starts_s: dict[str, float] = {}
         for node in self._node_set.nodes.values():
@@ -190,10 +223,7 @@ class PlanExecutor:
     def _is_stopped(self, options: ExecutionOptions) -> bool:
         return self._main_queue.stopping and options.stoppable
 
-    def _has_ended(self, item: _RunningStep) -> bool:
-        return item.future.done() or self._main_queue.urgent or time.monotonic() >= item.until_s
-
-    def _start(self, step: Step, phase: _Phase) -> None:
+    def _start(self, step: Step, after: Sequence[Step], phase: _Phase) -> None:
         node = self._node_set.nodes[step.node]
         options = phase.options
         now_s = time.monotonic()
@@ -206,17 +236,26 @@ class PlanExecutor:
             return
         limit_s = min(self._node_set.timeout_s(step.node) + _STUCK_AFTER_S, options.step_limit_s)
         is_outdated = partial(self._is_outdated, step.node, options.serial)
-        future = node.loop.run_task(node.lifecycle.run_step(step.transition, is_outdated))
-        future.add_done_callback(lambda _: self._main_queue.wakeup.wake())
+        others = tuple(other.full_name for other in after)
+        future = self._node_set.run_step(step.node, step.transition, is_outdated, others)
         name = node.loop.name
-        phase.running.append(_RunningStep(step, name, future, now_s, limit_s, options.end_s))
+        item = _RunningStep(step, name, future, now_s, limit_s, options.end_s)
+        phase.running[step.number] = item
+        phase.check_s = min(phase.check_s, item.until_s)
+        future.add_done_callback(partial(self._on_done, phase, step.number))
+
+    def _on_done(self, phase: _Phase, number: int, _: object) -> None:
+        phase.ended.append(number)
+        self._main_queue.wakeup.wake()
 
     def _is_outdated(self, node: str, serial: int | None) -> bool:
         return serial is not None and self._desired.value.has_moved(node, serial)
 
-    def _end(self, item: _RunningStep, phase: _Phase) -> None:
-        phase.running.remove(item)
-        phase.done.add(item.step.number)
+    def _end(self, number: int, phase: _Phase) -> None:
+        item = phase.running.pop(number, None)
+        if item is None:
+            return  # it had no time left before
+        phase.done.add(number)
         failure = self._failure(item)
         if not item.future.done():
             moved = NodeMoved(item.step.node, f"late end of '{item.step.transition}'")

@@ -6,14 +6,13 @@ import os
 import socket
 import threading
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
-from composer.model import PrimaryState, System
+from composer.model import Node, PrimaryState, System
 from composer.model.dependencies import needed_states
-from composer.plan import start_goals
+from composer.plan import parse_goals, start_goals
 from composer.runtime.metrics.statistics import Statistics
 
 _MAX_LISTED = 5
@@ -28,9 +27,11 @@ class NodeStatus:
     ``starts_active`` is whether a start of the system activates it. ``depends_on`` are the states
     that the nodes it depends on must have, by their full names. ``left_to_manager`` are the
     services that the manager node has instead (see :class:`composer.model.Introspection`).
+    ``process`` is the process of the system that the node runs in, empty for the one that reports.
 
     Rates are in hertz over the last second, and so is ``busy``, the share of a thread that its
     callbacks took. ``slowest`` is the callback with the longest call so far, and its time.
+    ``calls`` and ``skipped`` are as in a ``NodeSummary``.
     ``overruns`` counts calls over their ``budget_ms``, ``queue_drops`` messages and calls that full
     queues dropped, ``qos_events`` the events of :mod:`composer.runtime.ports.qos_events` by name.
     ``sent``, ``received`` and ``dropped`` count messages by topic.
@@ -41,6 +42,7 @@ class NodeStatus:
     starts_active: bool = True
     depends_on: Mapping[str, str] = field(default_factory=dict)
     left_to_manager: tuple[str, ...] = ()
+    process: str = ""
     state: str = "unconfigured"
     since_s: float = 0.0
     restarts: int = 0
@@ -53,6 +55,8 @@ class NodeStatus:
     slowest: str = ""
     overruns: int = 0
     queue_drops: int = 0
+    calls: int = 0
+    skipped: int = 0
     qos_events: Mapping[str, int] = field(default_factory=dict)
     sent: Mapping[str, int] = field(default_factory=dict)
     received: Mapping[str, int] = field(default_factory=dict)
@@ -61,7 +65,11 @@ class NodeStatus:
 
 @dataclass(frozen=True, slots=True)
 class SystemStatus:
-    """A system, its process, and its nodes in the order of the bring-up."""
+    """A system, its process, and its nodes in the order of the bring-up.
+
+    ``started_by`` identifies the start of a process of a system by the one that coordinates it,
+    ``goals`` are those of the whole system: see :mod:`composer.plan.system_goals`.
+    """
 
     system: str
     activity: str  # "starting", "running", "pausing", "stopping" ...
@@ -69,6 +77,8 @@ class SystemStatus:
     host: str
     pid: int
     started_s: float  # seconds since 1970
+    started_by: str = ""
+    goals: str = ""
 
     @property
     def failed(self) -> tuple[NodeStatus, ...]:
@@ -83,6 +93,16 @@ class SystemStatus:
         """
         nodes = [node for node in self.nodes if node.starts_active]
         return bool(nodes) and not self.failed and all(node.state == "active" for node in nodes)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it is up: as ``is_active``, and no node is in another state than desired.
+
+        A system in which a start activates no node is ready if it runs.
+        """
+        active = self.is_active or not any(node.starts_active for node in self.nodes)
+        settled = all(node.state == node.desired for node in self.nodes)
+        return self.activity == "running" and active and not self.failed and settled
 
     @property
     def summary(self) -> str:
@@ -104,24 +124,23 @@ class _Counters(NamedTuple):
     received: int
     busy_s: float
 
-    def with_rates(self, node: NodeStatus, before: _Counters | None) -> NodeStatus:
-        """Return ``node`` with the rates since ``before``."""
+    def rates(self, before: _Counters | None) -> dict[str, float]:
+        """Return the rates of a node since ``before``, none if there are none yet."""
         if before is None or self.at_s <= before.at_s:
-            return node
+            return {}
         passed_s = self.at_s - before.at_s
         # The counters of ports start from zero when a node is configured again.
-        return replace(
-            node,
-            sent_hz=max(0, self.sent - before.sent) / passed_s,
-            received_hz=max(0, self.received - before.received) / passed_s,
-            busy=max(0.0, self.busy_s - before.busy_s) / passed_s,
-        )
+        return {
+            "sent_hz": max(0, self.sent - before.sent) / passed_s,
+            "received_hz": max(0, self.received - before.received) / passed_s,
+            "busy": max(0.0, self.busy_s - before.busy_s) / passed_s,
+        }
 
 
 class Status:
     """The current status of the system and its nodes. Thread-safe."""
 
-    def __init__(self, system: System, order: tuple[str, ...]) -> None:
+    def __init__(self, system: System, order: tuple[str, ...], started_by: str = "") -> None:
         """``order`` are the keys of all nodes, in the order of the bring-up."""
         self._lock = threading.Lock()
         self._changed: Callable[[], None] = lambda: None
@@ -144,6 +163,7 @@ class Status:
             host=socket.gethostname(),
             pid=os.getpid(),
             started_s=now_s,
+            started_by=started_by,
         )
         self._nodes = {
             name: NodeStatus(
@@ -154,6 +174,7 @@ class Status:
                     models[on].full_name: state.value for on, state in needed[name].items()
                 },
                 left_to_manager=models[name].introspection.left_to_manager,
+                process=_process_of(models[name]),
                 since_s=now_s,
             )
             for name in order
@@ -180,16 +201,27 @@ class Status:
             self._status = replace(self._status, activity=activity)
         self._changed()
 
+    def keep_goals(self, text: str) -> None:
+        """Keep the goals of the whole system, unless there are newer ones."""
+        new = parse_goals(text)
+        with self._lock:
+            known = parse_goals(self._status.goals)
+            if new is None or (known is not None and new.serial <= known.serial):
+                return
+            self._status = replace(self._status, goals=text)
+        self._changed()
+
     def set_desired(self, desired: Mapping[str, str], held_down: Mapping[str, str]) -> None:
         """Set the desired states, and why failed nodes are held down, by the keys of nodes."""
+        is_changed = False
         with self._lock:
             for name, node in self._nodes.items():
-                self._nodes[name] = replace(
-                    node,
-                    desired=desired.get(name, node.desired),
-                    held_down=held_down.get(name, ""),
-                )
-        self._changed()
+                goal, reason = desired.get(name, node.desired), held_down.get(name, "")
+                if (goal, reason) != (node.desired, node.held_down):
+                    self._nodes[name] = replace(node, desired=goal, held_down=reason)
+                    is_changed = True
+        if is_changed:
+            self._changed()
 
     def set_state(self, name: str, state: str) -> None:
         """Set the state of a node."""
@@ -237,26 +269,35 @@ class Status:
         counters = self._statistics.get(name)
         if counters is None:
             return node
-        node = replace(
+        rates = self._counters[name].rates(self._counters_before.get(name))
+        return replace(
             node,
+            **rates,  # type: ignore[arg-type]  # of fields that are floats
             errors=counters.errors,
             slowest=counters.slowest,
             overruns=counters.overruns,
             queue_drops=counters.queue_drops,
+            calls=counters.calls,
+            skipped=counters.skipped,
             qos_events=dict(counters.qos_events),
             sent=self._by_topic(name, counters.sent_by_port),
             received=self._by_topic(name, counters.received_by_port),
             dropped=self._by_topic(name, counters.dropped_by_port),
         )
-        return self._counters[name].with_rates(node, self._counters_before.get(name))
 
     def _by_topic(self, name: str, counts: Mapping[str, int]) -> Mapping[str, int]:
-        found: Counter[str] = Counter()
+        found: dict[str, int] = {}
+        topics = self._topics[name]
         for port, count in counts.items():
-            found[self._topics[name].get(port, port)] += count
+            topic = topics.get(port, port)
+            found[topic] = found.get(topic, 0) + count
         return found
 
     def _change(self, name: str, **changes: object) -> None:
         with self._lock:
             self._nodes[name] = replace(self._nodes[name], **changes)  # type: ignore[arg-type]
         self._changed()
+
+
+def _process_of(node: Node) -> str:
+    return "" if node.process is None else node.process.value

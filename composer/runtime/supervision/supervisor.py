@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -55,6 +55,8 @@ from composer.runtime.supervision.status import Status
 if TYPE_CHECKING:  # this module and its tests need no ROS
     from composer.runtime.supervision.node_set import NodeSet
 
+#: In the cause of a plan that moves of several nodes have caused.
+_MAX_CAUSES = 3
 _DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
 
 
@@ -80,6 +82,7 @@ class Supervisor:
             node_set, self.shared, main_queue, self._report_failed_step
         )
         self._abandoned: dict[str, set[str]] = {}  # by hung loop: the nodes that did not fail
+        self._absent: set[str] = set()  # failed, and not moved until they return by themselves
 
     @property
     def desired(self) -> DesiredState:
@@ -98,16 +101,29 @@ class Supervisor:
     # --- the whole system
 
     def set_goals(
-        self, goals: Mapping[str, PrimaryState], since: int, *, forget_failures: bool = False
+        self,
+        goals: Mapping[str, PrimaryState],
+        since: int,
+        activity: str = "",
+        *,
+        forget_failures: bool = False,
     ) -> None:
-        """Change the goals of nodes, except of those moved externally since a serial number."""
+        """Change the goals of nodes, except of those moved externally since a serial number.
+
+        ``activity`` is that of the system with these goals; by default, it does not change.
+        """
 
         def change(desired: DesiredState) -> DesiredState:
             kept = desired.forget_failures() if forget_failures else desired
-            return kept.with_goals(goals, since)
+            return kept.with_goals(goals, since, activity)
 
         self.shared.update(change)
         self._publish_desired()
+
+    def start(self, goals: Mapping[str, PrimaryState], activity: str, since: int) -> None:
+        """Set the first goals, and the activity of the system."""
+        self.set_goals(goals, since, activity)
+        self._status.set_activity(activity)
 
     def bring_up(self, plan: Plan, since: int, within_s: float = math.inf) -> str | None:
         """Execute a plan, all or nothing; return why it failed and was rolled back, or None.
@@ -148,11 +164,15 @@ class Supervisor:
         desired = self.desired  # first: states that are newer outdate the steps of their nodes
         return self._reconcile(desired, self._node_set.states(), cause)
 
-    def _reconcile_settled(self, cause: str = "") -> tuple[StepFailed, ...]:
-        """Reconcile, but without nodes with a fault in the queue: that is handled first."""
+    def reconcile_settled(self, cause: str = "") -> tuple[StepFailed, ...]:
+        """Reconcile, but without nodes with a fault in the queue: that is handled first.
+
+        Nor absent ones: they may be active again by now, and their return is in the queue.
+        """
         desired = self.desired
+        left = desired.unhandled.keys() | self._absent
         states = self._node_set.states()
-        settled = {name: at for name, at in states.items() if name not in desired.unhandled}
+        settled = {name: at for name, at in states.items() if name not in left}
         return self._reconcile(desired, settled, cause)
 
     def _reconcile(
@@ -164,7 +184,8 @@ class Supervisor:
         for failure in failures:
             name = failure.step.node
             if name not in self.desired.down:
-                fault = Fault(name, FaultKind.STEP, failure.text, self.desired.serial)
+                kind = FaultKind.ABSENT if self._node_set.is_absent(name) else FaultKind.STEP
+                fault = Fault(name, kind, failure.text, self.desired.serial)
                 self.shared.update(partial(DesiredState.await_fault, fault=fault))
                 self._main_queue.put(fault)
         self._publish_desired()
@@ -203,6 +224,8 @@ class Supervisor:
             item = self._main_queue.get(min(end_s, due_s))
             if isinstance(item, Command):
                 run_command(item)
+            elif isinstance(item, NodeMoved):  # many move at once if another process moves them
+                self._on_moved([item, *self._main_queue.take_next(NodeMoved)])
             elif item is not None:
                 self.handle(item)
 
@@ -211,14 +234,19 @@ class Supervisor:
         match event:
             case Fault() as fault:
                 self._on_fault(fault)
-            case NodeMoved(cause=cause):
-                self._reconcile_settled(cause)
+            case NodeMoved() as moved:
+                self._on_moved([moved])
             case CallbackHanging() as hanging:
                 self._on_callback_hanging(hanging)
             case LoopRecovered() as recovered:
                 self._on_loop_recovered(recovered)
             case NodeReturned(node=name):
                 self._on_returned(name)
+
+    def _on_moved(self, moved: Sequence[NodeMoved]) -> None:
+        causes = tuple(dict.fromkeys(item.cause for item in moved if item.cause))
+        more = f" and {len(causes) - _MAX_CAUSES} more" * (len(causes) > _MAX_CAUSES)
+        self.reconcile_settled(", ".join(causes[:_MAX_CAUSES]) + more)
 
     def restart(self, restart: Restart) -> None:
         """Restart a failed node, unless an external transition comes first."""
@@ -234,7 +262,7 @@ class Supervisor:
             self._on_fault(Fault(name, FaultKind.TRANSITION, problem, desired.serial))
             return
         full_name = self._node_set.nodes[name].full_name
-        failures = self._reconcile_settled(f"restart {restart.attempt} of {full_name}")
+        failures = self.reconcile_settled(f"restart {restart.attempt} of {full_name}")
         if not failures and not self._main_queue.stopping:
             self._reporter.report(Restarted(self._reporter.elapsed_s, full_name, restart.attempt))
 
@@ -248,7 +276,7 @@ class Supervisor:
         if decision is None or not is_new or name not in desired.down:
             return
         self._status.set_error(name, fault.text)
-        consequence = _consequence(decision)
+        consequence = _consequence(decision, fault.kind)
         self._reporter.report(
             NodeFailed(self._reporter.elapsed_s, node.full_name, fault.text, consequence)
         )
@@ -256,11 +284,13 @@ class Supervisor:
         if fault.kind is FaultKind.LOST:
             node.lifecycle.fail_request()
             self._abandon_loop(name)
+        elif fault.kind is FaultKind.ABSENT:
+            self._absent.add(name)
         if decision.action is OnFailure.SHUTDOWN:
             self._publish_desired()
             self._main_queue.request_stop(f"{node.full_name} failed: {decision.reason}")
             return
-        self._reconcile_settled()
+        self.reconcile_settled()
         self._shut_down_unless_down(name)
         if self._node_set.is_lost(name) and fault.kind is not FaultKind.LOST:
             self.shared.update(lambda now: now.release(name))
@@ -283,20 +313,22 @@ class Supervisor:
         self._node_set.hung.discard(recovered.loop)
         for name in self._abandoned.pop(recovered.loop, ()):
             self.shared.update(partial(DesiredState.release, node=name))
-        self._reconcile_settled(f"executor '{recovered.loop}' runs again")
+        self.reconcile_settled(f"executor '{recovered.loop}' runs again")
 
     def _on_returned(self, name: str) -> None:
         """Bring an external node up again that had disappeared, and what depends on it."""
-        if name in self.desired.down:
+        was_absent = name in self._absent
+        self._absent.discard(name)
+        if was_absent or name in self.desired.down:
             self.shared.update(partial(DesiredState.release, node=name))
             full_name = self._node_set.nodes[name].full_name
-            self._reconcile_settled(f"{full_name} is there again")
+            self.reconcile_settled(f"{full_name} is there again")
 
     def _is_outdated(self, fault: Fault) -> bool:
         """Return whether the node has left the state in which it failed."""
         state = self._node_set.nodes[fault.node].state
         match fault.kind:
-            case FaultKind.TRANSITION:
+            case FaultKind.TRANSITION | FaultKind.ABSENT:  # it has returned
                 return state not in _DOWN
             case FaultKind.SILENCE | FaultKind.ERRORS:
                 return state != PrimaryState.ACTIVE
@@ -321,7 +353,8 @@ class Supervisor:
         """Shut down a failed node that could not be cleaned up, unless it was moved externally."""
         desired = self.desired
         at = self._node_set.states().get(name, PrimaryState.UNCONFIGURED)
-        if name in desired.down and at is not PrimaryState.UNCONFIGURED:
+        is_kept_down = name in desired.down and name not in self._absent
+        if is_kept_down and at is not PrimaryState.UNCONFIGURED:
             full_name = self._node_set.nodes[name].full_name
             step = Step(1, "shutdown", name, full_name, "cannot be cleaned up")
             options = ExecutionOptions(best_effort=True, serial=desired.serial)
@@ -344,13 +377,15 @@ class Supervisor:
         goals = desired_states(self._system, desired)
         states = {name: state.value for name, state in goals.items()}
         self._status.set_desired(states, desired.down)
+        if desired.goals:  # the bring-up is over
+            self._node_set.other_processes.keep_goals(desired.goals, desired.activity)
 
 
-def _consequence(decision: Decision) -> str:
+def _consequence(decision: Decision, kind: FaultKind) -> str:
     match decision.action:
         case OnFailure.RESTART:
             return f"restart {decision.attempt} in {decision.wait_s:g} s"
         case OnFailure.ISOLATE:
-            return "isolating it"
+            return "waiting for its return" if kind is FaultKind.ABSENT else "isolating it"
         case OnFailure.SHUTDOWN:
             return "shutting down the system"

@@ -7,12 +7,13 @@ from pathlib import Path
 import pytest
 
 from composer.loading import load
-from composer.model import OnFailure, System, member_system
+from composer.model import OnFailure, PrimaryState, System, member_system
 
 TEXT = """
 system: robot
 namespace: lab
 lifecycle: {on_failure: shutdown}
+hosts: {jetson: {address: 10.0.0.5, user: pilot, workspace: ~/robot, setup: [env.sh]}}
 processes:
   vision: {nodes: ["camera_*"], cpus: [1, 2], environment: {SIZE: 3}, memory_mb: 200, host: jetson}
   control: {}
@@ -52,6 +53,8 @@ def test_nodes_have_processes_by_name_pattern_and_key(system: System) -> None:
     assert vision.memory_mb.value == 200
     assert vision.host is not None
     assert vision.host.value == "jetson"
+    assert system.hosts[0].login == "pilot@10.0.0.5"
+    assert system.hosts[0].setup == ("env.sh",)
 
 
 def test_a_process_only_takes_failed_nodes_down(system: System) -> None:
@@ -62,3 +65,11 @@ def test_a_process_only_takes_failed_nodes_down(system: System) -> None:
         assert node.in_process
         assert not node.depends_on
         assert node.supervision.policy is OnFailure.ISOLATE
+
+
+def test_a_process_knows_how_far_its_nodes_start(system: System) -> None:
+    member = member_system(system, "vision", {"camera_front": PrimaryState.INACTIVE})
+    front, rear = member.nodes
+    assert front.autostart is not None
+    assert front.autostart.value is PrimaryState.INACTIVE
+    assert rear.autostart is None

@@ -199,6 +199,8 @@ def test_the_budget(
         ("shutdown", FaultKind.TRANSITION, OnFailure.SHUTDOWN, "silent for 300 ms"),
         ("restart", FaultKind.CALLBACK, OnFailure.RESTART, "silent for 300 ms"),
         ("restart", FaultKind.ERRORS, OnFailure.RESTART, "silent for 300 ms"),
+        ("restart", FaultKind.ABSENT, OnFailure.ISOLATE, "silent for 300 ms"),
+        ("shutdown", FaultKind.ABSENT, OnFailure.SHUTDOWN, "silent for 300 ms"),
         ("restart", FaultKind.LOST, OnFailure.SHUTDOWN,
          "silent for 300 ms; it cannot be restarted"),
     ],

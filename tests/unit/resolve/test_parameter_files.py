@@ -192,3 +192,23 @@ def test_a_variable_is_text_and_must_be_of_the_type(tmp_path: Path) -> None:
     found = {item.rule.name: item.message for item in load(tmp_path / "system.yaml").diagnostics}
     assert found["parameter-type"].endswith("must be of type double, not the string '${speed}'")
     assert found["parameter-substitution"] == "'${speed}' is not replaced in parameter files"
+
+
+def test_a_value_that_the_system_replaces_must_be_valid_too(tmp_path: Path) -> None:
+    (tmp_path / "nodes").mkdir()
+    (tmp_path / "nodes" / "motor.yaml").write_text(
+        "node: motor\nparameters: {speed: {type: double, default: 1.0, maximum: 5.0}}\n",
+        encoding="utf-8",
+    )
+    # A value for any node may be meant for others.
+    text = section("/motor", 9.0) + section("/**", 7.0)
+    (tmp_path / "robot.yaml").write_text(text, encoding="utf-8")
+    system = tmp_path / "system.yaml"
+    system.write_text(
+        "system: demo\nparameter_files: [robot.yaml]\n"
+        "nodes: {motor: {type: motor, parameters: {speed: 2.0}}}\n",
+        encoding="utf-8",
+    )
+    found = load(system)
+    assert [item.rule.name for item in found.diagnostics] == ["parameter-range"]
+    assert found.diagnostics[0].primary.line == 1

@@ -11,17 +11,16 @@ from pathlib import Path
 
 import pytest
 
-from composer.cli.support.output_queue import OutputQueue
+from composer.cli.support.output.output_queue import OutputQueue
 from composer.run_log import (
     Record,
     RotatingFile,
     Run,
     RunFolder,
     Selection,
+    SystemLog,
     find_runs,
-    follow,
     parse_since,
-    read,
 )
 from composer.run_log.record import parse_line
 from composer.run_log.rotation import log_files
@@ -121,12 +120,62 @@ def test_runs_are_found_by_system_in_order_and_the_oldest_removed(tmp_path: Path
     assert find_runs(tmp_path / "nothing") == []
 
 
-def test_runs_of_parts_of_systems_are_found_only_by_name(tmp_path: Path) -> None:
-    whole, part = RunFolder(tmp_path, "/split"), RunFolder(tmp_path, "/split/hearing", part=True)
-    assert [run.folder for run in find_runs(tmp_path)] == [whole.path]
+def test_runs_of_parts_of_systems_are_found_by_name_or_without_a_whole(tmp_path: Path) -> None:
+    part = RunFolder(tmp_path, "/split/hearing", part=True)
+    for name in (None, "split", "/split", "/split/hearing", "hearing"):
+        assert [run.folder for run in find_runs(tmp_path, name)] == [part.path]
+    whole = RunFolder(tmp_path, "/split")
+    for name in (None, "split", "/split"):
+        assert [run.folder for run in find_runs(tmp_path, name)] == [whole.path]
     assert [run.folder for run in find_runs(tmp_path, "/split/hearing")] == [part.path]
     whole.close()
     part.close()
+
+
+def write(folder: Path, at_s: float, message: str, **fields: str) -> None:
+    about = {"level": "info", "logger": "ear", "node": "/ear"} | fields
+    line = Record(int(at_s * 1e9), message=message, **about).to_line()
+    with (folder / "log-000001.jsonl").open("a", encoding="utf-8") as file:
+        file.write(line)
+    os.utime(file.name, (at_s, at_s))
+
+
+def test_the_log_of_a_system_has_the_lines_of_its_processes_once(tmp_path: Path) -> None:
+    whole, child, alone = (
+        RunFolder(tmp_path, "/split"),
+        RunFolder(tmp_path, "/split/seeing", part=True, forwarded=True),
+        RunFolder(tmp_path, "/split/hearing", part=True),
+    )
+    (run,) = find_runs(tmp_path)
+    now_s = run.started.timestamp()
+    write(child.path, now_s, "not again")
+    write(whole.path, now_s + 2, "second")
+    write(alone.path, now_s - 1, "earlier, in the first run")
+    write(alone.path, now_s + 1, "/ear active", logger="compose")
+    write(alone.path, now_s + 1, "first")
+    log = SystemLog(tmp_path, run)
+    assert [record.message for record in log.new()] == [
+        "earlier, in the first run",
+        "first",
+        "second",
+    ]
+    again = alone.path.with_name(f"{alone.path.name}1")  # started again, by a service manager
+    again.mkdir()
+    (again / "run.json").write_bytes((alone.path / "run.json").read_bytes())
+    write(again, now_s + 3, "third")
+    assert [record.message for record in log.new()] == ["third"]
+    assert [record.message for record in log.new()] == []
+
+    folder = whole.path.parent / "2126-03-01-08-30-00-125-1"  # the next run
+    folder.mkdir()
+    (folder / "run.json").write_bytes((whole.path / "run.json").read_bytes())
+    next_s = Run(folder, "/split").started.timestamp()
+    write(again, next_s + 1, "of the next run")
+    assert [r.message for r in SystemLog(tmp_path, run).new()][-1] == "third"
+    later = SystemLog(tmp_path, find_runs(tmp_path)[-1])
+    assert [record.message for record in later.new()] == ["of the next run"]
+    for started in (whole, child, alone):
+        started.close()
 
 
 WRITER = """
@@ -155,14 +204,14 @@ def test_a_run_is_followed_over_rotations_until_its_process_ends(tmp_path: Path)
         run = Run(Path(process.stdout.readline().strip()), "/pipeline")
         assert run.is_running()
         messages = []
-        for found in follow(run, lambda _: None):
+        for found in SystemLog(tmp_path, run).follow(lambda _: None):
             messages.append(found.message)
             if found.message in ("line 0", "line 50"):
                 process.stdin.write("\n")
                 process.stdin.flush()
     assert messages == [f"line {number}" for number in range(100)]
     assert not run.is_running()
-    assert [found.message for found in read(run)][-1] == "line 99"
+    assert [found.message for found in SystemLog(tmp_path, run).new()][-1] == "line 99"
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ from composer.runtime.children.child_processes import (
     StartFailed,
 )
 
-PATIENCE_S = 10.0
+PATIENCE_S = 20.0
 MARK = "COMPOSER_TEST_MARK"
 #: A composer with three children: a polite one, one that ignores everything but SIGKILL, and one
 #: with a grandchild that has left the process group.
@@ -43,13 +43,12 @@ time.sleep(60)
 """.replace("MARK", repr(MARK))
 
 
-def wait_until(condition: Callable[[], object], what: str) -> float:
-    """Wait until ``condition()`` is true; return how long it took, in seconds."""
+def wait_until(condition: Callable[[], object], what: str) -> None:
+    """Wait until ``condition()`` is true; fail after ``PATIENCE_S``."""
     began_s = time.monotonic()
     while not condition():
         assert time.monotonic() < began_s + PATIENCE_S, f"timed out: {what}"
         time.sleep(0.002)
-    return time.monotonic() - began_s
 
 
 def marked(mark: str) -> list[int]:
@@ -128,31 +127,36 @@ def test_a_program_that_cannot_start(
 
 
 @pytest.mark.parametrize(
-    ("script", "status", "least_s"),
+    ("traps", "status", "limits_s", "least_s"),
     [
-        ("trap 'exit 7' INT; echo ready; while true; do sleep 0.01; done", 7, 0.0),
-        ("trap '' INT; trap 'exit 8' TERM; echo ready; while true; do sleep 0.01; done", 8, 0.2),
-        ("trap '' INT TERM; echo ready; while true; do sleep 0.01; done", -9, 0.4),
+        ("trap 'exit 7' INT", 7, (PATIENCE_S, PATIENCE_S), 0.0),
+        ("trap '' INT; trap 'exit 8' TERM", 8, (0.2, PATIENCE_S), 0.2),
+        ("trap '' INT TERM", -9, (0.2, 0.2), 0.4),
     ],
 )
-def test_ends_in_order(children: ChildProcesses, script: str, status: int, least_s: float) -> None:
+def test_ends_in_order(
+    children: ChildProcesses,
+    traps: str,
+    status: int,
+    limits_s: tuple[float, float],
+    least_s: float,
+) -> None:
     lines: list[tuple[str, bool]] = []
-    child = start(children, script, lines)
+    child = start(children, f"{traps}; echo ready; while true; do sleep 0.01; done", lines)
     wait_until(lambda: lines, "the trap")
-    children.end(child, 0.2, 0.2)
-    took_s = wait_until(child.ended.done, "the end")
+    began_s = time.monotonic()
+    children.end(child, *limits_s)
+    wait_until(child.ended.done, "the end")
     assert child.ended.result() == status
-    assert least_s <= took_s < least_s + 2.0
+    assert time.monotonic() - began_s >= least_s
 
 
-def test_a_kill_is_noticed_at_once(children: ChildProcesses) -> None:
+def test_a_kill_is_noticed(children: ChildProcesses) -> None:
     child = start(children, "exec sleep 60", [])
     wait_until(child.started.done, "the start")
-    times_s = []
     os.kill(child.started.result(), signal.SIGKILL)
-    times_s.append(wait_until(child.ended.done, "the end"))
+    wait_until(child.ended.done, "the end")
     assert child.ended.result() == -9
-    assert times_s[0] < 0.1 * max(1.0, os.getloadavg()[0])
 
 
 def test_the_rest_of_a_group_ends_with_its_leader(children: ChildProcesses) -> None:

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import threading
 from bisect import bisect
+from dataclasses import replace
 from random import Random
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from composer.cli.support.callback_tables import (
+from composer.cli.support.output.callback_tables import (
     SortKey,
     sorted_rates,
     summary_table,
     top_data,
     top_table,
 )
-from composer.runtime.metrics.figures import CallbackFigures, figures, rates
+from composer.remote.systems.system_reports import NodeReport, SystemReport, with_processes
+from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, figures, rates
 from composer.runtime.metrics.histogram import BATCH_SIZE, BOUNDS_S, Histogram
 from composer.runtime.metrics.statistics import CallbackStatistics, Statistics
 
@@ -123,20 +124,20 @@ def test_rates_are_those_between_two_snapshots() -> None:
     assert rates(now, before, 1.0)[0].busy == 0.0  # a node that was created again
 
 
-def report(at_s: float, *callbacks: CallbackFigures) -> Any:
-    return SimpleNamespace(
+def report(at_s: float, *callbacks: CallbackFigures) -> SystemReport:
+    return SystemReport(
         name="/robot",
         activity="running",
         message="2 of 2 nodes active",
         host="robot1",
         pid="12",
+        nodes=(),
         callbacks=callbacks,
-        chains=(),
         callbacks_at_s=at_s,
     )
 
 
-def two_reports() -> tuple[Any, Any]:
+def two_reports() -> tuple[SystemReport, SystemReport]:
     before = report(
         1.0, CallbackFigures("/a", "timer", "tick"), CallbackFigures("/b", "subscription", "scan")
     )
@@ -185,3 +186,32 @@ def test_the_summary_shows_the_slowest_callbacks() -> None:
     lines = summary_table(now.callbacks, 1).splitlines()
     assert lines[1].split()[0] == "/b"
     assert lines[2] == "1 more callbacks took less time"
+
+
+def test_rates_of_other_processes_are_those_between_their_own_reports() -> None:
+    def whole(at_s: float, others_at_s: float, calls: int) -> SystemReport:
+        other = replace(
+            report(others_at_s, CallbackFigures("/b", "timer", "tick", calls)),
+            chains=(ChainFigures("way", 10.0, calls), ChainFigures("unknown", 1.0, 1)),
+        )
+        own = replace(
+            report(at_s, CallbackFigures("/a", "timer", "tick", calls)),
+            nodes=(node("/a", ""), node("/b", "acting")),
+            chains=(ChainFigures("way", 10.0),),
+        )
+        return with_processes(own, {"acting": other})
+
+    before, now = whole(1.0, 0.5, 10), whole(2.0, 2.5, 30)
+    assert now.processes == {"acting": "/robot/acting"}
+    found = {item.figures.node: item.calls_hz for item in sorted_rates(before, now, SortKey.NODE)}
+    assert found == {"/a": 20.0, "/b": 10.0}
+    assert [(chain.chain, chain.count) for chain in now.chains] == [("way", 30)]
+
+
+def node(name: str, process: str) -> NodeReport:
+    zeros = dict.fromkeys(("since_s", "restarts", "errors", "sent_hz", "received_hz", "busy"), 0)
+    counts = {"overruns": 0, "queue_drops": 0, "qos_events": {}, "depends_on": {}}
+    topics = {"sent": {}, "received": {}, "dropped": {}}
+    texts = {"last_error": "", "held_down": "", "slowest": "", "process": process}
+    values: dict[str, Any] = {**zeros, **counts, **topics, **texts}
+    return NodeReport(node=name, state="active", desired="active", **values)

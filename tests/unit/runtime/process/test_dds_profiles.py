@@ -11,6 +11,7 @@ import pytest
 
 from composer.runtime.process.dds_profiles import (
     use_command_profile,
+    use_dashboard_profile,
     use_discovery_profile,
     use_large_system_profile,
 )
@@ -65,6 +66,23 @@ def test_the_profile_for_large_systems_has_the_settings_of_writers_only(tmp_path
     assert left
     configured = {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
     use_large_system_profile(configured)
+    assert configured == {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
+
+
+def test_a_dashboard_announces_itself_less_often(tmp_path: Path) -> None:
+    environment: dict[str, str] = {}
+    use_discovery_profile(environment, tmp_path)
+    everything = _settings(environment)
+    use_dashboard_profile(environment)
+    missing = everything - _settings(environment)
+    assert missing
+    assert all("leaseAnnouncement" in setting for setting in missing)
+    selected = dict(environment)
+    use_discovery_profile(environment, tmp_path)  # it joins the ROS graph for another browser
+    use_dashboard_profile(environment)
+    assert environment == selected
+    configured = {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
+    use_dashboard_profile(configured)
     assert configured == {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
 
 

@@ -50,7 +50,7 @@ def test_the_profile_is_extended(discovery_range: str, large_system: bool, tmp_p
         {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"},
         {"FASTDDS_BUILTIN_TRANSPORTS": "DEFAULT"},
         {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"},
-        {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_STATIC_PEERS": "10.0.0.7"},
+        {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_LOCALHOST_ONLY": "1"},
     ],
 )
 def test_the_configuration_of_the_user_is_kept(configured: dict[str, str], tmp_path: Path) -> None:

@@ -8,7 +8,12 @@ from pathlib import Path
 import pytest
 
 from composer.runtime.process import StartRefused
-from composer.runtime.process.instance_lock import hold_instance_lock, local_systems
+from composer.runtime.process.instance_lock import (
+    LocalSystems,
+    hold_instance_lock,
+    is_held,
+    local_systems,
+)
 
 OTHER_USER = 65534
 NAME = "/robot"
@@ -30,6 +35,46 @@ def test_a_held_lock_refuses_a_second_process_and_is_listed(folder: Path) -> Non
             pass
     assert local_systems() == {}
     assert folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_looking_for_a_lock_that_was_never_held_creates_no_file(folder: Path) -> None:
+    assert not is_held(NAME)
+    assert list(folder.iterdir()) == []
+
+
+def test_an_observer_follows_systems_whose_lock_files_existed_before(folder: Path) -> None:
+    observer = LocalSystems()
+    assert observer.current() == {}
+    with hold_instance_lock(NAME):
+        pass
+    for _ in range(2):
+        _make_older(folder)
+        assert observer.current() == {}  # also from what it remembers
+        with hold_instance_lock(NAME), hold_instance_lock("/lab/robot"):
+            pid = str(os.getpid())
+            assert observer.current() == {NAME: pid, "/lab/robot": pid}
+            _make_older(folder)
+            assert observer.current() == {NAME: pid, "/lab/robot": pid}
+            assert observer.current() == {NAME: pid, "/lab/robot": pid}
+        assert observer.current() == {}
+
+
+def test_an_observer_opens_no_files_of_ended_systems_again(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with hold_instance_lock(NAME), hold_instance_lock("/lab/robot"):
+        pass
+    _make_older(folder)
+    observer = LocalSystems()
+    assert observer.current() == {}
+    monkeypatch.setattr(os, "listdir", None)
+    assert observer.current() == {}
+
+
+def _make_older(folder: Path) -> None:
+    """Move the last change of the folder into the past, by another time at each call."""
+    changed_ns = folder.stat().st_mtime_ns - 10**9
+    os.utime(folder, ns=(changed_ns, changed_ns))
 
 
 def test_a_symbolic_link_in_place_of_the_folder_is_refused(folder: Path, tmp_path: Path) -> None:

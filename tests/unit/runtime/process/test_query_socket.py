@@ -25,7 +25,7 @@ VIEW: GraphView = {
     "service": (),
     "action": (("/navigate", ("composer_interfaces/action/Navigate",)),),
 }
-LIMIT_S = 10.0
+LIMIT_S = 30.0
 
 
 @pytest.fixture(autouse=True)

@@ -92,7 +92,6 @@ def test_incomplete_ports_of_this_user_are_removed_in_all_domains(tmp_path: Path
     assert not path.exists()
 
 
-@pytest.mark.timeout(5)
 def test_a_fifo_named_like_a_port_is_refused_without_opening_its_other_end(tmp_path: Path) -> None:
     path = tmp_path / "fastrtps_port7411"
     os.mkfifo(path)

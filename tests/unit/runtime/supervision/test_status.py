@@ -1,4 +1,4 @@
-"""Whether a system as a whole is active."""
+"""Whether a system as a whole is active, and ready."""
 
 from __future__ import annotations
 
@@ -30,6 +30,27 @@ def test_a_system_is_active_if_all_nodes_that_start_active_are(
 ) -> None:
     status = SystemStatus("robot", "running", nodes, "host", 1, 0.0)
     assert status.is_active is is_active
+
+
+@pytest.mark.parametrize(
+    ("activity", "nodes", "is_ready"),
+    [
+        ("running", (PLANNER, CAMERA), True),
+        ("running", (CAMERA,), True),  # it is where it should be
+        ("running", (), True),
+        ("starting", (PLANNER, CAMERA), False),
+        ("paused", (replace(PLANNER, state="inactive", desired="inactive"),), False),
+        ("running", (replace(PLANNER, state="activating"), CAMERA), False),
+        ("running", (replace(PLANNER, held_down="silent"), CAMERA), False),
+        ("running", (PLANNER, replace(CAMERA, state="unconfigured")), False),
+        # In a process whose nodes have not been brought up.
+        ("running", (NodeStatus("/planner", "unconfigured"),), False),
+    ],
+)
+def test_a_system_is_ready_if_all_nodes_are_where_they_should_be(
+    activity: str, nodes: tuple[NodeStatus, ...], is_ready: bool
+) -> None:
+    assert SystemStatus("robot", activity, nodes, "host", 1, 0.0).is_ready is is_ready
 
 
 def test_the_summary_lists_only_some_failed_nodes() -> None:

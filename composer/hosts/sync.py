@@ -1,0 +1,148 @@
+"""Copy the project to the workspaces of hosts, with rsync over ssh."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+from pathlib import Path
+
+import asyncssh
+
+from composer.fast_dataclass import dataclass
+from composer.hosts.connection import HostError, key_file
+from composer.hosts.remote_command import quoted_path, workspace
+from composer.model import Host
+
+#: In a workspace: it holds a copy of a project, which may be replaced.
+MARK = ".compose-sync"
+#: What is made on each computer, and repositories.
+EXCLUDED = (
+    f"/{MARK}",
+    "/.venv",
+    "/venv",
+    "/build",
+    "/install",
+    "/log",
+    "/logs",
+    ".git",
+    "__pycache__",
+    "node_modules",
+)
+_NOT_OURS, _NOT_WRITABLE = 74, 75
+_COPY_WITHIN_S = 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class SyncOptions:
+    """What to copy: everything below ``root`` but ``EXCLUDED``.
+
+    With ``delete``, files of the workspace that are not in the project are deleted. With
+    ``dry_run``, nothing is changed.
+    """
+
+    root: Path
+    delete: bool = False
+    dry_run: bool = False
+
+
+def root_problem(root: Path) -> str | None:
+    """Return why a folder is not copied as a project; None if it is."""
+    if root == Path(root.anchor):
+        return "the root of the project is that of the file system"
+    if root == Path.home():
+        return "the root of the project is the home folder"
+    return None
+
+
+async def prepare_workspace(
+    host: Host, connection: asyncssh.SSHClientConnection, *, dry_run: bool
+) -> str:
+    """Make the workspace, or check that it holds a copy of a project; return its absolute path.
+
+    Raises HostError.
+    """
+    folder = quoted_path(workspace(host))
+    lines = (
+        [f"echo {folder}", f"[ -d {folder} ] || exit 0"]
+        if dry_run
+        else [f"echo {folder}", f"mkdir -p {folder}"]
+    )
+    lines += [f"cd {folder}", f'[ -e {MARK} ] || [ -z "$(ls -A)" ] || exit {_NOT_OURS}']
+    lines += [] if dry_run else [f"touch {MARK}"]
+    script = " && ".join(f"{{ {line}; }}" for line in lines) + f" || exit {_NOT_WRITABLE}"
+    try:
+        done = await connection.run(f"exec sh -c {shlex.quote(script)}")
+    except (asyncssh.Error, OSError) as error:
+        raise HostError(host, f"connection lost: {error}") from error
+    name = workspace(host)
+    if done.exit_status == _NOT_OURS:
+        raise HostError(
+            host,
+            f"the workspace '{name}' holds other files, which were not copied by 'compose sync'",
+            f"choose another folder; or permit it: ssh {host.login} touch {name}/{MARK}",
+        )
+    lines = (str(done.stdout or "") + str(done.stderr or "")).splitlines()
+    path = next((line for line in lines if line.startswith("/")), None)
+    if done.exit_status != 0 or path is None:
+        raise HostError(host, f"cannot write to '{name}': {lines[-1] if lines else 'no reason'}")
+    return path
+
+
+def copy_project(host: Host, target: str, options: SyncOptions) -> tuple[str, ...]:
+    """Copy the project to the folder ``target``; return what was copied or deleted.
+
+    Raises HostError.
+    """
+    command = rsync_command(host, target, options)
+    try:
+        done = subprocess.run(  # noqa: S603 - the words are checked by the rule invalid-host
+            command,
+            check=False,
+            capture_output=True,
+            text=True,
+            stdin=subprocess.DEVNULL,
+            timeout=_COPY_WITHIN_S,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise HostError(host, f"rsync has not ended within {_COPY_WITHIN_S:g} s") from error
+    if done.returncode != 0:
+        lines = [line for line in done.stderr.splitlines() if line.strip()]
+        reason = lines[0] if lines else f"exit code {done.returncode}"
+        hint = None
+        if "command not found" in done.stderr or done.returncode == 127:
+            hint = "install rsync there"
+        raise HostError(host, f"rsync failed: {reason}", hint)
+    return tuple(line for line in done.stdout.splitlines() if not line.endswith("/"))
+
+
+def rsync_command(host: Host, target: str, options: SyncOptions) -> list[str]:
+    """Return the command that copies the project to the folder ``target`` of a host."""
+    ssh = ["ssh", "-a", "-x", *([] if host.port is None else ["-p", str(host.port)])]
+    settings = {"BatchMode": "yes", "StrictHostKeyChecking": "yes", "PasswordAuthentication": "no"}
+    files = {"IdentityFile": host.identity_file, "UserKnownHostsFile": host.known_hosts}
+    settings |= {
+        name: str(key_file(file, options.root)) for name, file in files.items() if file is not None
+    }
+    for name, value in settings.items():
+        quoted = f'"{value}"' if " " in value else value
+        ssh += ["-o", f"{name}={quoted}"]
+    address = f"[{host.address}]" if ":" in host.address.value else host.address.value
+    user = "" if host.user is None else f"{host.user}@"
+    return [
+        "rsync",
+        "--recursive",
+        "--links",
+        "--perms",
+        "--times",
+        "--checksum",
+        "--secluded-args",  # no shell there reads the names
+        "--out-format=%o %n",
+        *(["--delete"] if options.delete else []),
+        *(["--dry-run"] if options.dry_run else []),
+        *(f"--exclude={pattern}" for pattern in EXCLUDED),
+        f"--rsh={shlex.join(ssh)}",
+        "--",
+        f"{options.root}{os.sep}",
+        f"{user}{address}:{target}/",
+    ]

@@ -1,0 +1,58 @@
+"""The files and interfaces that a system uses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from composer.behavior_source import find_behavior
+from composer.hosts.inventory import Question
+from composer.model import BehaviorReference, System
+from composer.project import SETTINGS_FILE, Project
+from composer.source import SourceFile
+
+
+def question_about(system: System, path: Path, project: Project) -> Question:
+    """Return what other computers must have in common with this one to run the system in ``path``.
+
+    The files are those of the project: YAML, parameters, Python code and settings. What is
+    installed is compared by its version.
+    """
+    names = {
+        str(found.resolve().relative_to(project.root))
+        for found in (path, *_files(system, project))
+        if project.holds(found) and found.is_file()
+    }
+    interfaces = {port.interface.value for node in system.nodes for port in node.ports}
+    return Question(tuple(sorted(names)), tuple(sorted(interfaces)))
+
+
+def _files(system: System, project: Project) -> Iterator[Path]:
+    for source in _sources(system):
+        yield Path(source.path)
+    for node in system.nodes:
+        yield from node.type_files
+    seen: set[tuple[str, Path]] = set()
+    for reference in _references(system):
+        key = (reference.text.value, reference.folder)
+        if key not in seen:
+            seen.add(key)
+            yield from (module.path for module in find_behavior(reference).own_modules)
+    yield project.root / SETTINGS_FILE
+
+
+def _sources(system: System) -> Iterator[SourceFile]:
+    """Yield the YAML files in which something of the system is written."""
+    spans = [node.span for node in system.nodes]
+    spans += [process.span for process in system.processes]
+    spans += [host.span for host in system.hosts]
+    spans += [executor.span for executor in system.executors]
+    yield from {system.source, *system.parameter_files, *(span.file for span in spans)}
+
+
+def _references(system: System) -> Iterator[BehaviorReference]:
+    for node in system.nodes:
+        if node.behavior is not None:
+            yield node.behavior
+        if node.hosted_class is not None:
+            yield node.hosted_class.reference

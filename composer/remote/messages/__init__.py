@@ -1,0 +1,1 @@
+"""Messages of any topic: as text, measured, collected, published."""

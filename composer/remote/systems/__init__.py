@@ -1,0 +1,1 @@
+"""Running systems of the composer: what their managers report, and requests to them."""

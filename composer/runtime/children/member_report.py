@@ -1,0 +1,150 @@
+"""What a process of the system reports about itself and its nodes.
+
+Its manager node publishes that as a diagnostic_msgs/msg/DiagnosticArray, latched on ``state``. The
+process may be of another version.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from composer.runtime.metrics.numbers import finite
+from composer.runtime.ros.diagnostic_arrays import read_array
+
+_RATES = ("sent_hz", "received_hz", "busy")
+_COUNTS = ("errors", "overruns", "queue_drops", "calls", "skipped")
+_COUNTS_BY_NAME = ("sent", "received", "dropped", "qos_events")
+
+
+@dataclass(frozen=True, slots=True)
+class MemberState:
+    """A node as its process reports it: its state, and why it is held down, if it has failed.
+
+    ``figures`` are rates and counters, by the names of the fields of ``NodeStatus``.
+    """
+
+    state: str
+    held_down: str
+    figures: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class MemberReport:
+    """One report. ``started_by`` identifies the start by a coordinating process, or is empty.
+
+    ``number`` counts the reports of the process. ``goals`` are those of the whole system that it
+    keeps. ``host``, ``pid`` and ``started_s`` (seconds since 1970) are those of the process.
+    """
+
+    activity: str
+    host: str
+    pid: str
+    started_s: float
+    started_by: str
+    number: int
+    goals: str
+    nodes: Mapping[str, MemberState]
+
+    @property
+    def is_starting(self) -> bool:
+        """Whether it has no nodes yet, and would refuse requests."""
+        return self.activity == "starting"
+
+    @property
+    def is_stopping(self) -> bool:
+        """Whether it takes its nodes down because the process ends."""
+        return self.activity in ("stopping", "stopped")
+
+    @property
+    def identity(self) -> tuple[str, str, float]:
+        """What no other process has."""
+        return self.host, self.pid, self.started_s
+
+
+def parse_report(content: bytes) -> MemberReport | None:
+    """Return the report in a serialized message, None if it is none."""
+    try:
+        _, [system, *nodes] = read_array(content)
+        values = system.values
+        started_s = finite(values.get("started", "0"))
+        number = int(values.get("number", "0"))
+    except ValueError:
+        return None
+    return MemberReport(
+        activity=values.get("activity", ""),
+        host=values.get("host", ""),
+        pid=values.get("pid", ""),
+        started_s=started_s,
+        started_by=values.get("started_by", ""),
+        number=number,
+        goals=values.get("goals", ""),
+        nodes={status.name.partition(": ")[2]: _node(status.values) for status in nodes},
+    )
+
+
+def _node(values: Mapping[str, str]) -> MemberState:
+    return MemberState(values.get("state", ""), values.get("held_down", ""), _figures(values))
+
+
+def _figures(values: Mapping[str, str]) -> Mapping[str, Any]:
+    """Return the rates and counters in a report; none if it is not of this version."""
+    try:
+        rates = {name: finite(values[name]) for name in _RATES}
+        counts = {name: int(values[name]) for name in _COUNTS}
+        by_name = {name: _counts(values[name]) for name in _COUNTS_BY_NAME}
+    except (KeyError, ValueError):
+        return {}
+    return {**rates, **counts, **by_name, "slowest": values.get("slowest", "")}
+
+
+def _counts(text: str) -> Mapping[str, int]:
+    pairs = (item.partition("=") for item in text.split())
+    return {name: int(count) for name, _, count in pairs}
+
+
+class NodeFigures:
+    """The rates and counters of a node over all lives of its process, which count from zero."""
+
+    def __init__(self) -> None:
+        self._reported: Mapping[str, Any] = {}
+        self._counts: Counter[str] = Counter()  # of the last report
+        self._earlier: Counter[str] = Counter()  # counted by earlier lives
+        self._known = False
+        self._before: Counter[str] = Counter()  # counted before this process was there
+
+    def take(self, figures: Mapping[str, Any], *, is_started_here: bool) -> None:
+        """Receive what the process reports."""
+        if not figures:
+            return
+        self._reported = figures
+        self._counts = _counters(figures)
+        if not self._known:
+            self._known = True
+            self._before = Counter() if is_started_here else self._counts
+
+    def end_life(self) -> None:
+        """Keep the counts of a process that has ended."""
+        self._earlier += self._counts
+        self._reported = {}
+        self._counts = Counter()
+
+    @property
+    def current(self) -> Mapping[str, Any]:
+        """The figures by the names of the fields of ``NodeStatus``, of all lives so far."""
+        totals = {name: self._counts[name] + self._earlier[name] for name in _COUNTS}
+        return {**self._reported, **totals}
+
+    @property
+    def since_start(self) -> Mapping[str, int]:
+        """The counters since this process knows the node."""
+        return self._counts + self._earlier - self._before
+
+
+def _counters(figures: Mapping[str, Any]) -> Counter[str]:
+    counts = Counter({name: figures.get(name, 0) for name in _COUNTS})
+    for name in _COUNTS_BY_NAME:
+        counts[name] = sum(figures.get(name, {}).values())
+    return counts

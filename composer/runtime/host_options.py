@@ -1,0 +1,48 @@
+"""How a system is run: limits of time, and what its process is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from composer.model import LogLevel, Process
+
+
+@dataclass(frozen=True, slots=True)
+class HostOptions:
+    """How a system is run.
+
+    ``run_for_s`` is how long it runs, ``bring_up_within_s`` the limit of the whole bring-up,
+    ``stop_within_s`` that of the tear-down. ``transition_timeout_s`` overrides the system's.
+    ``tracing`` records callback timings, also of callbacks without a ``budget_ms``;
+    ``check_mutation`` checks after each callback whether it has modified a message.
+    ``fail_on_error`` makes errors of user code and failed calls a failure of the run.
+
+    ``process`` is set if the system is the part of another one that a process of it runs;
+    ``started_by`` then identifies its start by the coordinating process, or is empty.
+    ``member_command`` starts such processes of this system, with ``--process NAME`` after it;
+    without it, they are only awaited.
+
+    ``end_within(seconds)`` has to end the process after that time, whatever hangs in it; None
+    cancels that. It is called with ``grace_s`` as soon as the system stops, and never canceled
+    then: the end of Python may hang as well. It also limits each call of the start that may never
+    return from the middleware. ``ends_process`` promises that the process ends after the run, by
+    ``os._exit`` if the outcome requires it. ``on_alive()`` is called every second.
+    """
+
+    run_for_s: float | None = None
+    log_level: LogLevel = LogLevel.INFO
+    bring_up_within_s: float = math.inf
+    transition_timeout_s: float | None = None
+    stop_within_s: float = 1.7
+    grace_s: float = 10.0
+    end_within: Callable[[float | None], None] = lambda _: None
+    tracing: bool = True
+    check_mutation: bool = False
+    fail_on_error: bool = False
+    ends_process: bool = False
+    on_alive: Callable[[], None] = lambda: None
+    process: Process | None = None
+    started_by: str = ""
+    member_command: Sequence[str] = ()

@@ -1,0 +1,74 @@
+"""Limits Fast DDS to network interfaces, which only a profile can do."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import MutableMapping, Sequence
+from pathlib import Path
+
+from composer.model import Discovery
+from composer.runtime.process import StartRefused
+from composer.runtime.process.addresses import has_interface, interface_names
+from composer.runtime.process.dds_profiles import generated_profile, is_own_profile
+from composer.runtime.process.dds_xml import Profile, add, child
+from composer.runtime.process.instance_lock import private_path
+
+_PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_TRANSPORTS_VARIABLE = "FASTDDS_BUILTIN_TRANSPORTS"
+_RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_UNUSED = "'interfaces' of the system are not used"
+#: With others, rmw_fastrtps replaces the transports of a profile.
+_RANGES = ("", "SUBNET", "SYSTEM_DEFAULT")
+
+
+def use_interfaces(discovery: Discovery | None, environment: MutableMapping[str, str]) -> list[str]:
+    """Select a profile for the network interfaces of a system, if it has some.
+
+    Return a warning if the environment prevents it. Raises StartRefused if there is no such
+    interface: Fast DDS would discover nothing, and only log why.
+    """
+    interfaces = [] if discovery is None else [item.value for item in discovery.interfaces]
+    if not interfaces:
+        return []
+    for text in interfaces:
+        if not has_interface(text):
+            raise StartRefused(
+                f"this computer has no network interface '{text}' ('discovery' of the system)",
+                f"it has {', '.join(interface_names())}; see 'ip address'",
+            )
+    if (
+        not is_own_profile(environment)
+        or environment.get(_TRANSPORTS_VARIABLE)
+        or environment.get(_RANGE_VARIABLE, "") not in _RANGES
+    ):
+        return [
+            f"{_UNUSED}: the environment sets a profile or transports of Fast DDS, or"
+            f" {_RANGE_VARIABLE}"
+        ]
+    content = profile_for_interfaces(environment[_PROFILES_VARIABLE], interfaces)
+    path = private_path(generated_profile(content))
+    if path is None:
+        return [f"{_UNUSED}: there is no private folder for the profile"]
+    try:
+        _write(path, content)
+    except OSError as error:
+        return [f"{_UNUSED}: cannot write '{path}': {error.strerror}"]
+    environment[_PROFILES_VARIABLE] = str(path)
+    return []
+
+
+def profile_for_interfaces(path: str, interfaces: Sequence[str]) -> str:
+    """Return the profile in the file ``path`` with these network interfaces only, as XML."""
+    profile = Profile(path)
+    allowed = child(profile.udp, "interfaceWhiteList")
+    for interface in interfaces:
+        is_address = interface.replace(".", "").isdigit()
+        add(allowed, "address" if is_address else "interface", interface)
+    return profile.text()
+
+
+def _write(path: Path, content: str) -> None:
+    """Write the file as a whole: other processes may read it now."""
+    partial = path.with_suffix(f".{os.getpid()}")
+    partial.write_text(content, encoding="utf-8")
+    partial.replace(path)

@@ -1,0 +1,62 @@
+"""The endpoints of all nodes in the ROS graph, with the QoS profiles that discovery reports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeAlias
+
+from composer.drift import ObservedEndpoint
+from composer.model import PortKind
+from composer.names import is_hidden, join_node_name, split_node_name
+from composer.runtime.ros.graph import RosGraph
+
+#: The order of endpoints of a node.
+_ORDER = {kind: number for number, kind in enumerate(PortKind)}
+
+_Ends: TypeAlias = dict[str, list[ObservedEndpoint]]
+
+
+def endpoints(graph: RosGraph) -> tuple[tuple[str, tuple[ObservedEndpoint, ...]], ...]:
+    """Return the nodes discovered so far with their endpoints, as a hashable value."""
+    ends = _endpoints_by_node(graph)
+    return tuple((name, tuple(ends[name])) for name in sorted(ends))
+
+
+def _endpoints_by_node(graph: RosGraph) -> _Ends:
+    ends: _Ends = {name: [] for name in node_names(graph)}
+    for topic, types in visible_topics(graph).items():
+        info = graph.topic(topic, types)
+        for kind, found in (
+            (PortKind.PUBLISHER, info.publishers),
+            (PortKind.SUBSCRIPTION, info.subscriptions),
+        ):
+            for end in found:
+                if end.node in ends:
+                    ends[end.node].append(ObservedEndpoint(kind, topic, end.type, end.qos))
+    for name, of_node in ends.items():
+        of_node.extend(_services_and_actions(graph, name))
+        of_node.sort(key=lambda end: (_ORDER[end.kind], end.name, end.type))
+    return ends
+
+
+def _services_and_actions(graph: RosGraph, full_name: str) -> Iterator[ObservedEndpoint]:
+    namespace, name = split_node_name(full_name)
+    for kind, query in (
+        (PortKind.SERVICE, graph.services_of),
+        (PortKind.CLIENT, graph.clients_of),
+        (PortKind.ACTION_SERVER, graph.action_servers_of),
+        (PortKind.ACTION_CLIENT, graph.action_clients_of),
+    ):
+        for found, types in query((name, namespace)):
+            if not is_hidden(found):
+                yield from (ObservedEndpoint(kind, found, type_name) for type_name in types)
+
+
+def node_names(graph: RosGraph) -> list[str]:
+    """Return the full names of all nodes; a name that two nodes share is listed twice."""
+    return [join_node_name(namespace, name) for name, namespace in graph.nodes()]
+
+
+def visible_topics(graph: RosGraph) -> dict[str, tuple[str, ...]]:
+    """Return the types of each topic that ROS tools do not hide."""
+    return {name: types for name, types in sorted(graph.topics()) if not is_hidden(name)}

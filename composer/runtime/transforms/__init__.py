@@ -1,0 +1,1 @@
+"""Frames of tf2: the transforms that a process has received, and what nodes do with them."""

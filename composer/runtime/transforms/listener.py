@@ -1,0 +1,202 @@
+"""The transforms that arrive on /tf and /tf_static, once for all nodes of a process.
+
+A listener of tf2_ros has two subscriptions and a buffer per node. Here the manager node subscribes
+while a node of the process that looks up frames is active.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.subscription import Subscription
+from rclpy.time import Time
+
+from composer.model import TF_STATIC_TOPIC, TF_TOPIC, Port, PortKind, Transforms
+from composer.runtime.clock.sim_time import SimTimeSource
+from composer.runtime.executors.loop import Loop, Taken
+from composer.runtime.intra_process.router import LocalRouter
+from composer.runtime.metrics.repeat_limit import RepeatLimit
+from composer.runtime.ros.messages import interface_class
+from composer.runtime.ros.qos_profiles import rclpy_profile
+from composer.runtime.transforms.buffer import TransformBuffer
+from composer.runtime.transforms.messages import nanoseconds, transform_of
+
+_WARNING_PERIOD_S = 10.0
+
+
+class TransformListeners:
+    """The listeners of a process, one for each pair of topics; most systems have one pair."""
+
+    def __init__(
+        self, node: Node, loop: Loop, sim_time: SimTimeSource, warn: Callable[[str], None]
+    ) -> None:
+        """Subscribe with ``node``, on ``loop``; call ``warn`` for transforms that are not valid."""
+        self._node = node
+        self._loop = loop
+        self._sim_time = sim_time
+        self._warn = warn
+        self._creating = threading.Lock()
+        self._listeners: dict[tuple[str, str], TransformListener] = {}
+
+    def listener(self, transforms: Transforms, router: LocalRouter) -> TransformListener | None:
+        """Return the listener for the frames of a node; None if it looks up none. Thread-safe."""
+        static = transforms.port(PortKind.SUBSCRIPTION, TF_STATIC_TOPIC)
+        dynamic = transforms.port(PortKind.SUBSCRIPTION, TF_TOPIC)
+        if static is None or dynamic is None:
+            return None
+        key = (static.full_name, dynamic.full_name)
+        with self._creating:
+            if key not in self._listeners:
+                topics = _Topics(self._node, self._loop, router, static, dynamic)
+                self._listeners[key] = TransformListener(topics, self._sim_time, self._warn)
+            return self._listeners[key]
+
+
+class TransformListener:
+    """Fills a buffer while it has users; the last one that leaves empties it."""
+
+    def __init__(
+        self, topics: _Topics, sim_time: SimTimeSource, warn: Callable[[str], None]
+    ) -> None:
+        self._topics = topics
+        self._sim_time = sim_time
+        self._warn = warn
+        self._repeats = RepeatLimit(_WARNING_PERIOD_S)
+        self._changing = threading.Lock()
+        self._users: dict[object, bool] = {}  # with simulated time, or not
+        self._now_ns = 0  # of /clock
+        self.buffer = TransformBuffer()
+
+    def join(self, user: object, *, is_simulated: bool) -> TransformBuffer:
+        """Return the buffer, which is filled from now on. From any thread."""
+        with self._changing:
+            if not self._users:
+                self.buffer = buffer = TransformBuffer()
+                self._topics.open(_Receiver(self, buffer, static=True), _Receiver(self, buffer))
+            self._users[user] = is_simulated
+            self._follow_clock()
+            return self.buffer
+
+    def leave(self, user: object) -> None:
+        """Stop using the buffer. From any thread."""
+        with self._changing:
+            if self._users.pop(user, None) is None:
+                return
+            self._follow_clock()
+            if not self._users:
+                self._topics.close()
+
+    def ignore(self, what: str, problem: str) -> None:
+        """Log that a transform is ignored, from time to time."""
+        admission = self._repeats.admit(what)
+        if admission is not None:
+            self._warn(f"ignored the transform {what}: {problem}{admission.suffix}")
+
+    def _follow_clock(self) -> None:
+        if any(self._users.values()):
+            self._sim_time.join(self._on_time)
+        else:
+            self._sim_time.leave(self._on_time)
+
+    def _on_time(self, now: Time) -> None:
+        """Forget what is known when the simulated time goes back, as tf2 does."""
+        if now.nanoseconds < self._now_ns:
+            self.buffer.clear()
+        self._now_ns = now.nanoseconds
+
+
+class _Receiver:
+    """Puts the transforms of one topic into a buffer, on the thread of the publisher or of DDS."""
+
+    def __init__(
+        self, listener: TransformListener, buffer: TransformBuffer, *, static: bool = False
+    ) -> None:
+        self._listener = listener
+        self._buffer = buffer
+        self._static = static
+        self._is_open = True
+
+    def put(self, message: Any) -> None:
+        """Add the transforms of a message."""
+        if not self._is_open:
+            return
+        for item in message.transforms:
+            header = item.header
+            problem = self._buffer.insert(
+                header.frame_id,
+                item.child_frame_id,
+                nanoseconds(header.stamp),
+                transform_of(item.transform),
+                static=self._static,
+            )
+            if problem is not None:
+                self._listener.ignore(
+                    f"from '{item.child_frame_id}' to '{header.frame_id}'", problem
+                )
+        self._buffer.notify()
+
+    def receive(self, taken: Taken) -> None:
+        """Add the transforms of a message that came by DDS."""
+        self.put(taken[0])
+
+    def close(self) -> None:
+        """Receive nothing more."""
+        self._is_open = False
+
+
+@dataclass(slots=True)
+class _Topics:
+    """The subscriptions of a listener, which exist while it is open."""
+
+    node: Node
+    loop: Loop
+    router: LocalRouter
+    static: Port
+    dynamic: Port
+    _wanted: tuple[_Receiver, _Receiver] | None = None
+    _open: tuple[_Receiver, _Receiver] | None = None
+    _ends: list[Callable[[], None]] = field(default_factory=list)
+
+    def open(self, static: _Receiver, dynamic: _Receiver) -> None:
+        """Receive from now on. From any thread."""
+        self._wanted = (static, dynamic)
+        self.loop.call_soon(self._update)
+
+    def close(self) -> None:
+        """Receive nothing more, at once. From any thread."""
+        for receiver in self._wanted or ():
+            receiver.close()
+        self._wanted = None
+        self.loop.call_soon(self._update)
+
+    def _update(self) -> None:
+        wanted = self._wanted
+        if self._open is wanted:
+            return
+        while self._ends:
+            self._ends.pop()()
+        self._open = wanted
+        if wanted is not None:
+            for port, receiver in zip((self.static, self.dynamic), wanted, strict=True):
+                self._ends.append(self._subscribe(port, receiver))
+
+    def _subscribe(self, port: Port, receiver: _Receiver) -> Callable[[], None]:
+        subscription: Subscription = self.node.create_subscription(
+            interface_class(port.interface.value),
+            port.full_name,
+            receiver.receive,
+            rclpy_profile(port.qos.profile),
+        )
+        remove = self.router.add_subscription(port, subscription, receiver)
+        self.loop.add_subscription(subscription, receiver.receive)
+
+        def end() -> None:
+            remove()
+            self.loop.remove(subscription)
+            self.node.destroy_subscription(subscription)
+
+        return end

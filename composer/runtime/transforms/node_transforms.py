@@ -1,0 +1,151 @@
+"""A behavior's ``transforms``; see :class:`composer.behavior.Transforms`."""
+
+from __future__ import annotations
+
+from time import monotonic
+from typing import Any
+
+from builtin_interfaces.msg import Time
+
+from composer.behavior import CallCancelled, TransformError, TransformLookupError
+from composer.model import Transforms
+from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.executors.futures import Future
+from composer.runtime.executors.stacks import interruptible
+from composer.runtime.transforms.broadcaster import Broadcaster
+from composer.runtime.transforms.buffer import Found, TransformBuffer
+from composer.runtime.transforms.listener import TransformListeners
+from composer.runtime.transforms.messages import (
+    moved,
+    nanoseconds,
+    stamped,
+    transform_message,
+)
+
+
+class NodeTransforms:
+    """The frames of a configured node: one of its ports, as far as the lifecycle is concerned.
+
+    It uses the buffer of the process from the start of *activating* until the node leaves *active*.
+    """
+
+    def __init__(
+        self, context: NodeContext, transforms: Transforms, listeners: TransformListeners
+    ) -> None:
+        """Create the publishers. Raises MessageError if tf2_msgs is not installed."""
+        self._context = context
+        self._listener = listeners.listener(transforms, context.router)
+        self._buffer: TransformBuffer | None = None
+        self.broadcaster = Broadcaster(context, transforms)
+
+    def begin(self) -> None:
+        """Broadcast what is static, and listen: the node is being activated."""
+        self.broadcaster.begin()
+        self._listen()
+
+    def activate(self) -> None:
+        """Begin; listen again if a transition from *active* was refused."""
+        self._listen()
+        for publisher in self.broadcaster.publishers:
+            publisher.activate()
+
+    def deactivate(self) -> None:
+        """Stop listening."""
+        if self._listener is not None:
+            self._buffer = None
+            self._listener.leave(self)
+        for publisher in self.broadcaster.publishers:
+            publisher.deactivate()
+
+    def destroy(self) -> None:
+        """Destroy the publishers."""
+        self.deactivate()
+        for publisher in self.broadcaster.publishers:
+            publisher.destroy()
+
+    def _listen(self) -> None:
+        if self._listener is not None and self._buffer is None:
+            is_simulated = self._context.clock.is_simulated
+            self._buffer = self._listener.join(self, is_simulated=is_simulated)
+
+    # --- the API of behaviors
+
+    @interruptible
+    def lookup(self, target: str, source: str, *, stamp: Any = None) -> Any:
+        """Return the transform from ``source`` to ``target``, a TransformStamped."""
+        return _message(target, source, self._lookup(target, source, _time(stamp)))
+
+    @interruptible
+    def can_lookup(self, target: str, source: str, *, stamp: Any = None) -> bool:
+        """Return whether ``lookup`` would return a transform now."""
+        buffer = self._buffer
+        if buffer is None:
+            return False
+        return not isinstance(buffer.find(target, source, _time(stamp)), TransformError)
+
+    def wait(
+        self, target: str, source: str, *, stamp: Any = None, timeout_ms: float = 5000.0
+    ) -> Future[Any]:
+        """Wait for a transform up to the timeout, and return it."""
+        future: Future[Any] = Future()
+        buffer, stamp_ns = self._buffer, _time(stamp)
+        if buffer is None:
+            future.set_exception(self._refusal())
+            return future
+
+        def look_up() -> None:
+            found = buffer.find(target, source, stamp_ns)
+            if not isinstance(found, TransformError):
+                future.set_result(_message(target, source, found))
+
+        def missing() -> BaseException:
+            found = buffer.find(target, source, stamp_ns)
+            if not isinstance(found, TransformError):  # it has arrived at the last moment
+                return TransformError("the transform was not available in time")
+            error = buffer.explained(found, target, source)
+            return type(error)(f"{error} (after {timeout_ms:g} ms)")
+
+        buffer.add_waiting(look_up)
+        future.add_done_callback(lambda _: buffer.remove_waiting(look_up))
+        look_up()
+        if not future.done():
+            until_s = monotonic() + timeout_ms / 1000.0
+            self._context.gate.pending.add(future, until_s, missing)
+        return future
+
+    def transform(self, message: Any, target: str) -> Any:
+        """Return a message of geometry_msgs in another frame, at the time of its header."""
+        header = message.header
+        found = self._lookup(target, header.frame_id, _time(header.stamp))
+        return moved(message, target, found.transform)
+
+    def broadcast(self, child: str, transform: Any, *, stamp: Any = None) -> None:
+        """Broadcast the transform from a declared frame to its parent."""
+        self.broadcaster.broadcast(child, transform, stamp)
+
+    def _lookup(self, target: str, source: str, stamp_ns: int | None) -> Found:
+        buffer = self._buffer
+        if buffer is None:
+            raise self._refusal()
+        return buffer.lookup(target, source, stamp_ns)
+
+    def _refusal(self) -> Exception:
+        if self._listener is None:
+            return TransformLookupError("the node has no 'lookup' in its 'transforms'")
+        return CallCancelled(self._context.gate.refusal)
+
+
+def _message(target: str, source: str, found: Found) -> Any:
+    stamp_ns, transform = found
+    stamp = Time(sec=stamp_ns // 1_000_000_000, nanosec=stamp_ns % 1_000_000_000)
+    return stamped(target, source, stamp, transform_message(transform))
+
+
+def _time(stamp: Any) -> int | None:
+    """Return a time in nanoseconds; None for the latest one, which is zero in tf2."""
+    if stamp is None:
+        return None
+    if not isinstance(stamp, Time):
+        kind = type(stamp).__name__
+        raise TypeError(f"stamp must be a builtin_interfaces/msg/Time, not {kind}")
+    return nanoseconds(stamp) or None

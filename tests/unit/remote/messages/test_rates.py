@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import pytest
+
+from composer.remote.messages.rates import BandwidthWindow, DelayWindow, RateWindow
+
+
+def test_rate_statistics() -> None:
+    window = RateWindow(100)
+    for at_s in (10.0, 10.1, 10.2, 10.5):
+        window.add(at_s)
+    rate = window.statistics()
+    assert rate is not None
+    assert rate.average_hz == pytest.approx(3 / 0.5)
+    assert (rate.shortest_s, rate.longest_s) == (pytest.approx(0.1), pytest.approx(0.3))
+    assert rate.deviation_s == pytest.approx(0.0942809)
+    assert rate.window == 3
+
+
+def test_too_few_messages_have_no_statistics() -> None:
+    window = RateWindow(10)
+    assert window.statistics() is None
+    window.add(1.0)
+    assert window.statistics() is None
+    assert BandwidthWindow(10).statistics(5.0) is None
+
+
+def test_a_window_keeps_the_last_messages() -> None:
+    window = RateWindow(2)
+    for at_s in (0.0, 100.0, 100.5, 101.0):
+        window.add(at_s)
+    rate = window.statistics()
+    assert rate is not None
+    assert (rate.average_hz, rate.window) == (2.0, 2)
+
+
+def test_bandwidth_decreases_without_new_messages() -> None:
+    window = BandwidthWindow(10)
+    window.add(0.0, 100)
+    window.add(1.0, 300)
+    found = window.statistics(2.0)
+    assert found is not None
+    assert (found.bytes_per_s, found.mean, found.smallest, found.largest) == (
+        200.0,
+        200.0,
+        100,
+        300,
+    )
+    later = window.statistics(4.0)
+    assert later is not None
+    assert later.bytes_per_s == 100.0
+
+
+def test_delay_statistics() -> None:
+    delays = DelayWindow(2)
+    assert delays.statistics() is None
+    for delay_s in (9.0, 0.1, 0.3):
+        delays.add(delay_s)
+    found = delays.statistics()
+    assert found is not None
+    assert (found.shortest_s, found.longest_s, found.window) == (0.1, 0.3, 2)
+    assert found.average_s == pytest.approx(0.2)
+    assert found.deviation_s == pytest.approx(0.1)
