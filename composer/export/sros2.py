@@ -90,7 +90,7 @@ def enclaves(system: System) -> tuple[Enclave, ...]:
     manager = _manager(namespace, system)
     for part in parts:
         member = join(part.namespace, f"{part.name.value}/{_MANAGER}")
-        manager.allow(PortKind.CLIENT, f"{member}/change_state")
+        manager.allow(PortKind.CLIENT, f"{member}/change_states")
         manager.allow(PortKind.SUBSCRIPTION, f"{member}/state")
     own = [node for node in system.nodes if node.process is None]
     found = [Enclave(namespace, (manager, *_profiles(own)))]
@@ -133,9 +133,12 @@ def _manager(namespace: str, system: System) -> Profile:
     profile.allow(PortKind.PUBLISHER, "/parameter_events", "/rosout", SELF_TEST_TOPICS)
     profile.allow(PortKind.SUBSCRIPTION, "/clock", SELF_TEST_TOPICS)
     profile.allow(PortKind.SERVICE, *_COMMANDS, *_PARAMETER_SERVICES, "get_type_description")
-    profile.allow(PortKind.SERVICE, "change_state", "_instance_*")
+    profile.allow(PortKind.SERVICE, "change_state", "change_states", "_instance_*")
     profile.allow(PortKind.CLIENT, "_instance_*")
     for node in system.nodes:
+        for port in node.transforms.ports if node.transforms is not None else ():
+            if port.kind is PortKind.SUBSCRIPTION:  # one for all nodes
+                profile.allow(port.kind, port.full_name)
         if _is_driven(node):
             name = node.full_name
             profile.allow(PortKind.CLIENT, f"{name}/change_state", f"{name}/get_state")
@@ -157,7 +160,7 @@ def _profiles(nodes: Iterable[Node]) -> Iterator[Profile]:
 
 def _profile(node: Node) -> Profile:
     profile = Profile(node.ros_name.value, node.namespace.value)
-    for port in node.ports:
+    for port in node.visible_ports:
         profile.allow(port.kind, port.full_name)
     if node.implementation is ImplementationKind.EXECUTABLE:
         _allow_usual(profile, node)

@@ -1,78 +1,241 @@
-"""A unit with which systemd runs a system."""
+"""Units with which systemd runs a system: a service for each process, and a target for several."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path, PurePosixPath
 
-from composer.model import System
-
-#: ROS needs these; the others of a sourced workspace follow from its setup file.
-ENVIRONMENT = (
-    "AMENT_PREFIX_PATH",
-    "LD_LIBRARY_PATH",
-    "PYTHONPATH",
-    "RMW_IMPLEMENTATION",
-    "ROS_AUTOMATIC_DISCOVERY_RANGE",
-    "ROS_DISTRO",
-    "ROS_DOMAIN_ID",
-    "ROS_STATIC_PEERS",
+from composer.export.deployment import (
+    STOP_WITHIN_S,
+    Service,
+    is_restarted,
+    ros_variables,
+    services,
 )
+from composer.fast_dataclass import dataclass
+from composer.model import Host, OnFailure, RestartBudget, System
+
+#: The folders of a sourced workspace.
+_FOLDERS = ("AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "ROS_DISTRO")
 #: The wheels of ROS from PyPI set it when Python starts, and mark that.
 _LIBRARIES, _OF_WHEELS = "LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
-#: Longer than --grace of compose run, by which the process ends in any case.
-_STOP_TIMEOUT_S = 15
+#: Much longer than the second after which a process reports again that it is alive.
+_WATCHDOG_S = 30
+_RESTART_S = 2.0
 
-_UNIT = """\
-# Written by 'compose export systemd' for the system {name}.
-[Unit]
-Description=ROS 2 system {name}{description}
-Wants=network-online.target
+_SERVICE = """\
+# Written by 'compose export systemd' for the system {system}.
+{origin}[Unit]
+Description={description}
+{order}Wants=network-online.target
 After=network-online.target
-
+{limit}
 [Service]
-Type=exec
-ExecStart={command}
-WorkingDirectory={folder}
-{environment}# compose run shuts the system down in order.
+{start}ExecStart={command}
+{place}{environment}{resources}# {compose} ends everything in order.
 KillMode=mixed
 KillSignal=SIGTERM
 TimeoutStopSec={stop_s}
-# Exit code 1: errors in files, or a node failed permanently. 2: a usage error, not retried.
-Restart=on-failure
-RestartSec=2
-RestartPreventExitStatus=2
+{restart}
+[Install]
+WantedBy={target}
+"""
+
+_START_SYSTEM = f"""\
+# READY=1 follows the bring-up, whose transitions have limits of their own.
+Type=notify
+TimeoutStartSec=infinity
+WatchdogSec={_WATCHDOG_S}
+"""
+_START_SERVER = """\
+# READY=1 follows the start of the server.
+Type=notify
+"""
+#: Exit codes of usage errors, of errors in files, and of what is missing on another computer.
+_FINAL, _FINAL_THERE = "2 78", "2 71 72 73 78"
+
+_TARGET = """\
+# Written by 'compose export systemd' for the system {system}.
+[Unit]
+Description={description}
+Wants={wants}
 
 [Install]
 WantedBy={target}
 """
 
 
-def unit(
-    system: System, path: Path, python: Sequence[str], environment: Mapping[str, str], *, user: bool
-) -> str:
-    """Return the unit of the system in ``path``.
+@dataclass(frozen=True, slots=True)
+class Installation:
+    """How services are started.
 
-    ``python`` is the command that starts compose. Of ``environment``, the variables that ROS reads
-    become part of the unit. With ``user``, it is for the service manager of a user.
+    ``python`` is the command that starts compose here. Of ``environment``, the variables that ROS
+    reads become part of the units. ``remote`` returns the command that runs a service on
+    another computer, in its workspace: the name of a shell and its arguments.
     """
-    absolute = path.resolve()
-    words = [*python, "run", str(absolute)]
-    set_variables = [
-        f"Environment={_quoted(f'{name}={environment[name]}')}\n"
-        for name in ENVIRONMENT
-        if environment.get(name) and not (name == _LIBRARIES and _OF_WHEELS in environment)
-    ]
-    description = system.description or ""
-    return _UNIT.format(
-        name=system.name.value,
-        description=f": {_line(description)}" if description else "",
-        command=" ".join(_quoted(word.replace("$", "$$")) for word in words),
-        folder=_escaped(str(absolute.parent)),
-        environment="".join(set_variables),
-        stop_s=_STOP_TIMEOUT_S,
-        target="default.target" if user else "multi-user.target",
+
+    python: Sequence[str]
+    environment: Mapping[str, str]
+    remote: Callable[[Host, Service], Sequence[str]]
+
+
+def units(
+    system: System, path: Path, installation: Installation, *, user: bool
+) -> dict[PurePosixPath, str]:
+    """Return the units of the system in ``path``, by their file names.
+
+    Without other processes, that is one service. Services of another computer are in a folder with
+    its name.
+
+    Units of another computer have its paths, if its workspace is known. With ``user``, units are
+    for the service manager of a user.
+    """
+    name = system.name.value
+    listed = services(system)
+    boot = "default.target" if user else "multi-user.target"
+    target = f"{listed[0].label}.target" if len(listed) > 1 else None
+    here = [service for service in listed if service.host is None]
+    found: dict[PurePosixPath, str] = {}
+    if target is not None:
+        found[PurePosixPath(target)] = _TARGET.format(
+            system=name,
+            description=_description(system),
+            wants=" ".join(_unit(service) for service in here),
+            target=boot,
+        )
+    for service in listed:
+        order = f"PartOf={target}\n" if target is not None and service.host is None else ""
+        order += _order(service, [item for item in listed if item.host == service.host])
+        there = _computer(system, service)
+        if there is None:
+            command, place = _here(service, path.resolve(), installation)
+        else:
+            command, place = _there(service, there, installation, user=user)
+        found[PurePosixPath(service.host or "", _unit(service))] = _SERVICE.format(
+            system=name,
+            origin="" if len(listed) == 1 else f"# {service.origin}\n",
+            description=_description(system, service),
+            order=order,
+            limit="" if service.is_server else _start_limit(system),
+            command=" ".join(_quoted(word.replace("$", "$$")) for word in command),
+            start=_START_SERVER if service.is_server else _START_SYSTEM,
+            compose="compose discovery-server" if service.is_server else "compose run",
+            place=place,
+            environment=_environment(service.environment),
+            resources=_resources(service),
+            stop_s=STOP_WITHIN_S,
+            restart=_restart(system, service, _FINAL if there is None else _FINAL_THERE),
+            target=boot if target is None or service.host is not None else target,
+        )
+    return found
+
+
+def _here(service: Service, path: Path, installation: Installation) -> tuple[Sequence[str], str]:
+    """Return the command of a service, and the lines about its folder and environment."""
+    environment = installation.environment
+    variables = {**_workspace(environment), **ros_variables(environment)}
+    folder = f"WorkingDirectory={_escaped(str(path.parent))}\n"
+    command = [*installation.python, *service.command(str(path))]
+    return command, folder + _environment(dict(sorted(variables.items())))
+
+
+def _there(
+    service: Service, host: Host, installation: Installation, *, user: bool
+) -> tuple[Sequence[str], str]:
+    """Return the same for another computer, whose shell finds the workspace and Python."""
+    shell, *words = installation.remote(host, service)
+    login = "" if user or host.user is None else f"User={_escaped(host.user.value)}\n"
+    return [f"/bin/{shell}", *words], login
+
+
+def _unit(service: Service) -> str:
+    return f"{service.label}.service"
+
+
+def _order(service: Service, here: Sequence[Service]) -> str:
+    """Return what starts before a service, and stops after it."""
+    servers = [_unit(item) for item in here if item.is_server]
+    if service.is_server or len(here) == 1:
+        return ""
+    before = [_unit(item) for item in here if service.is_coordinator and item is not service]
+    order = f"Wants={' '.join(servers)}\n" if servers else ""
+    after = before or servers
+    return order + (f"After={' '.join(after)}\n" if after else "")
+
+
+def _computer(system: System, service: Service) -> Host | None:
+    """Return the other computer of a service, if its workspace is known."""
+    for host in system.hosts:
+        if host.name.value == service.host and host.workspace is not None:
+            return host
+    return None
+
+
+def _description(system: System, service: Service | None = None) -> str:
+    part = ""
+    if service is not None and service.is_server:
+        part = ", discovery server"
+    elif service is not None and service.process is not None:
+        part = f", process {service.process.name}"
+    text = f": {system.description}" if system.description and not part else ""
+    return _escaped(" ".join(f"ROS 2 system {system.name}{part}{text}".split()))
+
+
+def _workspace(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the folders of the workspace that is sourced now."""
+    found = {name: environment[name] for name in _FOLDERS if environment.get(name)}
+    if _OF_WHEELS in environment:
+        found.pop(_LIBRARIES, None)
+    return found
+
+
+def _environment(variables: Mapping[str, str]) -> str:
+    return "".join(
+        f"Environment={_quoted(f'{name}={value}')}\n" for name, value in variables.items()
     )
+
+
+def _resources(service: Service) -> str:
+    lines = []
+    if service.cpus:
+        lines.append(f"CPUAffinity={' '.join(map(str, service.cpus))}")
+    if service.memory_bytes is not None:
+        lines.append(f"MemoryMax={service.memory_bytes}")
+    if service.priority is not None:
+        lines.append(f"LimitRTPRIO={service.priority}")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _budget(system: System) -> RestartBudget | None:
+    """Return the limits of restarts, if the system restarts nodes that fail."""
+    policy = system.supervision.policy
+    return system.supervision.restart if policy is OnFailure.RESTART else None
+
+
+def _start_limit(system: System) -> str:
+    budget = _budget(system)
+    if budget is None:
+        return ""
+    return (
+        "# As the nodes: 'lifecycle.restart' of the system.\n"
+        f"StartLimitIntervalSec={_seconds(budget.window_ms)}\n"
+        f"StartLimitBurst={budget.max_attempts + 1}\n"
+    )
+
+
+def _restart(system: System, service: Service, final: str) -> str:
+    if not is_restarted(system) and not service.is_server:
+        return "# 'on_failure: shutdown' of the system: a failure ends it.\nRestart=no\n"
+    budget = None if service.is_server else _budget(system)
+    wait = f"{_RESTART_S:g}" if budget is None else _seconds(budget.backoff_ms)
+    return (
+        "# Not retried: usage errors (2) and errors in files (78).\n"
+        f"Restart=on-failure\nRestartSec={wait}\nRestartPreventExitStatus={final}\n"
+    )
+
+
+def _seconds(value_ms: float) -> str:
+    return f"{max(1, round(value_ms)) / 1000:g}"
 
 
 def _quoted(word: str) -> str:
@@ -86,7 +249,3 @@ def _quoted(word: str) -> str:
 
 def _escaped(text: str) -> str:
     return text.replace("%", "%%")
-
-
-def _line(text: str) -> str:
-    return _escaped(" ".join(text.split()))

@@ -26,9 +26,14 @@ def test_a_launch_file_names_the_system_relative_to_itself(folder: Path) -> None
     text = (folder / "launch" / "robot.launch.py").read_text()
     ast.parse(text)
     assert "SYSTEM = (Path(__file__).parent / '../systems/robot.yaml').resolve()" in text
-    done = compose("export", "launch", "systems/robot.yaml", "-o", "launch/robot.launch.py")
+    again = ("export", "launch", "systems/robot.yaml", "-o", "launch/robot.launch.py")
+    assert compose(*again).err == "launch/robot.launch.py is up to date\n"
+    (folder / "launch" / "robot.launch.py").write_text("my own")
+    done = compose(*again)
     assert done.code == 1
     assert "exists already" in done.err
+    assert compose(*again, "--force").code == 0
+    assert (folder / "launch" / "robot.launch.py").read_text() == text
 
 
 def test_on_stdout_the_path_is_absolute(folder: Path) -> None:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
+import pytest
+
+from composer.export.dds_permissions import permissions
 from composer.export.sros2 import enclaves, policy
 from composer.loading import load
 from composer.model import PortKind, System
+from tests.cli.compose import compose
 
 SYSTEM = """\
 system: robot
@@ -79,7 +84,7 @@ def test_each_process_has_an_enclave(tmp_path: Path) -> None:
         "/fleet/ear",
     ]
     manager = first.profiles[0]
-    assert "/fleet/robot/hearing/manager/change_state" in manager.names[PortKind.CLIENT]
+    assert "/fleet/robot/hearing/manager/change_states" in manager.names[PortKind.CLIENT]
     assert "/fleet/robot/hearing/manager/state" in manager.names[PortKind.SUBSCRIPTION]
 
 
@@ -95,3 +100,98 @@ def test_the_policy_has_the_format_of_sros2(tmp_path: Path) -> None:
         ("topics", {"publish": "ALLOW"}, ["/fleet/chatter"]),
         ("services", {"request": "ALLOW"}, ["/fleet/reset"]),
     ]
+
+
+def test_the_manager_listens_to_transforms_for_all_nodes(tmp_path: Path) -> None:
+    text = """\
+system: robot
+nodes:
+  mounts:
+    transforms: {static: {laser: {parent: base, translation_m: {x: 1}}}, lookup: [base, laser]}
+"""
+    (enclave,) = enclaves(resolved(tmp_path, text))
+    manager, mounts = (profile.names for profile in enclave.profiles)
+    assert {"/tf", "/tf_static"} <= manager[PortKind.SUBSCRIPTION]
+    assert "/tf_static" in mounts[PortKind.PUBLISHER]
+    assert "/tf" not in mounts[PortKind.PUBLISHER]
+    assert PortKind.SUBSCRIPTION not in mounts
+
+
+def schema(name: str) -> Any:
+    """Return a schema of SROS2; see THIRD_PARTY.md."""
+    xmlschema = pytest.importorskip("xmlschema")
+    return xmlschema.XMLSchema(Path(__file__).parent / "sros2" / name, allow="local")
+
+
+PROCESSES = "processes: {hearing: {nodes: [listener]}, acting: {nodes: [arm]}}\n"
+ARM = """\
+  arm:
+    name: arm_1
+    action_servers: {move: {type: example_interfaces/action/Fibonacci}}
+    action_clients: {look: {type: example_interfaces/action/Fibonacci, external: true}}
+"""
+
+
+def test_the_policy_and_the_permissions_fit_the_schemas_of_sros2(tmp_path: Path) -> None:
+    system = resolved(tmp_path, SYSTEM + ARM + PROCESSES)
+    schema("policy.xsd").validate(policy(system))
+    found = permissions(system, 7)
+    assert list(found) == ["/fleet/robot", "/fleet/robot/hearing", "/fleet/robot/acting"]
+    for text in found.values():
+        schema("permissions.xsd").validate(text)
+
+
+def test_permissions_name_the_topics_of_dds(tmp_path: Path) -> None:
+    system = resolved(tmp_path, SYSTEM + ARM + PROCESSES)
+    allowed = {}
+    for path, text in permissions(system, 7).items():
+        (grant,) = ElementTree.fromstring(text).iter("grant")
+        assert grant.findtext("subject_name") == f"CN={path}"
+        assert grant.findtext("allow_rule/domains/id") == "7"
+        assert grant.findtext("default") == "DENY"
+        for direction in ("publish", "subscribe"):
+            topics = grant.iterfind(f"allow_rule/{direction}/topics/topic")
+            allowed[path, direction] = [topic.text for topic in topics]
+            assert allowed[path, direction] == sorted(allowed[path, direction], key=str)
+    published, subscribed = (
+        set(allowed["/fleet/robot/hearing", direction]) for direction in ("publish", "subscribe")
+    )
+    assert {"ros_discovery_info", "rt/rosout", "rr/fleet/ear/muteReply"} < published
+    assert {"ros_discovery_info", "rt/fleet/chatter", "rq/fleet/ear/muteRequest"} < subscribed
+    assert "rt/fleet/chatter" not in published
+    assert "rt/fleet/chatter" in allowed["/fleet/robot", "publish"]
+    assert "rq/fleet/resetRequest" in allowed["/fleet/robot", "publish"]
+    of_arm = [item for item in allowed["/fleet/robot/acting", "publish"] if "_action" in item]
+    assert of_arm == [
+        "rq/fleet/look/_action/cancel_goalRequest",
+        "rq/fleet/look/_action/get_resultRequest",
+        "rq/fleet/look/_action/send_goalRequest",
+        "rr/fleet/move/_action/cancel_goalReply",
+        "rr/fleet/move/_action/get_resultReply",
+        "rr/fleet/move/_action/send_goalReply",
+        "rt/fleet/move/_action/feedback",
+        "rt/fleet/move/_action/status",
+    ]
+
+
+def test_each_process_gets_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("ROS_DOMAIN_ID", "7")
+    processes = "processes: {hearing: {nodes: [listener]}}\n"
+    resolved(tmp_path, SYSTEM + processes)
+    done = compose("export", "sros2", "robot.yaml", "--permissions")
+    assert done.code == 1
+    assert "there are 2 processes: /fleet/robot, /fleet/robot/hearing" in done.err
+    done = compose("export", "sros2", "robot.yaml", "--permissions", "-o", "enclaves")
+    assert done.code == 0, done.err
+    found = sorted(path.relative_to(tmp_path) for path in tmp_path.rglob("permissions.xml"))
+    assert [str(path.parent) for path in found] == [
+        "enclaves/fleet/robot/hearing",
+        "enclaves/fleet/robot",
+    ]
+    monkeypatch.setenv("ROS_DOMAIN_ID", "-1")
+    done = compose("export", "sros2", "robot.yaml", "--permissions", "-o", "enclaves", "--force")
+    assert (done.code, done.err) == (
+        1,
+        "compose: ROS_DOMAIN_ID is '-1', which is not a domain id\n",
+    )

@@ -5,27 +5,46 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import pytest
 
-from composer.export.systemd import unit
+from composer.export.deployment import Service
+from composer.export.systemd import Installation, units
+from composer.hosts.remote_command import python_words
 from composer.loading import load
-from composer.model import System
+from composer.model import Host, System
+from tests.cli.compose import compose
 
 PYTHON = ("/opt/my robot/bin/python", "-P", "-m", "composer")
+NODES = "nodes: {a: {on_activate: {log: a}}, b: {on_activate: {log: b}}, d: {log_level: warn}}\n"
+PROCESSES = """\
+processes:
+  b_1: {nodes: [b], cpus: [0, 2], priority: 50, memory_mb: 500, environment: {PRICE: "5 % of $x"}}
+  c: {host: jetson, nodes: [d]}
+hosts: {jetson: {}}
+"""
 
 
-@pytest.fixture
-def system(tmp_path: Path) -> tuple[System, Path]:
-    path = tmp_path / "my robot.yaml"
-    path.write_text("system: robot\ndescription: 100 %\nnodes: {a: {on_activate: {log: hello}}}\n")
+def system_of(folder: Path, text: str = "") -> tuple[System, Path]:
+    path = folder / "my robot.yaml"
+    path.write_text(f"system: robot\ndescription: 100 %\n{NODES}{text}")
     found = load(path).system
     assert found is not None
     return found, path
 
 
-def test_a_unit_has_the_command_and_the_variables_of_ros(system: tuple[System, Path]) -> None:
+def remote(host: Host, service: Service) -> list[str]:
+    return python_words(host, ("-m", "composer", *service.command("robot.yaml")), {})
+
+
+def unit(system: tuple[System, Path], environment: dict[str, str], *, user: bool = False) -> str:
+    found = units(*system, Installation(PYTHON, environment, remote), user=user)
+    assert list(found) == [PurePosixPath("robot.service")]
+    return found[PurePosixPath("robot.service")]
+
+
+def test_a_unit_has_the_command_and_the_variables_of_ros(tmp_path: Path) -> None:
     environment = {
         "ROS_DOMAIN_ID": "7",
         "PYTHONPATH": '/a "b" $HOME',
@@ -33,7 +52,8 @@ def test_a_unit_has_the_command_and_the_variables_of_ros(system: tuple[System, P
         "LD_LIBRARY_PATH": "/wheels",
         "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1",
     }
-    text = unit(*system, PYTHON, environment, user=False)
+    system = system_of(tmp_path)
+    text = unit(system, environment)
     path = system[1]
     assert f'ExecStart="/opt/my robot/bin/python" -P -m composer run "{path}"\n' in text
     assert f"WorkingDirectory={path.parent}\n" in text
@@ -42,18 +62,102 @@ def test_a_unit_has_the_command_and_the_variables_of_ros(system: tuple[System, P
         'Environment="PYTHONPATH=/a \\"b\\" $HOME"',
         "Environment=ROS_DOMAIN_ID=7",
     ]
+    assert "RestartPreventExitStatus=2 78\n" in text
     assert "WantedBy=multi-user.target" in text
-    assert "WantedBy=default.target" in unit(*system, PYTHON, {}, user=True)
+    assert "WantedBy=default.target" in unit(system, {}, user=True)
+
+
+def test_each_process_has_a_unit_with_its_limits(tmp_path: Path) -> None:
+    found = {str(name): text for name, text in _units(tmp_path, PROCESSES).items()}
+    names = ["robot.target", "robot.service", "robot-b-1.service", "jetson/robot-c.service"]
+    assert list(found) == names
+    assert "Wants=robot.service robot-b-1.service\n" in found["robot.target"]
+    robot, process = found["robot.service"], found["robot-b-1.service"]
+    assert " --await-processes\n" in robot
+    assert "PartOf=robot.target\nAfter=robot-b-1.service\n" in robot
+    for line in (
+        "CPUAffinity=0 2",
+        "MemoryMax=500000000",
+        "LimitRTPRIO=50",
+        'Environment="PRICE=5 %% of $x"',
+        "PartOf=robot.target",
+        "WantedBy=robot.target",
+    ):
+        assert f"{line}\n" in process
+    assert " --process b_1\n" in process
+    assert "WantedBy=multi-user.target\n" in found["jetson/robot-c.service"]
+
+
+def test_a_discovery_server_starts_before_the_processes_of_its_computer(tmp_path: Path) -> None:
+    server = "discovery: {kind: server, address: [10.0.0.1, 10.0.0.5], start: true}\n"
+    text = PROCESSES.replace("jetson: {}", "jetson: {address: 10.0.0.5}") + server
+    found = {str(name): text for name, text in _units(tmp_path, text).items()}
+    name = "robot-discovery.service"
+    assert {name, "jetson/robot-discovery-jetson.service"} < found.keys()
+    assert f'composer discovery-server "{tmp_path / "my robot.yaml"}"\n' in found[name]
+    assert "WatchdogSec" not in found[name]
+    assert "PartOf=robot.target\n" in found[name]
+    assert name in found["robot.target"]
+    assert f"Wants={name}\nAfter=robot-b-1.service {name}\n" in found["robot.service"]
+    assert f"Wants={name}\nAfter={name}\n" in found["robot-b-1.service"]
+    assert "Wants=robot-discovery-jetson.service\n" in found["jetson/robot-c.service"]
+    alone = {str(name) for name in _units(tmp_path, server)}
+    assert alone == {"robot.target", "robot.service", name}
+    assert len(_units(tmp_path, server.replace(", start: true", ""))) == 1
+
+
+def test_units_of_another_computer_use_its_workspace(tmp_path: Path) -> None:
+    host = "jetson: {user: robot, workspace: '~/my %robot', setup: [/opt/ros/setup.bash]}"
+    text = _units(tmp_path, PROCESSES.replace("jetson: {}", host))[
+        PurePosixPath("jetson/robot-c.service")
+    ]
+    (line,) = (line for line in text.splitlines() if line.startswith("ExecStart="))
+    assert line.startswith('ExecStart=/bin/bash -c "cd \\"$$HOME\\"/\'my %%robot\' || exit 71; ')
+    assert line.endswith('-P -m composer run robot.yaml --process c"')
+    assert "User=robot\n" in text
+    assert str(tmp_path) not in text
+    assert "RestartPreventExitStatus=2 71 72 73 78\n" in text
+
+
+def test_restarts_follow_the_policy_of_the_system(tmp_path: Path) -> None:
+    budget = "{max_attempts: 3, window_ms: 30000, backoff_ms: 250}"
+    (text,) = _units(tmp_path, f"lifecycle: {{on_failure: restart, restart: {budget}}}\n").values()
+    assert "StartLimitIntervalSec=30\nStartLimitBurst=4\n" in text
+    assert "Restart=on-failure\nRestartSec=0.25\n" in text
+    (text,) = _units(tmp_path, "lifecycle: {on_failure: shutdown}\n").values()
+    assert "Restart=no\n" in text
+
+
+def _units(folder: Path, text: str) -> dict[PurePosixPath, str]:
+    return units(*system_of(folder, text), Installation(PYTHON, {}, remote), user=False)
+
+
+def test_several_units_need_a_folder(tmp_path: Path) -> None:
+    _, path = system_of(tmp_path, PROCESSES)
+    done = compose("export", "systemd", str(path))
+    assert done.code == 1
+    assert "there are 4 units: robot.target, robot.service" in done.err
+    done = compose("export", "systemd", str(path), "-o", str(tmp_path / "units"))
+    assert done.code == 0, done.err
+    assert (tmp_path / "units" / "jetson" / "robot-c.service").is_file()
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="needs systemd-analyze")
 @pytest.mark.parametrize("user", [False, True])
-def test_systemd_accepts_the_unit(user: bool, system: tuple[System, Path], tmp_path: Path) -> None:
-    file = tmp_path / "robot.service"
+def test_systemd_accepts_the_units(user: bool, tmp_path: Path) -> None:
     environment = {"ROS_DOMAIN_ID": "7", "PYTHONPATH": "/a b:/c%d"}
     python = (sys.executable, "-P", "-m", "composer")
-    file.write_text(unit(*system, python, environment, user=user))
-    command = ["systemd-analyze", "verify", *(["--user"] if user else []), str(file)]
+    installation = Installation(python, environment, remote)
+    text = PROCESSES.replace("jetson: {}", "jetson: {address: 10.0.0.5, workspace: ~/robot}")
+    text += "lifecycle: {on_failure: restart, restart: {backoff_ms: 250}}\n"
+    text += "discovery: {kind: server, address: [10.0.0.1, 10.0.0.5], start: true}\n"
+    system = system_of(tmp_path, text)
+    files = []
+    for name, text in units(*system, installation, user=user).items():
+        files.append(tmp_path / name)
+        files[-1].parent.mkdir(exist_ok=True)
+        files[-1].write_text(text)
+    command = ["systemd-analyze", "verify", *(["--user"] if user else []), *map(str, files)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
-    about = [line for line in done.stderr.splitlines() if "robot.service" in line]
+    about = [line for line in done.stderr.splitlines() if "robot" in line]
     assert about == []

