@@ -9,7 +9,13 @@ from __future__ import annotations
 from composer.drift.compare import compare
 from composer.drift.debounce import Debouncer, DriftChange
 from composer.drift.drift import Drift, DriftKind
-from composer.drift.snapshot import ObservedEndpoint, ObservedNode, Snapshot
+from composer.drift.snapshot import (
+    ObservedEndpoint,
+    ObservedNode,
+    ObservedProcess,
+    Snapshot,
+    parse_endpoint,
+)
 
 __all__ = [
     "Debouncer",
@@ -18,6 +24,8 @@ __all__ = [
     "DriftKind",
     "ObservedEndpoint",
     "ObservedNode",
+    "ObservedProcess",
     "Snapshot",
     "compare",
+    "parse_endpoint",
 ]

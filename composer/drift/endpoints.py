@@ -28,7 +28,7 @@ _Key = tuple[PortKind, str]
 def compare_endpoints(node: Node, observed: ObservedNode) -> Iterator[Drift]:
     """Yield the differences between the ports of a node and its endpoints."""
     declared: dict[_Key, list[Port]] = {}
-    for port in node.ports:
+    for port in node.visible_ports:
         declared.setdefault((port.kind, port.full_name), []).append(port)
     live: dict[_Key, list[ObservedEndpoint]] = {}
     for endpoint in observed.endpoints:

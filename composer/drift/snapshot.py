@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import field
+from collections.abc import Mapping, Sequence
+from dataclasses import field, fields
+from typing import Any
 
 from composer.fast_dataclass import dataclass
 from composer.model import PortKind
-from composer.qos import QosProfile
+from composer.qos import Durability, History, Liveliness, QosProfile, Reliability
 from composer.tree import Plain
 
 #: Services of every node for tools (rcl_interfaces, lifecycle_msgs, type_description).
@@ -33,6 +34,13 @@ _TOOL_TOPICS = {
     "/parameter_events": "rcl_interfaces/msg/ParameterEvent",
 }
 _TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
+_POLICIES = tuple(field.name for field in fields(QosProfile))
+_PARSERS = {
+    "history": History,
+    "reliability": Reliability,
+    "durability": Durability,
+    "liveliness": Liveliness,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +67,21 @@ class ObservedEndpoint:
             return known or (last == "transition_event" and self.type == _TRANSITION_EVENT)
         return False
 
+    def plain(self) -> list[Plain]:
+        """Return the endpoint as plain data, for :func:`parse_endpoint`."""
+        policies = None if self.qos is None else [getattr(self.qos, name) for name in _POLICIES]
+        return [self.kind.value, self.name, self.type, policies]
+
+
+def parse_endpoint(plain: Sequence[Any]) -> ObservedEndpoint:
+    """Return an endpoint from plain data. Raises ValueError or TypeError for any other data."""
+    kind, name, type_name, policies = plain
+    qos = None
+    if policies is not None:
+        values = dict(zip(_POLICIES, policies, strict=True))
+        qos = QosProfile(**values | {key: make(values[key]) for key, make in _PARSERS.items()})
+    return ObservedEndpoint(PortKind(kind), str(name), str(type_name), qos)
+
 
 @dataclass(frozen=True, slots=True)
 class ObservedNode:
@@ -82,10 +105,27 @@ class ObservedNode:
 
 
 @dataclass(frozen=True, slots=True)
+class ObservedProcess:
+    """A process of a running system, with the full names of its nodes.
+
+    ``name`` is the namespace of its manager. ``host`` and ``pid`` are empty if it does not report.
+    """
+
+    name: str
+    host: str
+    pid: str
+    nodes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Snapshot:
-    """The nodes of the graph. Endpoints for tools are left out."""
+    """The nodes of the graph. Endpoints for tools are left out.
+
+    ``processes`` are those of running systems, if they were asked for.
+    """
 
     nodes: tuple[ObservedNode, ...]
+    processes: tuple[ObservedProcess, ...] = ()
 
     def node(self, full_name: str) -> ObservedNode | None:
         """Return the node with that name, or None."""

@@ -15,7 +15,7 @@ from composer.graph.diagram import Graph
 from composer.graph.scenes import declared, live
 from composer.graph.scenes.diagnostics import DiagnosticIndex
 from composer.graph.scenes.scene import Scene
-from composer.graph.views import connections, deployment, lifecycle, nodes, states
+from composer.graph.views import connections, deployment, frames, lifecycle, nodes, states
 from composer.model import System
 
 __all__ = ["View", "build_graph", "live_scene_of", "scene_of"]
@@ -26,6 +26,7 @@ _VIEWS: dict[View, Callable[[Scene], Graph]] = {
     View.LIFECYCLE: lifecycle.build,
     View.DEPLOYMENT: deployment.build,
     View.STATES: states.build,
+    View.FRAMES: frames.build,
 }
 
 

@@ -24,6 +24,7 @@ class VertexKind(StrEnum):
     ACTION = "action"
     PORT = "port"
     STATE = "state"
+    FRAME = "coordinate_frame"
 
 
 class EdgeKind(StrEnum):
@@ -35,6 +36,7 @@ class EdgeKind(StrEnum):
     DEPENDENCY = "dependency"
     IMPLIED = "implied"  # a dependency that is not declared
     TRANSITION = "transition"
+    TRANSFORM = "transform"  # from a parent frame to its child
 
 
 class Direction(StrEnum):

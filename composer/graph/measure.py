@@ -19,6 +19,8 @@ ROW_INDENT = 10.0
 HEXAGON_SLANT = 12.0
 _PADDING = Size(14.0, 8.0)
 _ROW_GAP = 16.0
+#: Shapes whose ends are not straight.
+_SLANTED = (VertexKind.SERVICE, VertexKind.TOPIC, VertexKind.FRAME)
 
 
 def sizes(graph: Graph) -> Sizes:
@@ -61,7 +63,7 @@ def _blocks(graph: Graph) -> Iterator[tuple[str, tuple[Cluster, list[Vertex]]]]:
 def _vertex_size(vertex: Vertex) -> Size:
     first, *others = vertex.lines
     width = max([text_width(first, FONT_SIZE), *(text_width(line, SMALL) for line in others)])
-    slant = HEXAGON_SLANT if vertex.kind in (VertexKind.SERVICE, VertexKind.TOPIC) else 0.0
+    slant = HEXAGON_SLANT if vertex.kind in _SLANTED else 0.0
     return Size(
         round(width + 2 * (_PADDING.width + slant / 2)),
         len(vertex.lines) * LINE_HEIGHT + 2 * _PADDING.height,

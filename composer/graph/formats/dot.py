@@ -16,6 +16,7 @@ _VERTICES = {
     ),
     VertexKind.PORT: 'shape=box, style="filled,rounded", fillcolor="#f8fafc", color="#64748b"',
     VertexKind.STATE: 'shape=box, style="filled,rounded", fillcolor="#e2e8f0", color="#475569"',
+    VertexKind.FRAME: 'shape=ellipse, style=filled, fillcolor="#fef9c3", color="#a16207"',
 }
 
 _EDGES = {
@@ -25,6 +26,7 @@ _EDGES = {
     EdgeKind.DEPENDENCY: 'color="#475569"',
     EdgeKind.IMPLIED: 'color="#475569", style=dashed',
     EdgeKind.TRANSITION: 'color="#475569"',
+    EdgeKind.TRANSFORM: 'color="#a16207"',
 }
 
 _WRONG = 'color="#dc2626", penwidth=3'

@@ -19,6 +19,7 @@ _SHAPES = {
     VertexKind.ACTION: ("[[", "]]"),
     VertexKind.PORT: ("(", ")"),
     VertexKind.STATE: ("(", ")"),
+    VertexKind.FRAME: ("([", "])"),
 }
 
 _ARROWS = {
@@ -28,6 +29,7 @@ _ARROWS = {
     EdgeKind.DEPENDENCY: "-->",
     EdgeKind.IMPLIED: "-.->",
     EdgeKind.TRANSITION: "-->",
+    EdgeKind.TRANSFORM: "-->",
 }
 
 _STYLES = (
@@ -37,6 +39,7 @@ _STYLES = (
     "classDef action fill:#f3e8ff,stroke:#7e22ce,color:#3b0764",
     "classDef port fill:#f8fafc,stroke:#64748b,color:#0f172a",
     "classDef state fill:#e2e8f0,stroke:#475569,color:#0f172a",
+    "classDef coordinate_frame fill:#fef9c3,stroke:#a16207,color:#422006",
     "classDef wrong stroke:#dc2626,stroke-width:3px",
 )
 

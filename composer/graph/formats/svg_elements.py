@@ -58,9 +58,10 @@ def line(path: Path) -> str:
         "C" + " ".join(map(_point, others[index : index + 3])) for index in range(0, len(others), 3)
     )
     wrong = " wrong" if edge.wrong else ""
+    between = " between" if path.is_between_parts else ""
     head = "wrong" if edge.wrong else edge.kind.value
     return (
-        f'<path class="edge {edge.kind}{wrong}" data-edge="{text(edge.key)}"'
+        f'<path class="edge {edge.kind}{wrong}{between}" data-edge="{text(edge.key)}"'
         f' data-kind="{edge.kind}" data-source="{text(edge.source)}"'
         f' data-target="{text(edge.target)}" marker-end="url(#head-{head})"'
         f' d="M{_point(begin)} {curves}">{_tooltip(edge.wrong)}</path>'
@@ -132,7 +133,8 @@ def _data_attributes(key: str, kind: str, namespace: str) -> str:
 def _shape(kind: VertexKind, place: Rectangle, classes: str) -> str:
     if kind is VertexKind.SERVICE:
         return f'<polygon class="{classes}" points="{_hexagon(place)}"/>'
-    radius = place.size.height / 2 if kind is VertexKind.TOPIC else 6.0
+    is_round = kind in (VertexKind.TOPIC, VertexKind.FRAME)
+    radius = place.size.height / 2 if is_round else 6.0
     outline = _rectangle(place, radius, classes)
     if kind is VertexKind.ACTION:
         inner = Rectangle(place.center, Size(place.size.width - 6.0, place.size.height - 6.0))

@@ -22,9 +22,11 @@ _KINDS = {
     "action": (("#f3e8ff", "#7e22ce"), ("#321a4d", "#c084fc")),
     "port": (("#f1f5f9", "#64748b"), ("#1e293b", "#94a3b8")),
     "state": (("#e2e8f0", "#475569"), ("#1e293b", "#94a3b8")),
+    "coordinate_frame": (("#fef9c3", "#a16207"), ("#3a2d06", "#facc15")),
     "dependency": (("none", "#475569"), ("none", "#94a3b8")),
     "implied": (("none", "#475569"), ("none", "#94a3b8")),
     "transition": (("none", "#475569"), ("none", "#94a3b8")),
+    "transform": (("none", "#a16207"), ("none", "#facc15")),
 }
 
 

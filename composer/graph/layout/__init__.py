@@ -10,7 +10,19 @@ box (``units``).
 from __future__ import annotations
 
 from composer.graph.layout.arrange import LayOut, arrange
+from composer.graph.layout.fitting import fit
 from composer.graph.layout.result import Frame, Layout, Path, Point, Rectangle, Size
 from composer.graph.layout.units import Sizes
 
-__all__ = ["Frame", "LayOut", "Layout", "Path", "Point", "Rectangle", "Size", "Sizes", "arrange"]
+__all__ = [
+    "Frame",
+    "LayOut",
+    "Layout",
+    "Path",
+    "Point",
+    "Rectangle",
+    "Size",
+    "Sizes",
+    "arrange",
+    "fit",
+]

@@ -12,7 +12,7 @@ from composer.graph.layout.result import Layout, Point, Size
 
 def components(graph: Graph) -> list[Graph]:
     """Return the components in the order of their first vertices, with their frames."""
-    outermost = _outermost(graph)
+    around = outermost(graph)
     parent = {vertex.key: vertex.key for vertex in graph.vertices}
 
     def root(key: str) -> str:
@@ -23,7 +23,7 @@ def components(graph: Graph) -> list[Graph]:
 
     first_in: dict[str, str] = {}
     for vertex in graph.vertices:
-        frame = outermost.get(vertex.cluster)
+        frame = around.get(vertex.cluster)
         if frame is not None:
             parent[root(vertex.key)] = root(first_in.setdefault(frame, vertex.key))
     for edge in graph.edges:
@@ -31,10 +31,10 @@ def components(graph: Graph) -> list[Graph]:
     members: dict[str, list[str]] = {}
     for vertex in graph.vertices:
         members.setdefault(root(vertex.key), []).append(vertex.key)
-    return [_part(graph, set(keys), outermost) for keys in members.values()]
+    return [_part(graph, set(keys), around) for keys in members.values()]
 
 
-def _outermost(graph: Graph) -> dict[str, str]:
+def outermost(graph: Graph) -> dict[str, str]:
     """Return the outermost cluster around each cluster; parents come before children."""
     found: dict[str, str] = {}
     for cluster in graph.clusters:
@@ -42,14 +42,14 @@ def _outermost(graph: Graph) -> dict[str, str]:
     return found
 
 
-def _part(graph: Graph, keys: set[str], outermost: dict[str, str]) -> Graph:
+def _part(graph: Graph, keys: set[str], around: dict[str, str]) -> Graph:
     vertices = tuple(vertex for vertex in graph.vertices if vertex.key in keys)
-    frames = {outermost[vertex.cluster] for vertex in vertices if vertex.cluster}
+    frames = {around[vertex.cluster] for vertex in vertices if vertex.cluster}
     return replace(
         graph,
         vertices=vertices,
         edges=tuple(edge for edge in graph.edges if edge.source in keys),
-        clusters=tuple(item for item in graph.clusters if outermost[item.key] in frames),
+        clusters=tuple(item for item in graph.clusters if around[item.key] in frames),
     )
 
 

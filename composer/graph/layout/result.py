@@ -68,11 +68,13 @@ class Path:
     """An edge as cubic Bézier curves: a start, then three points for each curve.
 
     It begins at the edge's source. ``label`` is the center of the label, if it has one.
+    ``is_between_parts`` says that the line may cross boxes.
     """
 
     edge: Edge
     points: tuple[Point, ...]
     label: Point | None
+    is_between_parts: bool = False
 
     def moved(self, by: Point) -> Path:
         """Return the path moved by an offset."""

@@ -5,13 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from composer.analysis.frames import kind_of, topic_of
 from composer.drift.compare import states_after_bring_up
 from composer.fast_dataclass import dataclass
 from composer.graph.labels import qos_label
 from composer.graph.scenes.diagnostics import DiagnosticIndex
-from composer.graph.scenes.facts import node_facts, port_facts
+from composer.graph.scenes.facts import node_facts, port_facts, transform_facts
 from composer.graph.scenes.rates import publishing_rates_hz
-from composer.graph.scenes.scene import ExecutorGroup, Scene, SceneNode, ScenePort, Wait
+from composer.graph.scenes.scene import (
+    ExecutorGroup,
+    Scene,
+    SceneNode,
+    ScenePort,
+    SceneTransform,
+    Wait,
+)
 from composer.model import (
     DEFAULT_EXECUTOR,
     Executor,
@@ -58,6 +66,12 @@ def scene_of(systems: Sequence[System], diagnostics: DiagnosticIndex) -> Scene:
         title=" + ".join(system.name.value for system in systems),
         nodes=tuple(nodes.values()),
         waits=tuple(wait for system in systems for wait in _waits(system)),
+        transforms=tuple(
+            transform
+            for system in systems
+            for node in system.nodes
+            for transform in _transforms(node, diagnostics)
+        ),
         executors=tuple(
             dict.fromkeys(group for system in systems for group in _groups(system, several))
         ),
@@ -110,6 +124,19 @@ def _scene_port(port: Port, rate_hz: float | None, diagnostics: DiagnosticIndex)
     )
 
 
+def _transforms(node: Node, diagnostics: DiagnosticIndex) -> Iterator[SceneTransform]:
+    for item in node.transforms.broadcasts if node.transforms is not None else ():
+        yield SceneTransform(
+            topic=topic_of(node, item),
+            parent=item.parent.value,
+            child=item.child.value,
+            kind=kind_of(item),
+            node=node.full_name,
+            details=transform_facts(item),
+            wrong=diagnostics.about_transform(item),
+        )
+
+
 def _waits(system: System) -> Iterator[Wait]:
     names = {node.name.value: node.full_name for node in system.nodes}
     states = {
@@ -126,11 +153,16 @@ def _waits(system: System) -> Iterator[Wait]:
 
 def _groups(system: System, several: bool) -> Iterator[ExecutorGroup]:
     declared = {executor.name.value: executor for executor in system.executors}
+    hosts = {
+        f"{_PROCESS}{process.name}": f" on {process.host}"
+        for process in system.processes
+        if process.host is not None
+    }
     prefix = f"{system.name.value} · " if several else ""
     for name in dict.fromkeys([*declared, *map(_executor_name, system.nodes)]):
         kind = _kind(declared.get(name))
         has_kind = name not in _OUTSIDE.values() and not name.startswith(_PROCESS)
-        label = f"{prefix}{name}: {kind}" if has_kind else f"{prefix}{name}"
+        label = f"{prefix}{name}: {kind}" if has_kind else f"{prefix}{name}{hosts.get(name, '')}"
         yield ExecutorGroup(_executor_key(system, name), label)
 
 

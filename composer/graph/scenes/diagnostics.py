@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from composer.diagnostics import Diagnostic, Severity
-from composer.model import Node, Port
+from composer.model import DynamicTransform, Node, Port, StaticTransform
 from composer.source import Span
 
 _Place = tuple[str, int, int]
@@ -30,6 +30,10 @@ class DiagnosticIndex:
     def about_node(self, node: Node) -> str:
         """Return the diagnostic about a node itself, or an empty text."""
         return self._first(_node_spans(node))
+
+    def about_transform(self, declared: StaticTransform | DynamicTransform) -> str:
+        """Return the diagnostic about the frames of a transform, or an empty text."""
+        return self._first((declared.child.span, declared.parent.span))
 
     def _first(self, spans: Iterable[Span]) -> str:
         return next(

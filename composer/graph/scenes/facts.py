@@ -9,7 +9,14 @@ from composer.graph.diagram import Details
 from composer.graph.labels import qos_facts
 from composer.graph.scenes.rates import timer_rate_hz
 from composer.graph.scenes.scene import SceneChannel, SceneEndpoint
-from composer.model import DEFAULT_EXECUTOR, ChannelKind, Node, Port
+from composer.model import (
+    DEFAULT_EXECUTOR,
+    ChannelKind,
+    DynamicTransform,
+    Node,
+    Port,
+    StaticTransform,
+)
 from composer.tree import Plain
 
 _SOURCES = {
@@ -53,6 +60,19 @@ def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
             for parameter in node.parameters
         },
     }
+    return _non_empty(facts)
+
+
+def transform_facts(declared: StaticTransform | DynamicTransform) -> Details:
+    """Return the details of a transform: its values, or where they come from."""
+    facts: dict[str, Plain] = {}
+    if isinstance(declared, DynamicTransform):
+        facts["from"] = None if declared.source is None else declared.source.value
+    elif declared.values is not None:
+        translation, rotation = declared.values.value
+        facts["translation_m"] = [*translation]
+        facts["quaternion"] = [round(value, 6) for value in rotation]
+    facts["declared_at"] = str(declared.child.span)
     return _non_empty(facts)
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
-from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
+from composer.drift import ObservedEndpoint, ObservedNode, ObservedProcess, Snapshot
 from composer.graph.diagram import Details
 from composer.graph.labels import discovered_qos_label, qos_facts
 from composer.graph.namespaces import parent_of
-from composer.graph.scenes.scene import Scene, SceneNode, ScenePort
+from composer.graph.scenes.scene import ExecutorGroup, Scene, SceneNode, ScenePort
 from composer.model import PortKind
 from composer.tree import Plain
 
@@ -26,14 +26,37 @@ def scene_of(snapshot: Snapshot, rates_hz: Mapping[str, float]) -> Scene:
     )
     # With several publishers, the rate is that of the topic: the senders are unknown.
     alone = {topic: rate for topic, rate in rates_hz.items() if publishers[topic] == 1}
+    groups = {node: _key(process) for process in snapshot.processes for node in process.nodes}
     return Scene(
         title=_TITLE,
-        nodes=tuple(_scene_node(node, alone) for node in snapshot.nodes if not node.is_hidden),
+        nodes=tuple(
+            _scene_node(node, alone, groups.get(node.full_name, ""))
+            for node in snapshot.nodes
+            if not node.is_hidden
+        ),
+        executors=tuple(_groups(snapshot)),
         rates_hz={topic: rate for topic, rate in rates_hz.items() if topic not in alone},
+        is_live=True,
     )
 
 
-def _scene_node(node: ObservedNode, rates_hz: Mapping[str, float]) -> SceneNode:
+def _groups(snapshot: Snapshot) -> Iterator[ExecutorGroup]:
+    """Return hosts and their processes, as far as nodes of them are drawn."""
+    drawn = {node.full_name for node in snapshot.nodes if not node.is_hidden}
+    processes = [process for process in snapshot.processes if drawn.intersection(process.nodes)]
+    for host in sorted({process.host for process in processes if process.host}):
+        yield ExecutorGroup(f"host:{host}", f"host {host}")
+    for process in processes:
+        number = f": process {process.pid}" if process.pid else ": no response"
+        parent = f"host:{process.host}" if process.host else ""
+        yield ExecutorGroup(_key(process), f"{process.name}{number}", parent)
+
+
+def _key(process: ObservedProcess) -> str:
+    return f"process:{process.name}"
+
+
+def _scene_node(node: ObservedNode, rates_hz: Mapping[str, float], group: str) -> SceneNode:
     ports = tuple(_ports(node, rates_hz))
     state = "state unknown" if node.state is None else node.state
     return SceneNode(
@@ -42,6 +65,7 @@ def _scene_node(node: ObservedNode, rates_hz: Mapping[str, float]) -> SceneNode:
         namespace=parent_of(node.full_name),
         note=state,
         state=state,
+        executor=group,
         ports=ports,
         details=_facts(node, ports),
         wrong=f"{node.count} nodes have this name" if node.count > 1 else "",

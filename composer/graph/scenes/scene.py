@@ -72,24 +72,44 @@ class Wait:
 
 @dataclass(frozen=True, slots=True)
 class ExecutorGroup:
-    """An executor and its label."""
+    """What runs nodes, and its label: an executor, a process, or a host around processes.
+
+    ``parent`` is the key of the group around it, which comes before it; empty without one.
+    """
 
     key: str
     label: str
+    parent: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class SceneTransform:
+    """A transform that a node broadcasts, on ``topic`` or the static topic that belongs to it."""
+
+    topic: str
+    parent: str
+    child: str
+    kind: str  # static or dynamic
+    node: str  # full name
+    details: Details = ()
+    wrong: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
     """Everything to draw.
 
-    ``rates_hz`` are the measured rates of topics with several publishers.
+    ``rates_hz`` are the measured rates of topics with several publishers. ``is_live`` is whether
+    the states of nodes are observed.
     """
 
     title: str
     nodes: tuple[SceneNode, ...]
     waits: tuple[Wait, ...] = ()
     executors: tuple[ExecutorGroup, ...] = ()
+    transforms: tuple[SceneTransform, ...] = ()
     rates_hz: Mapping[str, float] = field(default_factory=dict)
+    is_live: bool = False
 
 
 @dataclass(frozen=True, slots=True)

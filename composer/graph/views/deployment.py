@@ -1,4 +1,7 @@
-"""Who runs what: executors as frames around their nodes, and what passes between nodes."""
+"""Who runs what: executors as frames around their nodes, and what passes between nodes.
+
+In a running graph, the frames are processes and hosts, and nodes have their states.
+"""
 
 from __future__ import annotations
 
@@ -14,16 +17,17 @@ _MAX_NAMES = 3
 
 
 def build(scene: Scene) -> Graph:
-    """Return the graph of executors, each with the nodes whose callbacks it calls."""
+    """Return the graph of executors or processes, each with its nodes."""
     return Graph(
         title=scene.title,
         view="deployment",
         direction=Direction.RIGHT,
         vertices=tuple(
-            node_vertex(node, node.full_name, "", node.executor) for node in scene.nodes
+            node_vertex(node, node.full_name, node.note if scene.is_live else "", node.executor)
+            for node in scene.nodes
         ),
         edges=tuple(_edges(scene)),
-        clusters=tuple(Cluster(group.key, group.label) for group in scene.executors),
+        clusters=tuple(Cluster(group.key, group.label, group.parent) for group in scene.executors),
     )
 
 

@@ -219,3 +219,28 @@ def test_ports_of_other_programs_are_compared_only_if_some_are_declared() -> Non
         DriftKind.MISSING_ENDPOINT,
         DriftKind.EXTRA_ENDPOINT,
     ]
+
+
+def test_transforms_are_published_by_their_node_and_received_by_the_manager() -> None:
+    system = system_of("""
+        system: frames
+        nodes:
+          mounts:
+            transforms:
+              static: {laser: {parent: base_link, translation_m: {x: 1}}}
+              lookup: [laser]
+          viewer:
+            external: true
+            publishers: {bill: {type: std_msgs/msg/String, topic: /bill, qos: state}}
+            transforms: {lookup: [laser]}
+    """)
+    message, latched = "tf2_msgs/msg/TFMessage", QosProfile(durability=Durability.TRANSIENT_LOCAL)
+    static = ObservedEndpoint(PortKind.PUBLISHER, "/tf_static", message, latched)
+    listens = ObservedEndpoint(PortKind.SUBSCRIPTION, "/tf_static", message, latched)
+    viewer = ObservedNode("/viewer", (BILL, listens), "")
+    mounts = ObservedNode("/mounts", (static,), "active")
+    missing = compare(system, Snapshot((mounts, viewer)))
+    assert [item.subject for item in missing if "/tf" in item.subject] == ["subscription /tf"]
+    missing = compare(system, Snapshot((replace(mounts, endpoints=()), viewer)))
+    subjects = [item.subject for item in missing if item.node == "/mounts"]
+    assert subjects == ["publisher /tf_static"]

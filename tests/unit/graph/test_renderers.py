@@ -15,7 +15,7 @@ from composer.characters import is_safe
 from composer.graph import View, build_graph, scene_of
 from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
 from composer.graph.engines import Engine
-from composer.graph.formats import dot, mermaid, svg
+from composer.graph.formats import dot, mermaid, svg, theme
 from composer.graph.formats import json as graph_json
 from composer.graph.output import Format, render
 from composer.loading import load
@@ -160,3 +160,8 @@ def test_every_example_system_is_drawn_in_every_format(path: Path, view: View) -
     assert all({edge.source, edge.target} <= keys for edge in graph.edges)
     for form in (Format.JSON, Format.SVG, Format.MERMAID, Format.DOT):
         check(form, render([graph], form, Engine.BUNDLED).decode())
+
+
+def test_no_kind_of_vertex_has_the_name_of_another_color() -> None:
+    assert len(theme.colors(dark=False)) == len(theme._PLAIN) + 2 * len(theme._KINDS)
+    assert {*VertexKind, *EdgeKind} <= {*theme._KINDS}

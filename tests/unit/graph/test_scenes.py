@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
+from composer.drift import ObservedEndpoint, ObservedNode, ObservedProcess, Snapshot
 from composer.graph import View, build_graph, live_scene_of, scene_of
 from composer.graph.diagram import Graph
 from composer.loading import load
@@ -123,6 +124,28 @@ def test_states_of_a_running_graph() -> None:
     lines = {vertex.key: vertex.lines for vertex in graph.vertices}
     assert lines["state:active"] == ("active", "/a/one")
     assert lines["state:state unknown"] == ("state unknown", "/a/two")
+
+
+def test_processes_and_hosts_of_a_running_graph() -> None:
+    snapshot = replace(
+        seen(),
+        processes=(
+            ObservedProcess("/s", "bench", "12", ("/a/one",)),
+            ObservedProcess("/s/far", "", "", ("/a/two",)),
+            ObservedProcess("/s/gone", "attic", "14", ("/gone",)),
+        ),
+    )
+    graph = build_graph(live_scene_of(snapshot, {}), View.DEPLOYMENT)
+    frames = [(frame.key, frame.label, frame.parent) for frame in graph.clusters]
+    assert frames == [
+        ("host:bench", "host bench", ""),
+        ("process:/s", "/s: process 12", "host:bench"),
+        ("process:/s/far", "/s/far: no response", ""),
+    ]
+    drawn = {vertex.key: (vertex.cluster, *vertex.lines) for vertex in graph.vertices}
+    assert drawn["node:/a/one"] == ("process:/s", "/a/one", "active")
+    assert drawn["node:/a/two"] == ("process:/s/far", "/a/two", "state unknown")
+    assert drawn["node:/c"] == ("", "/c")
 
 
 def test_parameters_that_are_not_finite_are_yaml_text(tmp_path: Path) -> None:

@@ -137,6 +137,20 @@ def test_the_deployment_view_groups_nodes_by_executor() -> None:
     }
 
 
+def test_the_deployment_view_names_processes_and_their_hosts() -> None:
+    text = """
+        system: robot
+        hosts: {jetson: {address: 10.0.0.5}}
+        processes: {vision: {nodes: [camera], host: jetson}, control: {nodes: [arm]}}
+        nodes:
+          camera: {on_activate: {log: on}}
+          arm: {on_activate: {log: on}}
+    """
+    graph = drawn(text, View.DEPLOYMENT)
+    labels = [cluster.label for cluster in graph.clusters]
+    assert labels == ["process vision on jetson", "process control"]
+
+
 def test_the_position_of_a_diagnostic_is_marked() -> None:
     text = """
         system: broken

@@ -2,7 +2,8 @@
  * Pans and zooms a picture.
  *
  * The viewBox of the SVG contains the whole picture, so it is complete initially and in print. Pan
- * and zoom are a scale and a shift relative to that, in SVG units.
+ * and zoom are a scale and a shift relative to that, in SVG units. `onscale` is called with the pixels
+ * per unit whenever they may have changed.
  */
 const MIN_SCALE = 0.2;
 const MAX_PIXELS_PER_UNIT = 4;
@@ -13,10 +14,11 @@ const MIN_READABLE_PIXELS_PER_UNIT = 1.1;
 const MIN_DRAG_PIXELS = 4;
 const CLEARANCE_PIXELS = 24;
 
-export function createViewport(picture) {
+export function createViewport(picture, onscale = () => {}) {
   const { svg, world } = picture;
   const size = svg.viewBox.baseVal;
   let scale = 1;
+  let shownScale = null;
   let shift = { x: 0, y: 0 };
 
   function pixelsPerUnit() {
@@ -27,6 +29,12 @@ export function createViewport(picture) {
   function show() {
     world.style.transform = `translate(${shift.x}px, ${shift.y}px) scale(${scale})`;
     svg.dataset.scale = scale.toFixed(3);
+    if (scale !== shownScale) rescale();
+  }
+
+  function rescale() {
+    shownScale = scale;
+    onscale(pixelsPerUnit() * scale);
   }
 
   /** Show the whole picture. */
@@ -91,7 +99,7 @@ export function createViewport(picture) {
 
   listenToWheel(svg, zoomAt, pointAt);
   listenToPointers(svg, { zoomAt, pan, pointAt });
-  return { fit, zoom, center, reveal, uncover };
+  return { fit, zoom, center, reveal, uncover, rescale };
 }
 
 function listenToWheel(svg, zoomAt, pointAt) {
