@@ -55,7 +55,7 @@ def _refuse(page: Page, _: float) -> None:
 
 PICTURES = (
     Picture("dashboard-graph.png", "/graph", '[data-label]:has-text("Hz")', height=440),
-    Picture("dashboard-details.png", f"/graph{_PLANNER}", ".detail .source"),
+    Picture("dashboard-details.png", f"/graph{_PLANNER}", ".detail h3:has-text('Parameters')"),
     Picture("dashboard-nodes.png", f"/nodes{_PLANNER}", ".small", dark=True),
     Picture(
         "dashboard-plot.png",
@@ -70,7 +70,7 @@ PICTURES = (
         height=420,
         prepare=_refuse,
     ),
-    Picture("dashboard-phone.png", "/graph", '[data-label]:has-text("Hz")', width=360, height=720),
+    Picture("dashboard-phone.png", "/graph", "[data-state=active]", width=360, height=720),
 )
 
 

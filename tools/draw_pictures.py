@@ -23,6 +23,7 @@ PICTURES = (
     ("navigation", View.NODES),
     ("fleet", View.NODES),
     ("qos_patterns", View.CONNECTIONS),
+    ("frames", View.FRAMES),
 )
 
 

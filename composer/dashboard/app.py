@@ -6,8 +6,6 @@ import html
 import mimetypes
 from collections.abc import Awaitable, Callable, MutableMapping
 from functools import partial
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from typing import Any
 from urllib.parse import quote
 
@@ -24,6 +22,7 @@ from composer.dashboard.connection import Connection
 from composer.dashboard.context import Dashboard
 from composer.dashboard.foxglove.connection import FoxgloveConnection, FoxgloveServer
 from composer.dashboard.foxglove.frames import SUBPROTOCOLS
+from composer.dashboard.page_modules import file_of_page, index_of
 
 Scope = MutableMapping[str, Any]
 AsgiReceive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -35,9 +34,8 @@ _TRY_AGAIN_LATER = 1013
 _METHODS = ("GET", "HEAD")
 #: The addresses of the views; the page reads the rest of the path.
 _VIEWS = ("graph", "nodes", "topics", "services", "actions", "parameters", "log", "timing")
-_PAGE = files("composer.dashboard") / "page"
-#: Scripts and styles that the page shares with the pages of ``compose graph``.
-_GRAPH_FILES = files("composer.graph.formats.html")
+#: The page shares a folder with Python code.
+_SUFFIXES = (".css", ".html", ".js", ".svg", ".txt", "LICENSE")
 _MAX_PATH = 200
 _WITHOUT_FOXGLOVE = Refusal(404, "the dashboard was started with --no-foxglove")
 _NO_SUBPROTOCOL = Refusal(
@@ -50,11 +48,12 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
     connections: set[Client] = set()
     foxglove_server = FoxgloveServer.of(dashboard)
 
-    async def index(_: HttpRequest) -> Response:
+    async def index(request: HttpRequest) -> Response:
         # A connection follows: join the ROS graph while the page is being loaded.
         dashboard.ros.enter()
         dashboard.ros.leave()
-        return _content("index.html")
+        view = request.url.path.split("/")[1]
+        return _of_page(index_of(view), "text/html")
 
     async def page(socket: WebSocket) -> None:
         await socket.accept()
@@ -62,12 +61,12 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
 
     async def foxglove(socket: WebSocket) -> None:
         if not dashboard.options.foxglove:
-            await socket.send_denial_response(_refusal_page(_WITHOUT_FOXGLOVE))
+            await socket.send_denial_response(refusal_page(_WITHOUT_FOXGLOVE))
             return
         offered = socket.scope["subprotocols"]
         chosen = next((name for name in SUBPROTOCOLS if name in offered), None)
         if chosen is None:
-            await socket.send_denial_response(_refusal_page(_NO_SUBPROTOCOL))
+            await socket.send_denial_response(refusal_page(_NO_SUBPROTOCOL))
             return
         await socket.accept(chosen)
         await serve(socket, partial(FoxgloveConnection, foxglove_server))
@@ -88,7 +87,6 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
         Route("/", index),
         *(Route(f"/{view}", index) for view in _VIEWS),
         *(Route(f"/{view}/{{rest:path}}", index) for view in _VIEWS),
-        Route("/page/graph/{name}", _graph_file),
         Route("/page/{path:path}", _file),
         Route("/theme.css", _theme),
         WebSocketRoute("/ws", page),
@@ -134,7 +132,7 @@ class AccessCheck:
 
         async def send_secured(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = [*message["headers"], *_security_headers(host)]
+                message["headers"] = [*message["headers"], *security_headers(host)]
             await send(message)
 
         await self._app(scope, receive, send_secured)
@@ -143,11 +141,11 @@ class AccessCheck:
         """Return the response to a request that does not reach the application, or None."""
         refusal = self._access.refusal(request)
         if refusal is not None:
-            return _refusal_page(refusal)
+            return refusal_page(refusal)
         if request.is_websocket:
             return None
         if scope["method"] not in _METHODS:
-            return _refusal_page(Refusal(405, "only GET is possible"))
+            return refusal_page(Refusal(405, "only GET is possible"))
         if "token=" in request.query:
             # The address without the token, so that it is not in the history of the browser.
             location = "/" + quote(request.path.lstrip("/"))
@@ -160,25 +158,18 @@ async def _file(request: HttpRequest) -> Response:
     return _content(request.path_params["path"])
 
 
-async def _graph_file(request: HttpRequest) -> Response:
-    name = request.path_params["name"]
-    if not name.endswith((".js", ".css")):
-        return _not_found(name)
-    return _content(name, _GRAPH_FILES)
-
-
 async def _theme(_: HttpRequest) -> Response:
     from composer.graph.formats.theme import page_style
 
     return _of_page(page_style().encode(), "text/css")
 
 
-def _content(path: str, folder: Traversable = _PAGE) -> Response:
+def _content(path: str) -> Response:
     """Return a file of the page."""
     parts = path.split("/")
     is_odd = any(part in ("", ".", "..") or part.startswith(".") for part in parts)
-    found = folder.joinpath(*parts) if not is_odd and len(path) <= _MAX_PATH else None
-    if found is None or not found.is_file():
+    found = file_of_page(path) if not is_odd and len(path) <= _MAX_PATH else None
+    if found is None or not path.endswith(_SUFFIXES) or not found.is_file():
         return _not_found(path)
     kind = mimetypes.guess_type(path)[0] or "application/octet-stream"
     if kind == "application/javascript":
@@ -191,10 +182,11 @@ def _of_page(content: bytes, kind: str) -> Response:
 
 
 def _not_found(path: str) -> Response:
-    return _refusal_page(Refusal(404, f"there is no file '{path[:_MAX_PATH]}'"))
+    return refusal_page(Refusal(404, f"there is no file '{path[:_MAX_PATH]}'"))
 
 
-def _refusal_page(refusal: Refusal) -> Response:
+def refusal_page(refusal: Refusal) -> Response:
+    """Return a page, without scripts, that says why a request is refused."""
     text = html.escape(refusal.reason)
     page = (
         '<!DOCTYPE html><html lang="en"><meta charset="utf-8"><title>ros2-composer</title>'
@@ -204,11 +196,11 @@ def _refusal_page(refusal: Refusal) -> Response:
 
 
 def _secured(response: Response, host: str) -> Response:
-    response.raw_headers.extend(_security_headers(host))
+    response.raw_headers.extend(security_headers(host))
     return response
 
 
-def _security_headers(host: str) -> list[tuple[bytes, bytes]]:
+def security_headers(host: str) -> list[tuple[bytes, bytes]]:
     """Return headers that keep the page from loading or running anything of another origin."""
     is_plain = all(letter.isalnum() or letter in ".-:[]" for letter in host)
     socket = f" ws://{host}" if host and is_plain else ""

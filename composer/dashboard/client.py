@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from typing import Any
@@ -32,6 +33,9 @@ class Client(ABC):
         self._outbox = outbox
         self._loop = asyncio.get_running_loop()
         self._pending: set[asyncio.Task[None]] = set()
+        #: Updates of feeds on their way to the thread of the event loop.
+        self._arrived: deque[tuple[Callable[[Update], None], Update]] = deque()
+        self._is_woken = False
         self._is_open = True
 
     async def run(self) -> None:
@@ -103,8 +107,18 @@ class Client(ABC):
         """Return a receiver for the thread of feeds; ``take`` gets the updates on this thread."""
 
         def receive(update: Update) -> None:
-            if self._is_open:
+            if not self._is_open:
+                return
+            self._arrived.append((take, update))
+            if not self._is_woken:
+                self._is_woken = True
                 with suppress(RuntimeError):  # the server ends
-                    self._loop.call_soon_threadsafe(take, update)
+                    self._loop.call_soon_threadsafe(self._take_arrived)
 
         return receive
+
+    def _take_arrived(self) -> None:
+        self._is_woken = False  # first: what arrives from now on wakes the loop again
+        while self._arrived:
+            take, update = self._arrived.popleft()
+            take(update)

@@ -21,6 +21,10 @@ _LOG = logging.getLogger(__name__)
 #: A feed that fails is tried again after this time.
 _RETRY_S = 1.0
 _ALIGNED_S = 1.0
+#: A feed of reports is polled at most this often, however many systems report.
+_REPORT_GAP_S = 0.2
+#: A feed of reports waits this many periods for the next report.
+_REPORT_PERIODS = 1.5
 _INTERNAL = "an internal error of the dashboard: see its output"
 
 
@@ -38,6 +42,8 @@ class Feed(ABC):
     changes = False
     #: How often :meth:`poll` is called.
     period_s = 1.0
+    #: Whether to poll whenever a system has reported, instead of after each period.
+    follows_reports = False
 
     def start(self, ros: RosGraphSide) -> None:  # noqa: B027 - optional
         """Begin to observe; called once before the first poll. Raises RequestError."""
@@ -58,6 +64,8 @@ class RunningFeed:
         self.key = key
         self.receivers: dict[Receiver, None] = {}
         self.due_s = 0.0
+        self.polled_s = 0.0
+        self.has_report = False
         self.last: Update | None = None
         self.is_started = False
         self.is_urgent = False
@@ -80,6 +88,7 @@ class Feeds:
         self._changed = threading.Condition()
         self._running: dict[str, RunningFeed] = {}
         self._closing: list[RunningFeed] = []
+        self._outgoing: list[tuple[Receiver, Update]] = []
         self._is_open = True
 
     def add(self, key: str, feed: Feed, receiver: Receiver) -> None:
@@ -113,6 +122,15 @@ class Feeds:
                 running.is_urgent = True
                 self._changed.notify()
 
+    def poll_reports(self) -> None:
+        """Poll the feeds that follow the reports of systems, because one has arrived."""
+        with self._changed:
+            for running in self._running.values():
+                if running.feed.follows_reports and running.is_started:
+                    running.has_report = True
+                    running.due_s = min(running.due_s, running.polled_s + _REPORT_GAP_S)
+                    self._changed.notify()
+
     def stop(self) -> None:
         """Make :meth:`run` return."""
         with self._changed:
@@ -128,6 +146,7 @@ class Feeds:
                     self._close(running)
                 for running in due:
                     self._poll(running, ros)
+                self._deliver()
         finally:
             with self._changed:
                 known = [*self._closing, *self._running.values()]
@@ -150,15 +169,17 @@ class Feeds:
         from composer.remote.session import RosError
 
         running.is_urgent = False
+        running.polled_s = time.monotonic()
+        has_report, running.has_report = running.has_report, False
         try:
             if not running.is_started:
-                running.due_s = time.monotonic()
+                running.due_s = running.polled_s
                 running.feed.start(ros)
                 running.is_started = True
             for update in running.feed.poll():
                 running.last_error = ""
                 self._send(running, update)
-            running.due_s = _next_s(running.due_s, running.feed.period_s)
+            self._plan(running, has_report=has_report)
         except RequestError as error:
             self._fail(running, error)
         except RosError as error:
@@ -166,6 +187,16 @@ class Feeds:
         except Exception as error:  # an unexpected message must not end the other feeds
             _LOG.exception("the channel %s failed", running.key)
             self._fail(running, RequestError("internal", f"{_INTERNAL}: {error!r:.200}"))
+
+    def _plan(self, running: RunningFeed, *, has_report: bool) -> None:
+        """Set when the next poll is due; after a report, the next report is awaited."""
+        with self._changed:
+            if running.has_report:  # it arrived meanwhile
+                running.due_s = running.polled_s + _REPORT_GAP_S
+            elif has_report:
+                running.due_s = running.polled_s + running.feed.period_s * _REPORT_PERIODS
+            else:
+                running.due_s = _next_s(running.due_s, running.feed.period_s)
 
     def _fail(self, running: RunningFeed, error: RequestError) -> None:
         running.due_s = time.monotonic() + max(_RETRY_S, running.feed.period_s)
@@ -178,8 +209,12 @@ class Feeds:
         with self._changed:
             if running.feed.delivery is Delivery.LATEST:
                 running.last = update  # for later receivers
-            receivers = tuple(running.receivers)
-        for receiver in receivers:
+            self._outgoing += [(receiver, update) for receiver in running.receivers]
+
+    def _deliver(self) -> None:
+        """Pass on the updates of all feeds at once: each wake-up of the web server costs time."""
+        outgoing, self._outgoing = self._outgoing, []
+        for receiver, update in outgoing:
             receiver(update)
 
     def _close(self, running: RunningFeed) -> None:

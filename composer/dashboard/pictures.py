@@ -7,12 +7,14 @@ from dataclasses import replace
 from typing import Any
 
 from composer.dashboard.declared import Declared
-from composer.drift import ObservedNode, Snapshot
+from composer.dashboard.observing.topology import is_manager
+from composer.drift import Snapshot
 from composer.graph import View, build_graph, live_scene_of, scene_of
 from composer.graph.diagram import Cluster, Direction, Edge, Graph, Vertex
-from composer.graph.engines import Engine, lay_out
 from composer.graph.formats.svg import contents
 from composer.graph.formats.svg_elements import markers
+from composer.graph.layout import Size, fit
+from composer.graph.measure import sizes
 from composer.graph.scenes.scene import Scene
 from composer.model import PortKind
 
@@ -23,7 +25,6 @@ RATE_PLACEHOLDER_HZ = 1111.0
 _NODE = "node:"
 #: Views without a direction of their own.
 _TURNED = (View.NODES, View.CONNECTIONS)
-_MANAGER = "/manager"
 
 
 def live_scene(snapshot: Snapshot) -> Scene:
@@ -34,7 +35,7 @@ def live_scene(snapshot: Snapshot) -> Scene:
     nodes = tuple(
         replace(node, state=STATE_PLACEHOLDER if node.state != "" else "")
         for node in snapshot.nodes
-        if not _is_manager(node)
+        if not is_manager(node.full_name, node.endpoints)
     )
     rates_hz = {
         endpoint.name: RATE_PLACEHOLDER_HZ
@@ -45,27 +46,21 @@ def live_scene(snapshot: Snapshot) -> Scene:
     return live_scene_of(replace(snapshot, nodes=nodes), rates_hz)
 
 
-def _is_manager(node: ObservedNode) -> bool:
-    own_service = f"{node.full_name}/is_active"
-    return node.full_name.endswith(_MANAGER) and any(
-        endpoint.name == own_service for endpoint in node.endpoints
-    )
-
-
 def declared_scene(declared: Declared) -> Scene:
     """Return the scene of a system as declared, with its diagnostics."""
     return scene_of([declared.system], declared.diagnostics)
 
 
-def picture(scene: Scene, view: View, direction: Direction) -> dict[str, Any]:
+def picture(scene: Scene, view: View, page: Size) -> dict[str, Any]:
     """Return a diagram as an SVG fragment, and what is known about everything in it, by key.
 
-    All texts in the fragment are escaped.
+    ``page`` is the size of its place in pixels. All texts in the fragment are escaped.
     """
     graph = build_graph(scene, view)
+    directions = [graph.direction]
     if view in _TURNED:
-        graph = replace(graph, direction=direction)
-    layout = lay_out(graph, Engine.BUNDLED)
+        directions = [Direction.RIGHT, Direction.DOWN][:: 1 if page.width >= page.height else -1]
+    layout = fit(graph, sizes(graph), page, directions)
     return {
         "title": graph.title,
         "view": graph.view,

@@ -30,8 +30,8 @@ class Outgoing:
 
     def open(self, ros: RosGraphSide) -> None:
         """Create the publisher. Raises RosError, RequestError."""
+        from composer.remote.messages.values import build_message, class_of
         from composer.remote.name_matching import full_name
-        from composer.remote.values import build_message, class_of
         from composer.runtime.ros.qos_profiles import rclpy_profile
 
         self._ros = ros
@@ -60,7 +60,7 @@ class Outgoing:
 
     def wait_until_acknowledged(self) -> None:
         """Wait a second at most until reliable subscriptions have the message."""
-        from composer.remote.topics import wait_until_acknowledged
+        from composer.remote.messages.topics import wait_until_acknowledged
 
         wait_until_acknowledged(self._publisher)
 

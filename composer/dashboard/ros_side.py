@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
+import os
 import threading
 import time
 from collections.abc import Callable
@@ -66,6 +68,10 @@ class RosSide:
         self._is_open = True
         self.state, self.message = "left", ""
 
+    def prepare(self) -> None:
+        """Import what joining takes, so that the first browser does not wait for that."""
+        threading.Thread(target=_import, name="imports", daemon=True).start()
+
     def enter(self) -> None:
         """Count one more browser; the first one makes the dashboard join the ROS graph."""
         with self._lock:
@@ -126,37 +132,52 @@ class RosSide:
         with self._lock:
             if self._is_open and (self._browsers or time.monotonic() < self._left_s + LINGER_S):
                 return True
-            self._thread = None
-            self._side = None
+            # From here on, the next browser may start another thread: this one says nothing more.
+            self._thread, self._side, self.state = None, None, "left"
             return False
 
     def _run(self) -> None:
         self.state, self.message = "joining", ""
         try:
-            with ExitStack() as stack:
-                side = self._join(stack)
-                with self._lock:
-                    self._side = side
-                self.state = "ready"
-                self._joined.set()
-                self._feeds.run(side, self._is_needed)
-            self.state = "left"
+            self._run_feeds()
         except Exception as error:  # say why in the browser
             logging.getLogger(__name__).exception("the dashboard is not in the ROS graph")
-            self.state, self.message = "failed", str(error)
             with self._lock:
-                self._thread, self._side = None, None
+                if self._thread is threading.current_thread():
+                    self._thread, self._side = None, None
+                    self.state, self.message = "failed", str(error)
+                    self._joined.set()
+        gc.collect()  # nodes are in reference cycles, and the next collection may be far off
+
+    def _run_feeds(self) -> None:
+        """Join the ROS graph, and leave it when no browser is left."""
+        with ExitStack() as stack:
+            side = self._join(stack)
+            with self._lock:
+                self._side = side
+            self.state = "ready"
             self._joined.set()
+            self._feeds.run(side, self._is_needed)
 
     def _join(self, stack: ExitStack) -> RosGraphSide:
-        from composer.dashboard.observing.observed import Observed
+        from composer.dashboard.observing.observed import Observed, first_topology
         from composer.remote.shared_session import SharedSession
+        from composer.runtime.process.dds_profiles import use_dashboard_profile
         from composer.runtime.process.environment import prepare_environment
 
         prepare_environment()
+        use_dashboard_profile(os.environ)
+        first = first_topology()
         session = stack.enter_context(SharedSession())
-        observed = stack.enter_context(Observed(session, self._work))
+        observed = stack.enter_context(
+            Observed(session, self._work, first, self._feeds.poll_reports)
+        )
         return RosGraphSide(session, observed, self._forms, self._work)
+
+
+def _import() -> None:
+    import composer.dashboard.observing.observed
+    import composer.dashboard.pictures  # noqa: F401 - for the first diagram
 
 
 def _logged(function: Callable[[], None]) -> None:

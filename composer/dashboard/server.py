@@ -11,12 +11,14 @@ import errno
 import signal
 import socket
 from collections.abc import Callable
+from http import HTTPStatus
 from typing import Any
 
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from composer.dashboard.app import AccessCheck
+from composer.dashboard.access import Refusal
+from composer.dashboard.app import AccessCheck, refusal_page, security_headers
 
 DEFAULT_PORT = 8800
 #: Ports that are tried if the default one is in use.
@@ -125,7 +127,7 @@ class _GuardedProtocol(H11Protocol):
         """Accept a connection, or end it at once."""
         super().connection_made(transport)
         if len(self.connections) > MAX_OPEN:
-            transport.abort()
+            self._refuse(Refusal(503, f"{MAX_OPEN} connections are open already"))
             return
         self._check = self.loop.call_later(REQUEST_WITHIN_S, self._end_if_idle)
 
@@ -135,6 +137,23 @@ class _GuardedProtocol(H11Protocol):
             self._check.cancel()
         super().connection_lost(exc)
 
+    def send_400_response(self, msg: str) -> None:
+        """Answer what is not HTTP."""
+        self._refuse(Refusal(400, msg.rstrip(".")))
+
+    def _refuse(self, refusal: Refusal) -> None:
+        """Say why the connection ends, and end it; nothing waits for one that does not read."""
+        response = refusal_page(refusal)
+        status = HTTPStatus(refusal.status)
+        headers = [*response.raw_headers, *security_headers(""), (b"connection", b"close")]
+        head = b"".join(b"%b: %b\r\n" % header for header in headers)
+        start = f"HTTP/1.1 {status.value} {status.phrase}\r\n".encode()
+        self.transport.write(b"%b%b\r\n%b" % (start, head, bytes(response.body)))
+        if self.transport.get_write_buffer_size():
+            self.transport.abort()
+        else:
+            self.transport.close()
+
     def _end_if_idle(self) -> None:
         """End the connection if it has sent nothing, or only a part of a request."""
         self._check = None
@@ -142,7 +161,7 @@ class _GuardedProtocol(H11Protocol):
             return  # it is a WebSocket now
         is_busy = self.cycle is not None and not self.cycle.response_complete
         if not is_busy and self.cycle is self._last_cycle:
-            self.transport.abort()
+            self._refuse(Refusal(408, f"no complete request within {REQUEST_WITHIN_S:g} s"))
             return
         self._last_cycle = self.cycle
         self._check = self.loop.call_later(REQUEST_WITHIN_S, self._end_if_idle)

@@ -76,15 +76,15 @@ def run_dashboard(
         },
     )
     url = f"http://{_in_url(address.host)}:{port}/?token={token}"
+
+    def prepare() -> None:
+        on_ready(url)
+        ros.prepare()
+
     try:
-        serve(make_app(dashboard), listening, lambda: on_ready(url))
+        serve(make_app(dashboard), listening, prepare)
     finally:
         ros.close(_LEAVES_WITHIN_S)
-
-
-def foxglove_url(url: str) -> str:
-    """Return the address for Foxglove, given that of the page."""
-    return url.replace("http://", "ws://", 1).replace("/?", "/foxglove?", 1)
 
 
 def _title(options: Options, declared: Declared | None) -> str:

@@ -1,12 +1,11 @@
 """The parser of Foxglove reads every schema as intended.
 
-Requires Node.js and ``npm ci --prefix tests/foxglove``; skipped otherwise.
+Requires Node.js and ``npm ci --prefix tests/foxglove``.
 """
 
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,19 +15,21 @@ import pytest
 
 from composer.dashboard.foxglove.schemas import Schemas
 from composer.interfaces import Interfaces, Message
+from tests.programs import require_package
 
 HERE = Path(__file__).parent
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("node") is None or not (HERE / "node_modules" / "@foxglove" / "rosmsg").is_dir(),
-    reason="the parser is not installed: npm ci --prefix tests/foxglove",
-)
 #: What the parser calls these types.
 SAME = {
     "builtin_interfaces/Time": "time",
     "builtin_interfaces/Duration": "duration",
     "byte": "uint8",
 }
+
+
+@pytest.fixture(scope="module", autouse=True)
+def parser() -> None:
+    require_package(HERE, "@foxglove/rosmsg")
 
 
 def read(schemas: Mapping[str, str]) -> dict[str, Any]:

@@ -117,7 +117,7 @@ class GoalFeed(Feed):
         self._feedback = feedback
 
     def _shown(self, message: Any) -> Any:
-        from composer.remote.values import to_short_plain
+        from composer.remote.messages.values import to_short_plain
 
         return json_safe(to_short_plain(message, _MAX_ITEMS))
 

@@ -12,14 +12,15 @@ from composer.dashboard.observing.report_pairs import ReportPairs
 from composer.dashboard.outbox import Update
 
 if TYPE_CHECKING:
-    from composer.dashboard.observing.observed import Topology
+    from composer.dashboard.observing.topology import Topology
     from composer.dashboard.ros_side import RosGraphSide
     from composer.drift import ObservedEndpoint
-    from composer.remote.system_reports import NodeReport
+    from composer.remote.systems.system_reports import NodeReport
 
 VIEWS = ("nodes", "connections", "lifecycle", "deployment", "states")
-#: "TB", from top to bottom, suits a narrow screen.
-DIRECTIONS = ("LR", "TB")
+#: The size of the page in pixels, unless a subscription says it.
+_WIDTH, _HEIGHT = 1280.0, 800.0
+_MIN_SIDE, _MAX_SIDE = 16.0, 16384.0
 _DECLARED_ONLY = ("lifecycle", "deployment")
 #: Topics without a report are measured, but no more than these.
 _MAX_MEASURED = 60
@@ -32,13 +33,17 @@ _MAX_PICTURES = 4
 class PictureFeed(Feed):
     """The diagram, again whenever the graph has changed. The layout runs on a worker thread."""
 
+    follows_reports = True  # to wake up together with the other feeds
+
     def __init__(self, values: Values, declared: Declared | None) -> None:
         """Read the parameters of the channel. Raises BadRequestError, RequestError."""
         self._view = values.choice("view", VIEWS, "nodes")
         source = "declared" if self._view in _DECLARED_ONLY else "live"
         self._is_live = values.choice("source", ("live", "declared"), source) == "live"
         self._is_live = self._is_live and self._view not in _DECLARED_ONLY
-        self._direction = values.choice("direction", DIRECTIONS, "LR")
+        width = values.number("width", _WIDTH, _MIN_SIDE, _MAX_SIDE)
+        height = values.number("height", _HEIGHT, _MIN_SIDE, _MAX_SIDE)
+        self._page = (width, height)
         values.end()
         self._declared = None if self._is_live else required(declared, f"the view {self._view}")
         self._ros: RosGraphSide
@@ -74,7 +79,7 @@ class PictureFeed(Feed):
         if wanted == self._drawn:
             return
         self._drawn = wanted
-        known = observed.pictures.get((wanted, self._view, self._direction, self._is_live))
+        known = observed.pictures.get((wanted, self._view, self._page, self._is_live))
         if known is not None:
             yield Update(known)
             return
@@ -85,16 +90,16 @@ class PictureFeed(Feed):
     def _draw(self, topology: Topology, states: Mapping[str, str | None]) -> None:
         from composer.dashboard.pictures import declared_scene, live_scene, picture
         from composer.graph import View
-        from composer.graph.diagram import Direction
+        from composer.graph.layout import Size
 
         try:
             if self._declared is not None:
                 scene = declared_scene(self._declared)
             else:
                 scene = live_scene(topology.snapshot(states))
-            data = picture(scene, View(self._view), Direction(self._direction))
+            data = picture(scene, View(self._view), Size(*self._page))
             text = to_json({"revision": topology.revision, **data})
-            self._keep((self._drawn, self._view, self._direction, self._is_live), text)
+            self._keep((self._drawn, self._view, self._page, self._is_live), text)
             self._finished.append(Update(text))
         except Exception as error:  # reported by the next poll
             self._finished.append(error)
@@ -115,6 +120,8 @@ class LiveFeed(Feed):
     Rates of a system are in its reports. Other topics are measured.
     """
 
+    follows_reports = True
+
     def __init__(self, values: Values, declared: Declared | None) -> None:
         """Read the parameters of the channel. Raises BadRequestError."""
         del declared
@@ -122,10 +129,14 @@ class LiveFeed(Feed):
         self._ros: RosGraphSide
         self._pairs = ReportPairs(lambda report: report.at_s)
         self._measured: set[str] = set()
+        #: What the topics to measure depend on, and these topics with their endpoints.
+        self._known: object = None
+        self._wanted: dict[str, list[ObservedEndpoint]] = {}
 
     def start(self, ros: RosGraphSide) -> None:
         """Subscribe to the reports of systems."""
         self._ros = ros
+        self._known = None
         ros.observed.reports.acquire()
 
     def close(self) -> None:
@@ -157,25 +168,15 @@ class LiveFeed(Feed):
     def _measure(self, reported: set[str]) -> dict[str, Any]:
         """Measure the topics that no system reports; return their rates."""
         meters = self._ros.observed.meters
-        of_topics = self._ros.observed.topology().of_topics
-        managers = {f"{system}/{_MANAGER}" for system in self._ros.observed.reports.current()}
-
-        def is_reporting(end: tuple[str, ObservedEndpoint]) -> bool:
-            """Return whether this is for tools: managers report only while others listen."""
-            return end[1].is_for_tools or end[0] in managers
-
-        wanted = [
-            topic
-            for topic, ends in of_topics.items()
-            if topic not in reported and not all(map(is_reporting, ends))
-        ][:_MAX_MEASURED]
-        for topic in self._measured - set(wanted):
+        wanted = self._unreported(reported)
+        for topic in self._measured - wanted.keys():
             meters.release(topic)
             self._measured.discard(topic)
-        for topic in wanted:
-            ends = [end for _, end in of_topics[topic]]
+        for topic, ends in wanted.items():
             if topic not in self._measured and meters.acquire(topic, ends):
                 self._measured.add(topic)
+        if not self._measured:
+            return {}
         meters.poll()
         found = {topic: meters.figures(topic) for topic in sorted(self._measured)}
         return {
@@ -183,6 +184,28 @@ class LiveFeed(Feed):
             for topic, figures in found.items()
             if figures is not None
         }
+
+    def _unreported(self, reported: set[str]) -> dict[str, list[ObservedEndpoint]]:
+        """Return the topics that no system reports, with their endpoints."""
+        topology = self._ros.observed.topology()
+        systems = set(self._ros.observed.reports.current())
+        known = (topology.revision, systems, reported)
+        if known == self._known:
+            return self._wanted
+        self._known = known
+        managers = {f"{system}/{_MANAGER}" for system in systems}
+
+        def is_reporting(end: tuple[str, ObservedEndpoint]) -> bool:
+            """Return whether this is for tools: managers report only while others listen."""
+            return end[1].is_for_tools or end[0] in managers
+
+        wanted = [
+            (topic, [end for _, end in ends])
+            for topic, ends in topology.of_topics.items()
+            if topic not in reported and not all(map(is_reporting, ends))
+        ]
+        self._wanted = dict(wanted[:_MAX_MEASURED])
+        return self._wanted
 
 
 def _state(node: NodeReport) -> dict[str, Any]:

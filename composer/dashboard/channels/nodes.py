@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Iterator
-from dataclasses import asdict
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared
@@ -16,23 +15,33 @@ from composer.dashboard.outbox import Update
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.system_reports import NodeReport, SystemReport
+    from composer.remote.systems.system_reports import NodeReport, SystemReport
 
 _PERIOD_S = 1.0
+#: While nodes are being discovered.
+_SOON_S = 0.25
+#: Linux counts the CPU time in steps of 10 ms, so a longer time is also more precise.
+_USAGE_PERIOD_S = 1.8
+#: Reports arrive a little earlier or later than after a second.
+_EARLY = 0.8
 COMMANDS = ("startup", "pause", "resume", "reset", "shutdown")
 _TRANSITIONS = {
     "unconfigured": ["configure", "shutdown"],
     "inactive": ["activate", "cleanup", "shutdown"],
     "active": ["deactivate", "shutdown"],
 }
-#: Counts of messages by topic are for the graph.
-_NOT_SHOWN = ("node", "sent", "received", "dropped")
+#: What is shown of a report. Counts of messages by topic are for the graph.
+_SHOWN = (
+    *("state", "desired", "since_s", "restarts", "errors", "last_error", "held_down", "sent_hz"),
+    *("received_hz", "busy", "slowest", "overruns", "queue_drops", "qos_events", "depends_on"),
+    "process",
+)
 
 
 class NodesFeed(Feed):
     """All nodes, once a second and soon after a change."""
 
-    period_s = 0.25
+    follows_reports = True
 
     def __init__(self, values: Values, declared: Declared | None) -> None:
         """Read the parameters of the channel. Raises BadRequestError."""
@@ -42,7 +51,7 @@ class NodesFeed(Feed):
         self._host = socket.gethostname()
         self._processes = ProcessMonitor()
         self._usage: dict[str, dict[str, Any] | None] = {}
-        self._due_s = 0.0
+        self._due_s = self._usage_due_s = 0.0
         self._last: Any = None
 
     def start(self, ros: RosGraphSide) -> None:
@@ -57,28 +66,36 @@ class NodesFeed(Feed):
     def poll(self) -> Iterator[Update]:
         """Yield all nodes and systems if anything is new."""
         observed = self._ros.observed
+        self.period_s = _SOON_S if observed.is_new else _PERIOD_S
         reports = observed.reports.current()
-        nodes: dict[str, dict[str, Any]] = {}
-        for name, report in reports.items():
-            if report is not None:
-                nodes |= {node.node: self._managed(name, node) for node in report.nodes}
-        for node, state in observed.states().items():
-            nodes.setdefault(node, self._other(node, state))
-        for node in observed.topology().visible:
-            nodes.setdefault(node, self._other(node, ""))
-        states = [(name, node["state"], node.get("held_down")) for name, node in nodes.items()]
+        managed = {
+            node.node: (name, node)
+            for name, report in reports.items()
+            if report is not None
+            for node in report.nodes
+        }
+        states = dict.fromkeys(observed.topology().visible, "") | observed.states()
+        held_down = [node.held_down for _, node in managed.values()]
         activities = [(name, report and report.activity) for name, report in reports.items()]
         now_s = time.monotonic()
-        if (states, activities) == self._last and now_s < self._due_s:
+        if (states, held_down, activities) == self._last and now_s < self._due_s:
             return
-        self._last, self._due_s = (states, activities), now_s + _PERIOD_S
-        self._usage = {
+        self._last, self._due_s = (states, held_down, activities), now_s + _PERIOD_S * _EARLY
+        nodes = [self._managed(name, node) for name, node in managed.values()]
+        nodes += [self._other(*item) for item in states.items() if item[0] not in managed]
+        if now_s >= self._usage_due_s:
+            self._usage_due_s = now_s + _USAGE_PERIOD_S
+            self._usage = self._measured(reports.values())
+        systems = [self._system(name, report) for name, report in sorted(reports.items())]
+        yield Update(to_json({"systems": systems, "nodes": nodes}))
+
+    def _measured(self, reports: Iterable[SystemReport | None]) -> dict[str, Any]:
+        """Return the usage of the processes on this computer by their ids."""
+        return {
             report.pid: self._processes.usage(report.pid)
-            for report in reports.values()
+            for report in reports
             if report is not None and report.host == self._host
         }
-        systems = [self._system(name, report) for name, report in sorted(reports.items())]
-        yield Update(to_json({"systems": systems, "nodes": list(nodes.values())}))
 
     def _system(self, name: str, report: SystemReport | None) -> dict[str, Any]:
         declared = self._declared
@@ -96,11 +113,10 @@ class NodesFeed(Feed):
         }
 
     def _managed(self, system: str, node: NodeReport) -> dict[str, Any]:
-        values = {key: value for key, value in asdict(node).items() if key not in _NOT_SHOWN}
         return {
             "name": node.node,
             "system": system,
-            **values,
+            **{key: getattr(node, key) for key in _SHOWN},
             "transitions": _TRANSITIONS.get(node.state, []),
             "declared_at": self._declared_at(node.node),
         }

@@ -13,7 +13,7 @@ from composer.dashboard.outbox import Update
 from composer.model import PortKind
 
 if TYPE_CHECKING:
-    from composer.dashboard.observing.observed import Topology
+    from composer.dashboard.observing.topology import Topology
     from composer.dashboard.ros_side import RosGraphSide
 
 
@@ -49,7 +49,9 @@ class ServicesFeed(Feed):
         found: dict[str, dict[str, Any]] = {}
         for node in topology.visible:
             for end in topology.nodes[node]:
-                if end.kind not in (server, client) or (end.is_for_tools and not self._hidden):
+                if end.kind not in (server, client):
+                    continue
+                if not self._hidden and (end.is_for_tools or topology.is_for_tools(end.name)):
                     continue
                 item = found.setdefault(
                     end.name, {"name": end.name, "types": [], "servers": [], "clients": []}

@@ -13,10 +13,9 @@ from composer.dashboard.messages import Values, to_json
 from composer.dashboard.outbox import Update
 from composer.graph.labels import qos_facts
 from composer.model import PortKind
-from composer.names import is_hidden
 
 if TYPE_CHECKING:
-    from composer.dashboard.observing.observed import Topology
+    from composer.dashboard.observing.topology import Topology
     from composer.dashboard.ros_side import RosGraphSide
     from composer.drift import ObservedEndpoint
 
@@ -81,7 +80,8 @@ class TopicsFeed(Feed):
         return [
             _topic(name, ends)
             for name, ends in sorted(topology.of_topics.items())
-            if self._hidden or not (is_hidden(name) or all(end.is_for_tools for _, end in ends))
+            if self._hidden
+            or not (topology.is_for_tools(name) or all(end.is_for_tools for _, end in ends))
         ]
 
 

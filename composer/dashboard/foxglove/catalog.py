@@ -14,7 +14,7 @@ from composer.dashboard.outbox import Update
 from composer.model import PortKind
 
 if TYPE_CHECKING:
-    from composer.dashboard.observing.observed import Topology
+    from composer.dashboard.observing.topology import Topology
     from composer.dashboard.ros_side import RosGraphSide
 
 T = TypeVar("T")

@@ -37,7 +37,7 @@ def call_service(link: Link, call: ServiceCall, services: Mapping[int, OfferedSe
         link.post({"op": "serviceCallFailure", **content})
 
     def run(ros: RosGraphSide, deadline: Deadline) -> bytes:
-        from composer.remote.serialized import call_serialized
+        from composer.remote.messages.serialized import call_serialized
 
         return call_serialized(ros.session, deadline, service.name, service.type, call.data)
 

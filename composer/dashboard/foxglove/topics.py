@@ -17,7 +17,7 @@ from composer.qos import QosProfile, Reliability
 if TYPE_CHECKING:
     from composer.dashboard.observing.topic_reader import TopicReader
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.serialized import SerializedPublisher
+    from composer.remote.messages.serialized import SerializedPublisher
     from composer.remote.shared_session import SampledTopic
 
 _DEPTH = 200
@@ -113,7 +113,7 @@ class PublishedFeed(Feed):
     def start(self, ros: RosGraphSide) -> None:
         """Create the publisher."""
         from composer.dashboard.publishing import suitable_profile
-        from composer.remote.serialized import SerializedPublisher
+        from composer.remote.messages.serialized import SerializedPublisher
 
         profile = suitable_profile(ros, self.topic)
         self._publisher = SerializedPublisher(ros.session, self.topic, self._type_name, profile)

@@ -76,7 +76,7 @@ class TopicMeters:
         if known is not None:
             known.users += 1
             return True
-        from composer.remote.values import InvalidValueError
+        from composer.remote.messages.values import InvalidValueError
 
         publishers = [end for end in ends if end.kind is PortKind.PUBLISHER]
         types = {end.type for end in ends}

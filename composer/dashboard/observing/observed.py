@@ -5,23 +5,22 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Mapping, Set
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Iterable, Set
 from typing import TYPE_CHECKING, Self
 
 from composer.dashboard.observing.log_lines import LogLines
 from composer.dashboard.observing.meters import TopicMeters
-from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
-from composer.model import PortKind
-from composer.names import is_hidden
+from composer.dashboard.observing.topology import Topology
+from composer.drift import ObservedEndpoint
 from composer.remote.lifecycle import LifecycleClient
 from composer.remote.session import Deadline
-from composer.remote.snapshot import endpoints
-from composer.remote.system_reports import SystemReport
-from composer.remote.systems import Systems
-from composer.runtime.process.instance_lock import local_systems
-from composer.runtime.ros.graph import SETTLE_S
+from composer.remote.systems.local_endpoints import local_endpoints
+from composer.remote.systems.local_queries import local_report
+from composer.remote.systems.managers import DISCOVERY_S, Systems
+from composer.remote.systems.system_reports import SystemReport
+from composer.runtime.process.instance_lock import LocalSystems
+from composer.runtime.ros.endpoints_by_node import endpoints
+from composer.runtime.ros.graph import COMMAND_PREFIX, SETTLE_S
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import Work
@@ -34,83 +33,47 @@ _NEW_S = 4.0
 _FIRST_WITHIN_S = 1.0
 _FIRST_REPORTS_WITHIN_S = 1.5
 _FIRST_POLL_S = 0.03
-#: Endpoints are queried when names have changed, else less often: they take at most this share of
-#: a processor.
-_ENDPOINTS_PERIOD_S = 3.0
+#: After a change of the graph, endpoints are queried at once if names have changed, else less
+#: often: they take at most this share of a processor.
+_ENDPOINTS_PERIOD_S = 5.0
 _SHARE = 0.03
+#: What no feed has looked at for this time is queried again.
+_CERTAIN_S = 10.0
 _STATES_PERIOD_S = 2.0
 _SYSTEMS_PERIOD_S = 3.0
 #: Managers report every second.
 _SILENT_S = 5.0
 _STATES_WITHIN_S = 2.0
-_GET_STATE = "lifecycle_msgs/srv/GetState"
-
-
-@dataclass(frozen=True)
-class Topology:
-    """The nodes of the ROS graph with all of their endpoints. ``revision`` counts changes.
-
-    ``counts`` has the number of nodes of each name. Nodes of commands are left out.
-    """
-
-    revision: int
-    nodes: Mapping[str, tuple[ObservedEndpoint, ...]]
-    counts: Mapping[str, int]
-
-    @cached_property
-    def visible(self) -> list[str]:
-        """The names of nodes that are not hidden, sorted."""
-        return [name for name in self.nodes if not is_hidden(name)]
-
-    @cached_property
-    def lifecycle_nodes(self) -> frozenset[str]:
-        """The nodes that report their lifecycle state on request."""
-        return frozenset(
-            node
-            for node, ends in self.nodes.items()
-            if any((end.name, end.type) == (f"{node}/get_state", _GET_STATE) for end in ends)
-        )
-
-    def snapshot(self, states: Mapping[str, str | None]) -> Snapshot:
-        """Return the nodes as :mod:`composer.graph` and :mod:`composer.drift` read them."""
-        return Snapshot(
-            tuple(
-                ObservedNode(
-                    full_name=name,
-                    endpoints=tuple(end for end in ends if not end.is_for_tools),
-                    state=states.get(name, ""),
-                    count=self.counts.get(name, 1),
-                )
-                for name, ends in self.nodes.items()
-            )
-        )
-
-    @cached_property
-    def of_topics(self) -> Mapping[str, list[tuple[str, ObservedEndpoint]]]:
-        """The endpoints of each topic with the names of their nodes."""
-        found: dict[str, list[tuple[str, ObservedEndpoint]]] = {}
-        for name in self.visible:
-            for end in self.nodes[name]:
-                if end.kind in (PortKind.PUBLISHER, PortKind.SUBSCRIPTION):
-                    found.setdefault(end.name, []).append((name, end))
-        return found
 
 
 class Observed:
     """Observes the ROS graph on request. Use it on the thread of feeds, in a ``with`` block."""
 
-    def __init__(self, session: SharedSession, work: Work) -> None:
+    def __init__(
+        self,
+        session: SharedSession,
+        work: Work,
+        first: Topology | None,
+        on_report: Callable[[], None],
+    ) -> None:
+        """``first`` is what a system on this computer knows: discovery takes a second or more.
+
+        ``on_report`` is called on another thread when a system has reported.
+        """
         self._session = session
         self.meters = TopicMeters(session)
-        self.reports = SystemReports(session)
+        self.reports = SystemReports(session, on_report)
         self.log = LogLines(session)
         self._states = _States(session, work)
-        self._topology = Topology(0, {}, {})
+        self._discovery = _Discovery(session)
+        self._topology = first or Topology(0, {}, {})
         #: The last diagrams, by what they depend on.
         self.pictures: dict[object, str] = {}
         self._names: object = None
         self._names_due_s = 0.0
         self._endpoints_due_s = 0.0
+        self._change = 0
+        self._certain_s = 0.0
         self._joined_s = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -124,20 +87,26 @@ class Observed:
     def topology(self) -> Topology:
         """Return the nodes and endpoints, at most about a second old.
 
-        The first call waits a moment, so that the first view is complete.
+        Without the answer of a system, the first call waits, so that the first view is complete.
         """
         now_s = time.monotonic()
         if now_s < self._names_due_s:
             return self._topology
-        if not self._names_due_s:
-            self._wait_for_nodes()
         is_new = self.is_new
         self._names_due_s = now_s + (_NEW_PERIOD_S if is_new else _PERIOD_S)
+        if not self._discovery.is_complete():
+            if self._topology.revision:
+                return self._topology
+            self._discovery.wait(self._joined_s + _FIRST_WITHIN_S)
+        change = self._session.changes.number()
+        if change == self._change:
+            self._certain_s = now_s
+            return self._topology
         graph = self._session.graph
         names = (graph.nodes(), graph.topics(), graph.services())
         if names == self._names and now_s < self._endpoints_due_s:
             return self._topology
-        self._names = names
+        self._names, self._change, self._certain_s = names, change, now_s
         used_s = time.thread_time()
         nodes, counts = self._query()
         if nodes != self._topology.nodes or counts != self._topology.counts:
@@ -158,22 +127,12 @@ class Observed:
         is_early = time.monotonic() < self._joined_s + _FIRST_REPORTS_WITHIN_S
         return is_early and any(report is None for report in self.reports.current().values())
 
-    def _wait_for_nodes(self) -> None:
-        """Wait until the nodes of this computer are known, and their topics change no more."""
-        end_s = self._joined_s + _FIRST_WITHIN_S
-        last, since_s = -1, 0.0
-        while (now_s := time.monotonic()) < end_s:
-            count = len(self._session.graph.topics())
-            if count != last:
-                last, since_s = count, now_s
-            if now_s >= since_s + SETTLE_S and self._session.is_local_discovered():
-                return
-            time.sleep(_FIRST_POLL_S)
-
     def known(self) -> Topology:
         """Return the nodes and endpoints, on any thread."""
         known = self._topology
-        if known.revision and time.monotonic() < self._endpoints_due_s + _ENDPOINTS_PERIOD_S:
+        if known.revision and not self._discovery.was_complete:
+            return known
+        if known.revision and time.monotonic() < self._certain_s + _CERTAIN_S:
             return known
         return Topology(known.revision, *self._query())
 
@@ -181,7 +140,7 @@ class Observed:
         """Return the endpoints by node, and the number of nodes of each name."""
         graph = self._session.graph
         found = dict(endpoints(graph))
-        counts = Counter(f"{namespace.rstrip('/')}/{name}" for name, namespace in graph.others())
+        counts = Counter(name for name, _ in graph.names("node"))
         return {name: found[name] for name in sorted(found) if name in counts}, counts
 
     def states(self) -> dict[str, str | None]:
@@ -199,12 +158,62 @@ class Observed:
         return self._states.of(others) | managed
 
 
-class SystemReports:
-    """The reports of running systems, while anything acquires them."""
+def first_topology() -> Topology | None:
+    """Return what systems on this computer know of the ROS graph, None if none is certain.
+
+    Ask before joining it: systems are not certain while they discover another process.
+    """
+    answer = local_endpoints()
+    if answer is None:
+        return None
+    found, names = answer
+    counts = Counter(name for name in names if not _is_of_command(name))
+    return Topology(1, {name: found[name] for name in sorted(found) if name in counts}, counts)
+
+
+def _is_of_command(name: str) -> bool:
+    return name.rpartition("/")[2].startswith(COMMAND_PREFIX)
+
+
+class _Discovery:
+    """Whether the nodes of this computer are discovered, after joining the ROS graph."""
 
     def __init__(self, session: SharedSession) -> None:
         self._session = session
+        self._end_s = time.monotonic() + DISCOVERY_S
+        self._count, self._since_s = -1, 0.0
+        #: Whether it was complete at the last look.
+        self.was_complete = False
+
+    def is_complete(self) -> bool:
+        """Return whether all nodes are known and their topics change no more."""
+        if self.was_complete:
+            return True
+        now_s = time.monotonic()
+        count = len(self._session.graph.topics())
+        if count != self._count:
+            self._count, self._since_s = count, now_s
+        is_settled = now_s >= self._since_s + SETTLE_S and self._session.is_local_discovered()
+        self.was_complete = is_settled or now_s >= self._end_s
+        return self.was_complete
+
+    def wait(self, end_s: float) -> None:
+        """Wait until it is complete, but no longer than until ``end_s`` (time.monotonic)."""
+        while not self.is_complete() and time.monotonic() < end_s:
+            time.sleep(_FIRST_POLL_S)
+        self.was_complete = True
+
+
+class SystemReports:
+    """The reports of running systems, while anything acquires them."""
+
+    def __init__(self, session: SharedSession, on_report: Callable[[], None]) -> None:
+        self._session = session
+        self._on_report = on_report
         self._systems: Systems | None = None
+        self._local = LocalSystems()
+        self._discovered: tuple[str, ...] = ()
+        self._change = 0
         self._users = 0
         self._callback_users = 0
         self._with_callbacks = False
@@ -232,16 +241,32 @@ class SystemReports:
         if self._systems is None or with_callbacks is not self._with_callbacks:
             self.close()
             self._with_callbacks, self._due_s = with_callbacks, 0.0
-            self._systems = Systems(self._session, Deadline(math.inf), callbacks=with_callbacks)
+            self._systems = Systems(
+                self._session,
+                Deadline(math.inf),
+                callbacks=with_callbacks,
+                on_report=self._on_report,
+            )
         systems = self._systems
         now_s = time.monotonic()
         if now_s >= self._due_s:
             self._due_s = now_s + _SYSTEMS_PERIOD_S
-            local = local_systems()
-            known = {*systems.discover(), *local}
-            systems.subscribe(local)
+            local = self._local.current()
+            change = self._session.changes.number()
+            if change != self._change:
+                self._change, self._discovered = change, systems.discover()
+            known = {*self._discovered, *local}
+            systems.subscribe(known)
+            self._ask(local)
             systems.forget([name for name in systems.current() if name not in known])
         return {name: self._fresh(name, report) for name, report in systems.current().items()}
+
+    def _ask(self, local: Iterable[str]) -> None:
+        """Ask systems on this computer for their first report: a topic takes a second."""
+        for name in local:
+            if name not in self._seen:
+                report = local_report(name, _FIRST_WITHIN_S, callbacks=self._with_callbacks)
+                self._seen[name] = (report, time.monotonic())
 
     def _fresh(self, name: str, report: SystemReport | None) -> SystemReport | None:
         """Return the last report of a system, None if that is too old."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 _MB = 1e6
+_MAX_BYTES = 4096  # more than it can be
 #: Fields of /proc/PID/stat after the name of the command; see proc(5).
 _UTIME, _STIME, _THREADS, _STARTED, _RSS = 11, 12, 17, 19, 21
 
@@ -56,9 +56,15 @@ def _read(pid: str) -> _Reading | None:
     if not pid.isascii() or not pid.isdigit():
         return None
     try:
-        text = Path("/proc", pid, "stat").read_text(encoding="utf-8", errors="replace")
+        descriptor = os.open(f"/proc/{pid}/stat", os.O_RDONLY | os.O_CLOEXEC)
     except OSError:
         return None
+    try:
+        text = os.read(descriptor, _MAX_BYTES).decode("utf-8", errors="replace")
+    except OSError:
+        return None
+    finally:
+        os.close(descriptor)
     values = text.rpartition(")")[2].split()
     return _Reading(
         at_s=time.monotonic(),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from composer.remote.system_reports import SystemReport
+    from composer.remote.systems.system_reports import SystemReport
 
 #: Managers report every second, and at each change: those are too close for a rate.
 _APART_S = 0.5
@@ -26,7 +26,7 @@ class ReportPairs:
     """The last two reports of each system that are far enough apart."""
 
     def __init__(self, at_s: Callable[[SystemReport], float]) -> None:
-        """``at_s`` returns the time of a report in seconds."""
+        """``at_s`` returns the time of a report in seconds; 0 if it has none, as the first one."""
         self._at_s = at_s
         self._pairs: dict[str, ReportPair] = {}
 
@@ -37,7 +37,7 @@ class ReportPairs:
             if report is None:
                 continue
             known = self._pairs.get(name)
-            if known is None or known.now.pid != report.pid:
+            if known is None or known.now.pid != report.pid or not self._at_s(known.now):
                 pairs[name] = ReportPair(None, report, 0.0)
                 continue
             passed_s = self._at_s(report) - self._at_s(known.now)

@@ -100,7 +100,7 @@ class TopicReader:
         A stream of large messages is not requested reliably: a reader that is late would delay a
         publisher. Latched ones, such as maps, only arrive if they are.
         """
-        from composer.remote.topics import strictest_compatible_qos
+        from composer.remote.messages.topics import strictest_compatible_qos
 
         offers = [end.qos for end in publishers if end.qos is not None]
         profile = strictest_compatible_qos(offers, self._depth)

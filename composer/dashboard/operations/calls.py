@@ -31,8 +31,8 @@ def call(values: Values, dashboard: Dashboard) -> Prepared:
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
         from composer.remote.calls import ServiceRequest, call_service
         from composer.remote.graph_names import GraphNames
+        from composer.remote.messages.values import to_short_plain
         from composer.remote.name_matching import full_name
-        from composer.remote.values import to_short_plain
 
         service = full_name("service", name)
         names = GraphNames(ros.session, deadline)

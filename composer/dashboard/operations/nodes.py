@@ -16,8 +16,8 @@ from composer.dashboard.operations.operation import Prepared
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.lifecycle_batch import NodeOutcome
     from composer.remote.session import Deadline
+    from composer.remote.systems.lifecycle_batch import NodeOutcome
 
 _TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
 _READ_S = 5.0
@@ -126,7 +126,7 @@ def transition(values: Values, dashboard: Dashboard) -> Prepared:
     dependents = values.flag("dependents")
 
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
-        from composer.remote.lifecycle_batch import LifecycleBatch, LifecycleRequest
+        from composer.remote.systems.lifecycle_batch import LifecycleBatch, LifecycleRequest
 
         batch = LifecycleBatch(ros.session, deadline, [name], LifecycleRequest(label, None))
         outcomes = batch.run(dependents=dependents)
@@ -144,7 +144,7 @@ def restart(values: Values, dashboard: Dashboard) -> Prepared:
     name = values.text("node")
 
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
-        from composer.remote.lifecycle_batch import LifecycleBatch, LifecycleRequest
+        from composer.remote.systems.lifecycle_batch import LifecycleBatch, LifecycleRequest
 
         message = _restart_by_manager(ros, deadline, name)
         if message is not None:
@@ -161,9 +161,9 @@ def restart(values: Values, dashboard: Dashboard) -> Prepared:
 
 def _restart_by_manager(ros: RosGraphSide, deadline: Deadline, name: str) -> str | None:
     """Restart a node of a system; return the message of the manager, None if it has no manager."""
-    from composer.remote.managed_nodes import find_managed_nodes
     from composer.remote.name_matching import NotFoundError
-    from composer.remote.systems import Systems
+    from composer.remote.systems.managed_nodes import find_managed_nodes
+    from composer.remote.systems.managers import Systems
 
     systems = Systems(ros.session, deadline)
     try:
@@ -184,7 +184,7 @@ def command(values: Values, dashboard: Dashboard) -> Prepared:
     system, name = values.text("system"), values.choice("command", COMMANDS)
 
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
-        from composer.remote.systems import Systems
+        from composer.remote.systems.managers import Systems
 
         systems = Systems(ros.session, deadline)
         try:

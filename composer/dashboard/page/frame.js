@@ -1,6 +1,6 @@
 /** What is around every view: the bar with the state of the system, the views, the connection. */
 import { createAppearance } from "./graph/appearance.js";
-import { button, h, setText } from "./dom.js";
+import { button, h, refill, setText } from "./dom.js";
 import { bytes, duration, percent } from "./format.js";
 import { icon } from "./icons.js";
 import { attempt, confirmed, toast } from "./widgets/notices.js";
@@ -99,7 +99,7 @@ export function createFrame(app) {
     const [system] = data.systems;
     const active = data.nodes.filter((node) => node.state === "active").length;
     if (!system) {
-      setText(activity, `${data.nodes.length} nodes`);
+      setText(activity, data.nodes.length === 1 ? "1 node" : `${data.nodes.length} nodes`);
       activity.dataset.activity = "none";
       figures.replaceChildren();
       commands.replaceChildren();
@@ -123,7 +123,7 @@ export function createFrame(app) {
     const wanted = app.isReadOnly() ? [] : system.commands.filter((name) => (POSSIBLE[system.activity] ?? OTHERWISE).includes(name));
     if (commands.dataset.shown === wanted.join()) return;
     commands.dataset.shown = wanted.join();
-    commands.replaceChildren(...wanted.map((name) => {
+    refill(commands, ...wanted.map((name) => {
       const { label, ask, hint } = COMMANDS[name];
       const pressed = button([icon(name), h("span", {}, label)], () => attempt(pressed, async () => {
         if (ask && !(await confirmed(`${ask} ${system.name}?`, { verb: label, hint }))) return;

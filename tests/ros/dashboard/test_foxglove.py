@@ -1,6 +1,6 @@
 """The published client of the Foxglove protocol, with a running system and a hand-written node.
 
-Requires Node.js and ``npm ci --prefix tests/foxglove``; skipped otherwise.
+Requires Node.js and ``npm ci --prefix tests/foxglove``.
 """
 
 from __future__ import annotations
@@ -12,16 +12,18 @@ from typing import Any
 
 import pytest
 
+from tests.programs import require_package
 from tests.ros.support.commands import output_of
 from tests.ros.support.dashboard import Dashboard, dashboard
-from tests.ros.support.foxglove import IS_INSTALLED, FoxgloveClient, foxglove
-
-pytestmark = pytest.mark.skipif(
-    not IS_INSTALLED, reason="the client is not installed: npm ci --prefix tests/foxglove"
-)
+from tests.ros.support.foxglove import FOLDER, FoxgloveClient, foxglove
 
 PLANNER, CONTROLLER = "/planning/planner", "/control/motor_controller"
 SPEED = f"{PLANNER}.max_velocity"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def packages() -> None:
+    require_package(FOLDER, "@foxglove/ws-protocol")
 
 
 @pytest.fixture(scope="module")
@@ -63,13 +65,12 @@ def _named(found: list[dict[str, Any]], name: str) -> bool:
 
 def test_messages_are_those_that_were_published(client: FoxgloveClient) -> None:
     client.do("subscribe", topic="/lab/count")
-    values = []
+    values = [-1]
     for _ in range(20):
-        after = values[-1] if values else -1
-        message = client.message("/lab/count", lambda value, after=after: value["data"] > after)
+        message = client.message("/lab/count", lambda value: value["data"] > values[-1])
         values.append(message["value"]["data"])
     # The node counts what it sends.
-    assert values == list(range(values[0], values[0] + 20))
+    assert values[1:] == list(range(values[1], values[1] + 20))
     assert abs(message["timestamp"] / 1e9 - time.time()) < 10
     client.do("unsubscribe", subscription=message["subscription"])
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import socket
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 
@@ -16,6 +15,7 @@ from composer.dashboard.app import MAX_CONNECTIONS
 from composer.dashboard.server import BACKLOG, MAX_OPEN
 from tests.ros.support.commands import hand_written
 from tests.ros.support.dashboard import PATIENCE_S, Address, Browser, Dashboard, browser, dashboard
+from tests.ros.support.in_process import wait_until
 
 
 @pytest.fixture(scope="module")
@@ -132,26 +132,38 @@ def closed(opened: socket.socket) -> bool:
     return True
 
 
+def answer_of(opened: socket.socket) -> bytes:
+    """Return the beginning of what the server has answered; empty if that was lost."""
+    try:
+        return opened.recv(100)
+    except OSError:
+        return b""
+
+
 def test_half_open_and_many_connections(server: Dashboard, page: Browser) -> None:
     address = server.address
+    wait_until(lambda: page.ok("ping")["state"] == "ready", "the dashboard in the ROS graph")
     before = server.open_files()
     with ExitStack() as stack:
+        opened = []
         for number in range(1000):
             text = (b"", b"GET / HTTP/1.1\r\n", b"GET / HTTP/1.1\r\nX: " + b"x" * 1000)[number % 3]
             try:
-                stack.enter_context(raw(address, text))
+                opened.append(stack.enter_context(raw(address, text)))
             except ConnectionError:
                 continue  # the server has ended it already
             if number % 100 == 0:
                 assert page.ok("ping")  # a browser that is connected notices nothing
         assert server.open_files() <= before + MAX_OPEN + BACKLOG + 5
+        refused = (answer_of(one).startswith(b"HTTP/1.1 503 ") for one in opened[MAX_OPEN:])
+        assert any(refused)
+    wait_until(lambda: server.open_files() <= before + 5, "the files of the ended connections")
     slow = raw(address, b"GET / HTTP/1.1\r\nHost: x\r\nX: ")
-    started_s = time.monotonic()
+    assert answer_of(slow).startswith(b"HTTP/1.1 408 ")
     assert closed(slow)
-    assert time.monotonic() - started_s < 12
     with browser(address) as other:
         assert other.ok("ping")
-    assert server.open_files() <= before + 5
+    wait_until(lambda: server.open_files() <= before + 5, "the files of the ended connections")
 
 
 def test_odd_requests(server: Dashboard, page: Browser) -> None:
@@ -222,15 +234,17 @@ def test_a_client_that_never_reads_costs_no_memory(server: Dashboard, page: Brow
         page.until(count, bool)
         before_mb = server.memory_mb()
         received = len(page.updates)
-        page.wait(lambda: len(page.updates) > received + 60)  # six seconds of images
+
+        def images() -> int:
+            """Return how many images this browser has received since the others have stalled."""
+            return sum(
+                len(update["data"]["series"][0]["values"])
+                for update in page.updates[received:]
+                if update["sub"] == count and "data" in update
+            )
+
+        page.wait(lambda: images() > 150)  # of 30 a second
         assert server.memory_mb() < before_mb + 60
-        values = [
-            update["data"]["series"][0]
-            for update in page.updates
-            if update["sub"] == count and "data" in update
-        ]
-        passed_s = values[-1]["at_s"][-1] - values[0]["at_s"][0]
-        assert sum(len(item["values"]) for item in values) / passed_s > 20
         assert page.ok("ping")
 
 

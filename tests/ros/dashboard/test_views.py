@@ -32,10 +32,9 @@ def test_the_graph_has_both_and_measured_rates(page: Browser) -> None:
     assert data["nodes"][PLANNER]["state"] == "active"
     assert publisher in picture["things"]
     # No system reports the rate of the hand-written node, so it is measured.
-    measured = page.until(
-        live, lambda data: (data["topics"].get("/lab/count", {}).get("rate_hz") or 0) > 30
+    page.until(
+        live, lambda data: 30 < (data["topics"].get("/lab/count", {}).get("rate_hz") or 0) < 70
     )
-    assert measured["topics"]["/lab/count"]["rate_hz"] < 70
 
 
 def test_the_declared_graph_needs_no_running_node(page: Browser) -> None:
@@ -200,7 +199,10 @@ def test_a_service_is_called(page: Browser) -> None:
     data = page.until(
         channel, lambda data: {"/lab/add"} <= {item["name"] for item in data["services"]}
     )
-    assert all("get_parameters" not in item["name"] for item in data["services"])
+    hidden = ("get_parameters", "/pipeline/manager/")
+    assert not any(part in item["name"] for item in data["services"] for part in hidden)
+    everything = page.subscribe("services", hidden=True)
+    page.until(everything, lambda data: all(part in str(data["services"]) for part in hidden))
     reply = page.ok("call", service="/lab/add", request={"data": True})
     assert reply["response"] == {"success": True, "message": "switched"}
     plan = {"start": {"x": 0.0}, "goal": {"x": 1.0}, "max_velocity": 0.5}
@@ -241,15 +243,17 @@ def test_the_log_is_filtered(page: Browser) -> None:
 
 def test_timings_have_histograms(page: Browser) -> None:
     channel = page.subscribe("timing")
-    data = page.until(
-        channel, lambda data: data["systems"] and data["systems"][0]["callbacks"][0]["calls_hz"]
-    )
-    callbacks = {(item["node"], item["name"]): item for item in data["systems"][0]["callbacks"]}
-    control = callbacks[CONTROLLER, "control"]
+
+    def control_of(data: Any) -> Any:
+        callbacks = data["systems"][0]["callbacks"] if data["systems"] else []
+        found = {(item["node"], item["name"]): item for item in callbacks}
+        return found.get((CONTROLLER, "control"), {})
+
+    data = page.until(channel, lambda data: (control_of(data).get("calls_hz") or 0) > 20)
+    control = control_of(data)
     assert sum(count for _, count in control["histogram"]) == control["count"]
     bounds = [bound for bound, _ in control["histogram"]]
     assert bounds == sorted(bounds)
-    assert control["calls_hz"] > 20
 
 
 def test_forms_and_types(page: Browser) -> None:

@@ -4,17 +4,19 @@ import { readPicture } from "../graph/picture.js";
 import { createSearch } from "../graph/search.js";
 import { createSelection, listenToItems } from "../graph/selection.js";
 import { createViewport } from "../graph/viewport.js";
-import { button, empty, h, s } from "../dom.js";
+import { button, empty, h, refill, s } from "../dom.js";
 import { icon } from "../icons.js";
 import { pathOf } from "../router.js";
 import { dropNote, searchField, tabs } from "../widgets/parts.js";
 import { createArticle } from "./graph_details.js";
 import { createFilterMenu } from "./graph_filter.js";
 import { createOverlay } from "./graph_overlay.js";
+import { createZoomLevels } from "./graph_zoom.js";
 
 const ZOOM_STEP = 1.25;
 /** Until then, an empty graph may be one that is not discovered yet. */
 const DISCOVERY_MS = 4000;
+const MIN_SIDE = 128;
 const VIEWS = [
   ["nodes", "Nodes"],
   ["connections", "Ports"],
@@ -63,7 +65,7 @@ export function createView(app) {
   let wanted = null;
   let ends = [];
   let diagram = null;
-  let direction = "LR";
+  let place = {};
   let shownAt = 0;
 
   const current = () => picture;
@@ -102,9 +104,9 @@ export function createView(app) {
     const svg = s("svg", { class: "picture", viewBox: `0 0 ${data.width} ${data.height}`, role: "group", "aria-label": `${data.title}: ${data.view}` }, world);
     canvas.replaceChildren(svg);
     picture = readPicture(canvas);
-    viewport = createViewport(picture);
-    viewport.fit();
     overlay = createOverlay(picture, things);
+    viewport = createViewport(picture, createZoomLevels(picture));
+    viewport.fit();
     listenToItems(picture, selection, viewport);
     overlay.show(live);
     filter.update(picture);
@@ -128,7 +130,7 @@ export function createView(app) {
   /** The bring-up and the executors are in the file of a system. */
   function showLinks() {
     const possible = VIEWS.filter(([id, , isDeclared]) => !isDeclared || app.hello?.file || id === view);
-    links.replaceChildren(tabs("Diagram", possible.map(([id, label]) => [id, label, pathOf("graph", "", { view: id === "nodes" ? "" : id })]), view));
+    refill(links, tabs("Diagram", possible.map(([id, label]) => [id, label, pathOf("graph", "", { view: id === "nodes" ? "" : id })]), view));
   }
 
   addEventListener("hello", showLinks);
@@ -168,8 +170,8 @@ export function createView(app) {
     wanted = key;
     showLinks();
     canvas.replaceChildren(empty("Loading the graph …"));
-    direction = directionNow();
-    diagram = app.connection.subscribe("graph", { view, direction }, draw, { onerror: fail });
+    place = placeNow();
+    diagram = app.connection.subscribe("graph", { view, ...place }, draw, { onerror: fail });
     ends = [
       diagram,
       app.connection.subscribe("graph.live", {}, receiveLive),
@@ -177,15 +179,19 @@ export function createView(app) {
     document.addEventListener("keydown", onkey);
   }
 
-  /** A diagram from top to bottom is larger on a narrow screen. */
-  function directionNow() {
-    return canvas.clientWidth < canvas.clientHeight ? "TB" : "LR";
+  /** Return the size of the diagram on the screen, in steps, so that small changes move nothing. */
+  function placeNow() {
+    const step = (side) => Math.round(2 ** (Math.round(Math.log2(Math.max(side, MIN_SIDE)) * 4) / 4));
+    return { width: step(canvas.clientWidth), height: step(canvas.clientHeight) };
   }
 
   const resized = new ResizeObserver(() => {
-    if (ends.length === 0 || canvas.clientWidth === 0 || directionNow() === direction) return;
-    direction = directionNow();
-    diagram.update({ view, direction });
+    if (ends.length === 0 || canvas.clientWidth === 0) return;
+    viewport?.rescale();
+    const now = placeNow();
+    if (now.width === place.width && now.height === place.height) return;
+    place = now;
+    diagram.update({ view, ...place });
   });
   resized.observe(canvas);
 

@@ -30,7 +30,11 @@ export function createOverlay(picture, things) {
     const rate = texts.find((text) => text.textContent === RATE_PLACEHOLDER);
     if (rate) rates.set(line.key, rate);
   }
-  for (const text of rates.values()) text.textContent = "";
+  for (const text of rates.values()) {
+    text.textContent = "";
+    text.parentElement.classList.add("unmeasured");
+    text.parentElement.classList.toggle("alone", text.parentElement.querySelectorAll("text").length === 1);
+  }
 
   function nodeOf(item, texts) {
     const box = boxOf(item);
@@ -82,6 +86,7 @@ export function createOverlay(picture, things) {
       for (const [key, text] of rates) {
         const rate = rateOf(key, live);
         setText(text, rate === null ? "" : hertz(rate));
+        text.parentElement.classList.toggle("unmeasured", rate === null);
       }
       for (const line of picture.lines) {
         const edge = live.edges[line.key];

@@ -38,7 +38,9 @@ export function createImage(app, topic) {
     canvas.height = drawable.height;
     canvas.getContext("2d").drawImage(drawable, 0, 0);
     drawable.close();
-    setText(status, `${header.source_width} × ${header.source_height} ${header.source_encoding}   ${timeOfDay(header.at_s)}`);
+    // The server does not decode compressed images, so it does not know their size.
+    const { source_width: sourceWidth = canvas.width, source_height: sourceHeight = canvas.height } = header;
+    setText(status, `${sourceWidth} × ${sourceHeight} ${header.source_encoding}   ${timeOfDay(header.at_s)}`);
     drops.show(header.dropped, "only as many as chosen are shown in a second");
   }
 

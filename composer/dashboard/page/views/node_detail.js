@@ -1,5 +1,5 @@
 /** The details of one node: what it does, what it did wrong, and what can be done with it. */
-import { button, empty, h } from "../dom.js";
+import { button, empty, h, refill } from "../dom.js";
 import { count, duration, hertz, milliseconds, percent } from "../format.js";
 import { pathOf } from "../router.js";
 import { asked, attempt, confirmed, toast } from "../widgets/notices.js";
@@ -17,6 +17,8 @@ export function createNodeDetail(app) {
   const actions = h("div", { class: "actions" });
   const figures = h("div");
   const callbacks = h("div");
+  // It stays when its content is replaced, so that it keeps its focus.
+  const timings = h("div", { class: "scroll-x", tabindex: "0", role: "region", "aria-label": "Callbacks" });
   const declared = h("div");
   let name = "";
   let timing = null;
@@ -107,7 +109,7 @@ export function createNodeDetail(app) {
     const buttons = TRANSITIONS.filter((transition) => legal.includes(transition)).map((transition) =>
       acting(transition, "transition", { transition }, transition === "shutdown"));
     if (node.system) buttons.push(acting("restart", "restart", {}, false));
-    actions.replaceChildren(...buttons);
+    refill(actions, ...buttons);
   }
 
   function acting(label, op, args, isFinal) {
@@ -155,16 +157,13 @@ export function createNodeDetail(app) {
       h("th", { scope: "row" }, `${callback.kind} ${callback.name}`),
       [hertz(callback.calls_hz), milliseconds(callback.mean_ms), milliseconds(callback.p99_ms), milliseconds(callback.longest_ms)].map((text) => h("td", { class: "number" }, text)),
     );
-    callbacks.replaceChildren(section("Callbacks", h(
-      "div",
-      { class: "scroll-x", tabindex: "0", role: "region", "aria-label": "Callbacks" },
-      h(
-        "table",
-        { class: "small" },
-        h("thead", {}, h("tr", {}, ["Callback", "Calls", "Mean", "p99", "Max"].map((text, index) => h("th", { scope: "col", class: index ? "number" : null }, text)))),
-        h("tbody", {}, own.map(row)),
-      ),
-    )));
+    timings.replaceChildren(h(
+      "table",
+      { class: "small" },
+      h("thead", {}, h("tr", {}, ["Callback", "Calls", "Mean", "p99", "Max"].map((text, index) => h("th", { scope: "col", class: index ? "number" : null }, text)))),
+      h("tbody", {}, own.map(row)),
+    ));
+    if (!timings.isConnected) callbacks.replaceChildren(section("Callbacks", timings));
   }
 
   async function showDeclared(node) {

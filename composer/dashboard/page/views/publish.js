@@ -30,7 +30,7 @@ export function createPublish(app, topic) {
       const message = form.value();
       if (!message) return;
       const { subscriptions } = await app.connection.request("publish", { topic: topic.name, type, message });
-      toast(`Published on ${topic.name} to ${subscriptions} subscription${subscriptions === 1 ? "" : "s"}`);
+      toast(`Published on ${topic.name} to ${counted(subscriptions)}`);
     }
 
     function start() {
@@ -38,7 +38,7 @@ export function createPublish(app, topic) {
       if (!message || !rate.reportValidity()) return;
       const params = { topic: topic.name, type, message, rate_hz: Number(rate.value), qos: null };
       repeating = app.connection.subscribe("publishing", params, ({ count, subscriptions }) => {
-        setText(status, `${count} published to ${subscriptions} subscriptions`);
+        setText(status, `${count} published to ${counted(subscriptions)}`);
       }, {
         once: true,
         onerror(error) {
@@ -58,4 +58,8 @@ export function createPublish(app, topic) {
 
   load();
   return { element, end: () => repeating?.end() };
+}
+
+function counted(subscriptions) {
+  return `${subscriptions} subscription${subscriptions === 1 ? "" : "s"}`;
 }

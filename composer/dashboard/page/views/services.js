@@ -25,7 +25,7 @@ export function createView(app) {
     keyOf: ({ kind, name }) => `${kind} ${name}`,
     hrefOf: ({ kind, name }) => pathOf(`${kind}s`, name),
     sortBy: "name",
-    nothing: () => (searched ? "None matches." : ["There are no services or actions.", "Those of parameters and lifecycles are hidden."]),
+    nothing: () => (searched ? "None matches." : ["There are no services or actions.", "Those of parameters, lifecycles and managers are hidden."]),
   });
   const detail = h("aside", { class: "detail", "aria-label": "Call", hidden: true });
   const body = split({
@@ -33,7 +33,7 @@ export function createView(app) {
       "div",
       { class: "toolbar" },
       searchField("Search services and actions ( / )", (text) => { searched = text; update(); }),
-      toggle("Show hidden", false, (on) => { withHidden = on; subscription?.update({ hidden: on }); }, { title: "Show services of parameters, lifecycles and tools" }),
+      toggle("Show hidden", false, (on) => { withHidden = on; subscription?.update({ hidden: on }); }, { title: "Show services of parameters, lifecycles, managers and tools" }),
     ),
     list: table.element,
     detail,

@@ -1,10 +1,10 @@
 /** The topics: figures of those on the screen, and for one of them echo, plot, image and publish. */
-import { empty, h } from "../dom.js";
+import { button, empty, h, refill } from "../dom.js";
 import { bandwidth, count, hertz } from "../format.js";
 import { pathOf } from "../router.js";
 import { detailHead, facts, section, searchField, matches, split, tabs, toggle } from "../widgets/parts.js";
 import { createPlot, nameOf } from "../widgets/plot.js";
-import { qosText } from "../widgets/qos.js";
+import { qosText, sharedQosText } from "../widgets/qos.js";
 import { createTable } from "../widgets/table.js";
 import { createEcho } from "./echo.js";
 import { createImage } from "./image.js";
@@ -25,6 +25,7 @@ export function createView(app) {
     { id: "lost", label: "Lost", number: true, level: 3, value: (topic) => figure(topic, "lost") ?? null, text: (topic) => count(figure(topic, "lost")), tone: (topic) => (figure(topic, "lost") > 0 ? "warn" : "") },
     { id: "publishers", label: "Pub", number: true, level: 3, value: (topic) => topic.publishers.length, text: (topic) => count(topic.publishers.length) },
     { id: "subscriptions", label: "Sub", number: true, level: 3, value: (topic) => topic.subscriptions.length, text: (topic) => count(topic.subscriptions.length) },
+    { id: "qos", label: "QoS", level: 3, text: (topic) => sharedQosText([...topic.publishers, ...topic.subscriptions]) },
   ];
   const table = createTable({
     label: "Topics",
@@ -40,7 +41,7 @@ export function createView(app) {
       "div",
       { class: "toolbar" },
       searchField("Search topics and types ( / )", (text) => { searched = text; update(); }),
-      toggle("Show hidden", false, (on) => { withHidden = on; measure(true); }, { title: "Show topics of services, actions and tools" }),
+      toggle("Show hidden", false, (on) => { withHidden = on; measure(true); }, { title: "Show topics of services, actions, managers and tools" }),
     ),
     list: table.element,
     detail,
@@ -118,7 +119,7 @@ export function createView(app) {
       part.update(topic);
       return;
     }
-    detail.replaceChildren(detailHead(name, "/topics"), h("p", { class: "type" }, topic.types.join(", ")), tabs("Topic", entries, tab), part.element);
+    refill(detail, detailHead(name, "/topics"), h("p", { class: "type" }, topic.types.join(", ")), tabs("Topic", entries, tab), part.element);
   }
 
   function make(topic) {
@@ -149,13 +150,16 @@ export function createView(app) {
       },
     });
     const fields = h("select", {
-      "aria-label": "Add a field",
-      onchange: () => {
-        toggleSeries({ topic: name, field: fields.value });
-        fields.selectedIndex = 0;
-        app.go(link("plot"), { replace: true });
-      },
+      "aria-label": "Field to add",
+      // The arrow keys change the field, so only the button adds it.
+      onchange: () => { add.disabled = fields.value === ""; },
     }, h("option", { value: "" }, "Add a field …"));
+    const add = button("Add", () => {
+      const wanted = { topic: name, field: fields.value };
+      if (series.some((one) => nameOf(one) === nameOf(wanted))) return;
+      toggleSeries(wanted);
+      app.go(link("plot"), { replace: true });
+    }, { disabled: true });
     const type = topics.find((topic) => topic.name === name).types[0];
     app.connection.request("fields", { type }).then(
       ({ numeric }) => fields.append(...numeric.map((field) => h("option", { value: field }, field))),
@@ -167,7 +171,7 @@ export function createView(app) {
       hint.hidden = series.length > 0;
       plot.element.hidden = series.length === 0;
     };
-    const box = h("div", { class: "plotting" }, h("div", { class: "toolbar" }, fields), hint, plot.element);
+    const box = h("div", { class: "plotting" }, h("div", { class: "toolbar" }, fields, add), hint, plot.element);
     queueMicrotask(update);
     return { element: box, end: plot.end, update };
   }
@@ -180,7 +184,14 @@ export function createView(app) {
       h("h4", {}, h("a", { href: pathOf("nodes", end.node) }, end.node)),
       facts([["type", end.type], ["QoS", qosText(end.qos ?? {})]]),
     )));
-    const update = (now) => box.replaceChildren(ends("Publishers", now.publishers), ends("Subscriptions", now.subscriptions));
+    let shown = "";
+    // Only what has changed is replaced, or a link would lose its focus every second.
+    const update = (now) => {
+      const wanted = JSON.stringify([now.publishers, now.subscriptions]);
+      if (wanted === shown) return;
+      shown = wanted;
+      refill(box, ends("Publishers", now.publishers), ends("Subscriptions", now.subscriptions));
+    };
     update(topic);
     return { element: box, end() {}, update };
   }

@@ -17,13 +17,15 @@ export function toast(text, { tone = "good", hint = "" } = {}) {
 
 /** Run an action of a button: it is disabled meanwhile, and an error is shown. */
 export async function attempt(pressed, action) {
-  pressed.disabled = true;
+  if (pressed.getAttribute("aria-disabled") === "true") return;
+  // Not `disabled`, which takes the focus away.
+  pressed.setAttribute("aria-disabled", "true");
   try {
     await action();
   } catch (error) {
     toast(error.message, { tone: "bad", hint: error.hint });
   } finally {
-    pressed.disabled = false;
+    pressed.removeAttribute("aria-disabled");
   }
 }
 

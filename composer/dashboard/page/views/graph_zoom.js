@@ -1,0 +1,163 @@
+/**
+ * Leaves out of the diagram what is too small to read, and keeps names in a readable size.
+ *
+ * From afar, a box has only its name and its state. Names that have no room are left out: those of
+ * frames come first, then those of nodes.
+ */
+import { isNode } from "../graph/filter.js";
+
+/** From there on, everything is shown as it is drawn. */
+const NEAR_PIXELS_PER_UNIT = 0.7;
+/** Names have the same place within a step. */
+const STEP = 1.04;
+/** Sizes in pixels of the screen. */
+const NODE = { font: 11, height: 17, padding: 5 };
+const CHANNEL = { font: 10, height: 14, padding: 4 };
+const FRAME = { font: 12, height: 15, padding: 0 };
+const INNER_FRAME = { font: 10, height: 12, padding: 0 };
+const MARK = 10;
+const HEAD = 6;
+const GAP = 1;
+/** The size of a state's shape and of an arrow head as they are drawn, in SVG units. */
+const DRAWN_MARK = 12;
+const DRAWN_HEAD = 8;
+
+const measuring = document.createElement("canvas").getContext("2d");
+
+/** Return a function that shows the picture for a number of pixels per unit. */
+export function createZoomLevels(picture) {
+  const { svg, world } = picture;
+  const font = getComputedStyle(svg.querySelector("text") ?? svg).fontFamily;
+  const frames = framesOf(picture);
+  const items = [...picture.items.values()].filter((item) => item.kind !== "port").map(itemOf);
+  const named = [
+    ...frames.filter((frame) => frame.isOuter),
+    ...items.filter(({ item }) => isNode(item)),
+    ...items.filter(({ item }) => !isNode(item)),
+    ...frames.filter((frame) => !frame.isOuter),
+  ];
+  const heads = [...svg.querySelectorAll("marker")];
+  for (const entry of named) {
+    measuring.font = `${entry.style.font}px ${font}`;
+    entry.width = measuring.measureText(entry.text.textContent).width + 2 * entry.style.padding + (entry.mark ? MARK + 2 : 0);
+  }
+  let shown = null;
+
+  return (pixelsPerUnit) => {
+    const isFar = pixelsPerUnit < NEAR_PIXELS_PER_UNIT;
+    const level = isFar ? Math.floor(Math.log(pixelsPerUnit) / Math.log(STEP)) : "near";
+    if (level === shown) return;
+    shown = level;
+    svg.classList.toggle("far", isFar);
+    const unit = isFar ? STEP ** -level : 1;
+    world.style.setProperty("--unit", unit);
+    for (const head of heads) {
+      head.setAttribute("markerWidth", Math.max(DRAWN_HEAD, HEAD * unit));
+      head.setAttribute("markerHeight", Math.max(DRAWN_HEAD, HEAD * unit));
+    }
+    if (isFar) showFar(named, unit, svg.viewBox.baseVal.width);
+    else showNear(named);
+  };
+}
+
+function itemOf(item) {
+  const shapes = [...item.element.querySelectorAll(".shape")];
+  const [text, state] = item.element.querySelectorAll("text");
+  const box = shapes[0].getBBox();
+  const center = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
+  const mark = state ? item.element.querySelector(".mark") : null;
+  return { item, shapes, text, box, center, style: isNode(item) ? NODE : CHANNEL, mark };
+}
+
+function framesOf(picture) {
+  const found = picture.frames.map(({ element }) => ({
+    text: element.querySelector("text"),
+    element,
+    box: element.querySelector("rect").getBBox(),
+  }));
+  for (const frame of found) {
+    frame.isOuter = !found.some((other) => other !== frame && contains(other.box, frame.box));
+    frame.style = frame.isOuter ? FRAME : INNER_FRAME;
+  }
+  return found.filter(({ text }) => text);
+}
+
+function showFar(named, unit, right) {
+  // No name covers the box of a node, and that of a channel does not hide another one.
+  const boxesOf = (wanted) => named.filter(({ item }) => item && wanted(item)).map(({ box }) => box);
+  const taken = boxesOf(isNode);
+  const channels = new Map(boxesOf((item) => !isNode(item)).map((box) => [box, innerHalf(box)]));
+  for (const entry of named) {
+    const place = placeOf(entry, unit, right);
+    const isFree = (wanted, gap) => !taken.some((other) => other !== entry.box && overlap(other, wanted, gap));
+    const hidesChannel = () => [...channels].some(([box, inner]) => box !== entry.box && overlap(inner, place, 0));
+    const isShown = isFree(place, GAP * unit) && !(entry.style === CHANNEL && hidesChannel());
+    if (isShown) taken.push(place);
+    if (!entry.item) {
+      drawTitle(entry, isShown ? place : null, unit);
+      continue;
+    }
+    drawItem(entry, isShown ? place : null, unit);
+    entry.item.element.classList.toggle("covered", !isShown && !isFree(innerHalf(entry.box), 0) && !isNode(entry.item));
+  }
+}
+
+/** A name is in the middle of its box, within the picture; that of an outer frame is above it. */
+function placeOf({ item, box, center, style, width, isOuter }, unit, right) {
+  const size = { width: width * unit, height: style.height * unit };
+  if (item) {
+    const x = Math.max(Math.min(center.x - size.width / 2, right - size.width), 0);
+    return { x, y: center.y - size.height / 2, ...size };
+  }
+  return { x: box.x + (isOuter ? 0 : 3 * unit), y: isOuter ? box.y - size.height : box.y + unit, ...size };
+}
+
+function drawItem({ item, shapes, text, box, center, style, mark }, place, unit) {
+  item.element.classList.toggle("nameless", !place);
+  const width = place ? Math.max(place.width / box.width, 1) : 1;
+  const height = place ? Math.max(place.height / box.height, 1) : 1;
+  const shift = place ? place.x + place.width / 2 - center.x : 0;
+  for (const shape of shapes) shape.style.transform = `translate(${shift}px) scale(${width}, ${height})`;
+  if (!place) return;
+  const left = mark ? (MARK + 2) * unit : 0;
+  text.style.fontSize = `${style.font * unit}px`;
+  text.style.transform = `translate(${shift + left / 2}px, ${center.y - Number(text.getAttribute("y"))}px)`;
+  if (mark) mark.style.transform = `translate(${place.x + style.padding * unit}px, ${center.y - (MARK * unit) / 2}px) scale(${(MARK * unit) / DRAWN_MARK})`;
+}
+
+function drawTitle({ element, text, style }, place, unit) {
+  element.classList.toggle("nameless", !place);
+  if (!place) return;
+  text.style.fontSize = `${style.font * unit}px`;
+  const x = place.x - Number(text.getAttribute("x"));
+  const y = place.y + (style.height / 2) * unit - Number(text.getAttribute("y"));
+  text.style.transform = `translate(${x}px, ${y}px)`;
+}
+
+function showNear(named) {
+  for (const { item, element, shapes = [], text, mark } of named) {
+    (element ?? item.element).classList.remove("nameless", "covered");
+    for (const part of [...shapes, text, mark]) {
+      part?.style.removeProperty("transform");
+      part?.style.removeProperty("font-size");
+    }
+  }
+}
+
+function innerHalf({ x, y, width, height }) {
+  return { x: x + width / 4, y: y + height / 4, width: width / 2, height: height / 2 };
+}
+
+function contains(outer, inner) {
+  return (
+    outer.x <= inner.x && outer.x + outer.width >= inner.x + inner.width &&
+    outer.y <= inner.y && outer.y + outer.height >= inner.y + inner.height
+  );
+}
+
+function overlap(one, other, gap) {
+  return (
+    one.x < other.x + other.width + gap && other.x < one.x + one.width + gap &&
+    one.y < other.y + other.height + gap && other.y < one.y + one.height + gap
+  );
+}
