@@ -53,6 +53,22 @@ class GoalRejected(CallError):
     """The action server rejected the goal."""
 
 
+class TransformError(BehaviorError):
+    """A transform between two frames is not available."""
+
+
+class TransformLookupError(TransformError):
+    """A frame is not known: nothing has broadcast it yet."""
+
+
+class TransformConnectivityError(TransformError):
+    """Two frames are in different trees."""
+
+
+class TransformExtrapolationError(TransformError):
+    """The time is earlier or later than the transforms that were received."""
+
+
 class Publisher(Protocol):
     """A publisher port. Messages published while the node is inactive are dropped and counted."""
 
@@ -180,6 +196,49 @@ class Clock(Protocol):
         """Sleep without blocking. Raises CallCancelled if the node leaves the active state."""
 
 
+class Transforms(Protocol):
+    """The frames of tf2, for a node with `transforms`.
+
+    A transform is a geometry_msgs/msg/TransformStamped. It maps coordinates in the frame
+    ``source`` to those in the frame ``target``. A ``stamp`` is a builtin_interfaces/msg/Time, such
+    as that of a message header; None, or zero as in tf2, is the latest time at which all transforms
+    between the frames are known. Between two received transforms, values are interpolated.
+    """
+
+    def lookup(self, target: str, source: str, *, stamp: Any = None) -> Any:
+        """Return the transform from ``source`` to ``target``, a TransformStamped.
+
+        Raises TransformLookupError, TransformConnectivityError, TransformExtrapolationError.
+        """
+
+    def wait(
+        self, target: str, source: str, *, stamp: Any = None, timeout_ms: float = 5000.0
+    ) -> Awaitable[Any]:
+        """Wait for a transform up to the timeout, in real time, and return it.
+
+        Raises what ``lookup`` raises when the time is over, and CallCancelled.
+        """
+
+    def can_lookup(self, target: str, source: str, *, stamp: Any = None) -> bool:
+        """Return whether ``lookup`` would return a transform now."""
+
+    def transform(self, message: Any, target: str) -> Any:
+        """Return a message of geometry_msgs in another frame, at the time of its header.
+
+        The message is a PointStamped, Vector3Stamped, QuaternionStamped or PoseStamped; a vector is
+        only rotated. Raises what ``lookup`` raises, and TypeError for other messages.
+        """
+
+    def broadcast(self, child: str, transform: Any, *, stamp: Any = None) -> None:
+        """Broadcast the transform from a declared frame to its parent.
+
+        ``transform`` is a geometry_msgs/msg/Transform; by default, ``stamp`` is the current time.
+        The frame is declared in `static` or `dynamic`, without values and without `from`; that
+        determines the topic. Raises ValueError for another frame, or a rotation that is not
+        a unit quaternion.
+        """
+
+
 class Behavior:
     """Base class of behaviors: the attributes that the composer sets before ``on_configure``.
 
@@ -198,6 +257,7 @@ class Behavior:
         "node",
         "parameters",
         "publishers",
+        "transforms",
     )
 
     name: str
@@ -207,6 +267,7 @@ class Behavior:
     action_clients: Any  # self.action_clients.navigate: an ActionClient
     log: Logger
     clock: Clock
+    transforms: Transforms  # only if the node has `transforms`
     node: Any  # an rclpy Node for libraries that need one; what it creates follows the lifecycle
 
 

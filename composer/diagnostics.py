@@ -32,7 +32,7 @@ class Rule:
 
     ``code`` never changes its meaning and is never reused. Bands: 0xx reading, 1xx schema,
     2xx names and references, 3xx types, QoS and wiring, 4xx lifecycle, timers, parameters and
-    behaviors, 5xx style, 9xx internal.
+    behaviors, 5xx style and transforms, 9xx internal.
     """
 
     code: str

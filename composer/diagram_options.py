@@ -13,6 +13,7 @@ class View(StrEnum):
     LIFECYCLE = "lifecycle"
     DEPLOYMENT = "deployment"
     STATES = "states"
+    FRAMES = "frames"
 
 
 class Format(StrEnum):

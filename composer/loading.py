@@ -14,6 +14,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import TypeAlias
 
+from composer.analysis.follow_ups import without_follow_ups
 from composer.assembly import NodeTypeFile, assemble, inherit
 from composer.assembly.deduplication import add_include_labels, deduplicate
 from composer.diagnostics import Diagnostic, Severity, has_errors, in_order, registered_rules
@@ -28,12 +29,15 @@ from composer.project.rule_selection import apply_rule_settings, check_rule_sett
 from composer.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
 from composer.resolve.parameter_files.rules import PARAMETER_SUBSTITUTION
 from composer.rules import Context, all_checks, run_checks
-from composer.rules.unused_ignore import without_ignored
-from composer.rules.unused_node_type import unused_node_types
+from composer.rules.unused.unused_ignore import without_ignored
+from composer.rules.unused.unused_node_type import unused_node_types
 from composer.schema import check_schema, kind_of, kinds
 from composer.schema.kinds import check_kind
 from composer.source import SourceFile, Span
 from composer.tree import Mapping
+
+#: What identifies a diagnostic across the systems in which it appears: its rule and place.
+_Identity: TypeAlias = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +56,9 @@ class LoadResult:
     node_types: NodeTypes
     interfaces: Interfaces
     tree: Mapping | None = None
+    #: What was left out because it follows from another diagnostic, also if other systems with
+    #: the same node types report it.
+    follow_ups: frozenset[_Identity] = frozenset()
 
     @property
     def is_valid(self) -> bool:
@@ -190,6 +197,7 @@ def _run_pipeline(
 
     # Resolve: tree to model.
     system = None
+    follow_ups: frozenset[_Identity] = frozenset()
     if merged.expanded is not None:
         system, found = resolve(
             merged.expanded,
@@ -216,6 +224,10 @@ def _run_pipeline(
         )
         diagnostics += run_checks(context)
         diagnostics = deduplicate(diagnostics, system.nodes)
+        of_project = definitions.project.diagnostics
+        kept = without_follow_ups(diagnostics, context, of_project)
+        follow_ups = frozenset(map(_identity, diagnostics)).difference(map(_identity, kept))
+        diagnostics = kept
 
     # Selection: comments in the files and settings of the project silence diagnostics.
     diagnostics = add_include_labels(diagnostics, merged.included)
@@ -237,6 +249,7 @@ def _run_pipeline(
         definitions.node_types,
         definitions.interfaces,
         merged.tree,
+        follow_ups,
     )
 
 
@@ -312,16 +325,15 @@ def collect_diagnostics(results: Collection[LoadResult]) -> list[Diagnostic]:
             if diagnostic.primary.file == result.source:
                 reporter[_identity(diagnostic)] = result
     diagnostics = project_diagnostics(results)
+    follow_ups = frozenset().union(*(result.follow_ups for result in results))
     for result in results:
         diagnostics += (
             diagnostic
             for diagnostic in result.diagnostics
-            if reporter.setdefault(_identity(diagnostic), result) is result
+            if _identity(diagnostic) not in follow_ups
+            and reporter.setdefault(_identity(diagnostic), result) is result
         )
     return in_order(diagnostics)
-
-
-_Identity: TypeAlias = tuple[str, str]
 
 
 def _identity(diagnostic: Diagnostic) -> _Identity:

@@ -48,6 +48,11 @@ class Span:
         """Return the part that begins ``start`` characters into this span."""
         return Span(self.file, self.line, self.column + start, max(length, 1))
 
+    @property
+    def text(self) -> str:
+        """What stands there, without the quotation marks around it."""
+        return self.file.line(self.line)[self.column - 1 :][: self.length].strip("'\"")
+
     def __str__(self) -> str:
         return f"{self.file.path}:{self.line}:{self.column}"
 

@@ -7,6 +7,7 @@ hardly grows with the number of names.
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -19,6 +20,45 @@ LONGEST_NAME = 255
 
 _FEW = 60
 _NEIGHBORS = 12  # number of candidates on each side, of many names
+
+
+#: Shortest word in which one wrong letter is a typo: camera_l and camera_r are two cameras.
+_SHORTEST_TYPO = 4
+_SWAPPED = 2
+_WORD = re.compile(r"[^\W\d_]+")
+
+
+def is_typo(name: str, other: str) -> bool:
+    """Return whether one letter of a longer word of ``name`` is wrong, missing, surplus or swapped.
+
+    Names that differ in a digit, or at the end as singular and plural do, are different on purpose.
+    """
+    if abs(len(name) - len(other)) > 1:
+        return False
+    start = _shared(name, other)
+    end = _shared(name[start:][::-1], other[start:][::-1])
+    parts = (name[start : len(name) - end], other[start : len(other) - end])
+    in_word = _is_in_long_word(name, start) or _is_in_long_word(other, start)
+    if not in_word or not all(map(_is_letters, parts)):
+        return False
+    if len(name) == len(other):
+        return len(parts[0]) == 1 or (len(parts[0]) == _SWAPPED and parts[0] == parts[1][::-1])
+    return end > 0 and max(map(len, parts)) == 1
+
+
+def _shared(name: str, other: str) -> int:
+    """Return the number of letters that the names have in common at the start."""
+    pairs = enumerate(zip(name, other, strict=False))
+    return next((at for at, (a, b) in pairs if a != b), min(len(name), len(other)))
+
+
+def _is_in_long_word(name: str, at: int) -> bool:
+    words = (word for word in _WORD.finditer(name) if word.start() <= at <= word.end())
+    return any(len(word[0]) >= _SHORTEST_TYPO for word in words)
+
+
+def _is_letters(part: str) -> bool:
+    return all(letter.isalpha() or letter == "_" for letter in part)
 
 
 class Vocabulary:

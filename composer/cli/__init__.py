@@ -1,7 +1,7 @@
 """The command line: it parses arguments, calls the packages below and prints results.
 
 stdout is data, stderr is everything else. Exit codes: 0 success, 1 errors in files or a failed
-node, 2 usage error, 3 internal error.
+node, 2 usage error, 3 internal error, 78 errors in the files of a system to run.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 from composer.characters import escape_line
 from composer.cli.support.errors import FAILED, CommandError
-from composer.cli.support.streams import TolerantStream, drop
+from composer.cli.support.output.streams import TolerantStream, drop
 
 INTERNAL = 3
 INTERRUPTED = 128 + signal.SIGINT

@@ -5,46 +5,58 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Annotated
+from itertools import takewhile
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from composer.cli.support.options import examples
-from composer.cli.support.terminal import write
+from composer.cli.support.output.terminal import write
 
-#: Each command and its module in composer.cli.commands. The module has an ``app`` with subcommands,
-#: or a function with the name of the command and the epilogs of its commands in ``EPILOGS``.
+#: The commands under the headings of the help, each with its module in composer.cli.commands. A
+#: module has an ``app`` with subcommands, or a function with the name of the command and the
+#: epilogs of its commands in ``EPILOGS``.
 COMMANDS = {
-    "run": "run",
-    "ps": "ps",
-    "top": "top",
-    "logs": "logs",
-    "up": "manage",
-    "down": "manage",
-    "pause": "manage",
-    "resume": "manage",
-    "reset": "manage",
-    "restart": "restart",
-    "validate": "validate",
-    "config": "config",
-    "graph": "graph",
-    "diff": "diff",
-    "dashboard": "dashboard",
-    "import": "import_nodes",
-    "export": "export",
-    "new": "new",
-    "interfaces": "interfaces",
-    "lifecycle": "lifecycle",
-    "node": "node",
-    "topic": "topic",
-    "service": "service",
-    "action": "action",
-    "param": "param",
-    "interface": "interface",
-    "doctor": "doctor",
-    "rule": "rule",
-    "schema": "schema",
+    "Commands for systems": {
+        "run": "systems.run",
+        "ps": "systems.ps",
+        "top": "systems.top",
+        "logs": "systems.logs",
+        "dashboard": "systems.dashboard",
+        "up": "systems.manage",
+        "down": "systems.manage",
+        "pause": "systems.manage",
+        "resume": "systems.manage",
+        "reset": "systems.manage",
+        "restart": "systems.restart",
+        "sync": "systems.sync",
+        "discovery-server": "systems.discovery_server",
+    },
+    "Commands for files": {
+        "validate": "files.validate",
+        "rule": "files.rule",
+        "config": "files.config",
+        "graph": "files.graph",
+        "diff": "files.diff",
+        "new": "files.new",
+        "import": "files.import_nodes",
+        "export": "files.export",
+        "interfaces": "files.interfaces",
+        "schema": "files.schema",
+    },
+    "Commands for ROS 2": {
+        "lifecycle": "ros.lifecycle",
+        "node": "ros.node",
+        "topic": "ros.topic",
+        "service": "ros.service",
+        "action": "ros.action",
+        "param": "ros.param",
+        "interface": "ros.interface",
+        "doctor": "ros.doctor",
+    },
 }
+_MODULES = {name: module for group in COMMANDS.values() for name, module in group.items()}
 
 EPILOG = examples(
     "compose run pipeline                        run an example system",
@@ -55,6 +67,19 @@ EPILOG = examples(
 )
 
 
+class _Program(TyperGroup):
+    """The program; its help lists the commands under headings."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - as in the base
+        """Write the commands to the help page."""
+        width = formatter.width - max(map(len, self.commands)) - 6  # as typer does
+        for heading, names in COMMANDS.items():
+            with formatter.section(heading):
+                formatter.write_dl(
+                    [(name, self.commands[name].get_short_help_str(width)) for name in names]
+                )
+
+
 def application(arguments: Sequence[str] = ()) -> typer.Typer:
     """Return the application for a command line.
 
@@ -62,6 +87,7 @@ def application(arguments: Sequence[str] = ()) -> typer.Typer:
     commands run.
     """
     app = typer.Typer(
+        cls=_Program,
         no_args_is_help=True,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
@@ -76,16 +102,19 @@ def application(arguments: Sequence[str] = ()) -> typer.Typer:
 def _needed_commands(arguments: Sequence[str]) -> Sequence[str]:
     if list(arguments) == ["--version"]:
         return ()
-    command = next((text for text in arguments if not text.startswith("-")), None)
-    return (command,) if command in COMMANDS else tuple(COMMANDS)
+    options = list(takewhile(lambda text: text.startswith("-"), arguments))
+    command = next(iter(arguments[len(options) :]), None)
+    if command not in _MODULES or not {"-h", "--help"}.isdisjoint(options):
+        return tuple(_MODULES)
+    return (command,)
 
 
 def _add(app: typer.Typer, name: str) -> None:
-    module = import_module(f"composer.cli.commands.{COMMANDS[name]}")
+    module = import_module(f"composer.cli.commands.{_MODULES[name]}")
     if hasattr(module, "app"):
         app.add_typer(module.app, name=name)
     else:
-        app.command(name, epilog=module.EPILOGS[name])(getattr(module, name))
+        app.command(name, epilog=module.EPILOGS[name])(getattr(module, name.replace("-", "_")))
 
 
 def _print_version(requested: bool) -> None:
@@ -122,5 +151,6 @@ def compose(
     A system is declared in YAML files. The files are validated, and the nodes run as lifecycle
     nodes in one process. All ROS 2 tools work with a running system.
 
-    Exit codes: 0 success, 1 errors in files or a failed node, 2 usage error, 3 internal error.
+    Exit codes: 0 success, 1 errors in files or a failed node, 2 usage error, 3 internal error; 78
+    if 'compose run' cannot start because of errors in files.
     """

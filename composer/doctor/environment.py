@@ -64,6 +64,8 @@ def _discovery(environment: Mapping[str, str]) -> Iterator[CheckResult]:
             "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: no other process is discovered",
             "unset it, or set it to LOCALHOST or SUBNET",
         )
+    elif environment.get("ROS_STATIC_PEERS"):
+        yield ok(AREA, f"ROS_STATIC_PEERS {environment['ROS_STATIC_PEERS']}")
     elif reach == "LOCALHOST":
         yield note(
             AREA,
@@ -76,7 +78,8 @@ def _discovery(environment: Mapping[str, str]) -> Iterator[CheckResult]:
             "ROS_LOCALHOST_ONLY is deprecated and overrides ROS_AUTOMATIC_DISCOVERY_RANGE",
             "unset it and set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST",
         )
-    if environment.get("ROS_DISCOVERY_SERVER"):
+    is_super_client = environment.get("ROS_SUPER_CLIENT", "").lower() in ("true", "1")
+    if environment.get("ROS_DISCOVERY_SERVER") and not is_super_client:
         yield note(
             AREA,
             f"ROS_DISCOVERY_SERVER is {environment['ROS_DISCOVERY_SERVER']}: nodes are"

@@ -66,13 +66,22 @@ def check_discovery(session: Session, deadline: Deadline) -> CheckResult:
     finally:
         context.try_shutdown()
     took_s = time.monotonic() - started_s
+    server = os.environ.get("ROS_DISCOVERY_SERVER")
+    through = f" through the discovery server {server}" if server else ""
     if discovered:
-        return ok("discovery", f"two participants discovered each other within {took_s:.1f} s")
+        text = f"two participants discovered each other within {took_s:.1f} s{through}"
+        return ok("discovery", text)
+    remedy = (
+        "unset ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_DISCOVERY_SERVER and Fast DDS profiles; if that"
+        " does not help, check the firewall and the network"
+    )
+    if server:
+        remedy = "start the server ('fastdds discovery'), and allow UDP to its port in firewalls"
     return error(
         "discovery",
-        f"two participants on this computer did not discover each other within {took_s:.1f} s",
-        "unset ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_DISCOVERY_SERVER and Fast DDS profiles; if that"
-        " does not help, check the firewall and the network",
+        "two participants on this computer did not discover each other within"
+        f" {took_s:.1f} s{through}",
+        remedy,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import field
 
 from composer.fast_dataclass import dataclass
 from composer.model import PortKind
+from composer.names import join_node_name
 from composer.qos import QosProfile
 from composer.tree import Plain
 
@@ -56,7 +57,7 @@ class FoundNode:
     @property
     def full_name(self) -> str:
         """The full name of the node in ROS."""
-        return f"{self.namespace.rstrip('/')}/{self.name}"
+        return join_node_name(self.namespace, self.name)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,14 @@ from typing import Any
 
 from composer.importing.found import FoundNode, FoundParameter, FoundSystem
 from composer.importing.live import parameter_type
-from composer.names import parameter_name_problem
+from composer.names import join_node_name, parameter_name_problem
 from composer.tree import Plain
 
 _DEFAULT_NAME = "node"
+_PORTS = (
+    "A launch file does not show topics, services and actions, so the nodes have no ports.",
+    "To add them, start it, and copy the ports from the output of 'compose import live'.",
+)
 
 
 def describe_launch_file(
@@ -21,7 +25,7 @@ def describe_launch_file(
     left_out = list(found["left_out"])
     nodes = tuple(_node(item, left_out) for item in found["nodes"])
     command = " ".join(["compose import launch", path, *arguments])
-    return FoundSystem(name, nodes, (f"Imported by '{command}'.",), tuple(left_out))
+    return FoundSystem(name, nodes, (f"Imported by '{command}'.", *_PORTS), tuple(left_out))
 
 
 def _node(item: Mapping[str, Any], left_out: list[str]) -> FoundNode:
@@ -39,7 +43,7 @@ def _node(item: Mapping[str, Any], left_out: list[str]) -> FoundNode:
         keys["lifecycle"] = {"on_failure": "restart"}
     if item["ros_arguments"]:
         left_out.append(f"--ros-args of {shown}: {' '.join(item['ros_arguments'])}")
-    full_name = f"{namespace.rstrip('/')}/{name}"
+    full_name = join_node_name(namespace, name)
     values: dict[str, Plain] = item["parameters"]
     left_out += item["problems"]
     return FoundNode(

@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
 from composer.model import USE_SIM_TIME, ChannelKind, PortKind
-from composer.names import parameter_name_problem, topic_name_problem
+from composer.names import parameter_name_problem, split_node_name, topic_name_problem
 from composer.qos import PRESETS, QosProfile
 from composer.tree import Plain
 
@@ -44,11 +44,11 @@ def describe_graph(
             left_out.append(f"{node.count - 1} more nodes with the name {node.full_name}")
         ports = tuple(_ports(node, ends, known_types, left_out))
         parameters = tuple(_parameters(node, settings.get(node.full_name, {}), left_out))
-        namespace, _, last = node.full_name.rpartition("/")
+        namespace, last = split_node_name(node.full_name)
         found.append(
             FoundNode(
                 name=last,
-                namespace=namespace or "/",
+                namespace=namespace,
                 keys=_keys(node),
                 ports=ports,
                 parameters=parameters,

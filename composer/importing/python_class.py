@@ -8,13 +8,20 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from composer.behavior_source import BehaviorSource, Function, find_behavior
+from composer.behavior_source import (
+    BehaviorSource,
+    Function,
+    find_behavior,
+    nearby_modules,
+    top_package,
+)
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
 from composer.importing.found import FoundNode, FoundParameter, FoundPort
 from composer.importing.live import parameter_type
 from composer.importing.python_values import NotLiteral, Scope
 from composer.model import BehaviorReference, PortKind
+from composer.project import Project
 from composer.source import Located, SourceFile, Span, shown_path
 from composer.tree import Plain
 
@@ -65,10 +72,10 @@ def describe_class(text: str, folder: Path) -> tuple[FoundNode, tuple[str, ...]]
     """
     located = Located(text, Span(SourceFile("", text), 1, 1, len(text)))
     source = find_behavior(BehaviorReference(located, folder))
-    _check(source, text)
+    _check(source, text, folder)
     reader = _ClassReader([], [], [])
     for module, known in source.classes:
-        if "rclpy" not in module.path.parts:
+        if top_package(module.path) != "rclpy":
             for method in known.methods:
                 if method.node is not None:
                     reader.read(Scope(module, known.node, method.node))
@@ -89,7 +96,7 @@ def describe_class(text: str, folder: Path) -> tuple[FoundNode, tuple[str, ...]]
     return node, tuple(reader.unknown)
 
 
-def _check(source: BehaviorSource, text: str) -> None:
+def _check(source: BehaviorSource, text: str, folder: Path) -> None:
     module, _, name = text.partition(":")
     if not module or not name.isidentifier():
         raise ClassNotFound(
@@ -100,7 +107,8 @@ def _check(source: BehaviorSource, text: str) -> None:
     if not source.module_found:
         raise ClassNotFound(
             f"no Python module named '{module}'",
-            "it is searched for in this folder, in the project's node types, and on Python's path",
+            nearby_modules(module, folder, Project.at(folder)).hint
+            or "it is searched for in this folder, among the node types, and on Python's path",
         )
     if not source.class_found:
         raise ClassNotFound(

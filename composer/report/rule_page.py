@@ -20,7 +20,7 @@ BANDS = {
     "2": "Names and references",
     "3": "Types, QoS and wiring",
     "4": "Lifecycle, timers, parameters and behaviors",
-    "5": "Style",
+    "5": "Style and transforms",
     "9": "Internal",
 }
 

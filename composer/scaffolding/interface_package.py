@@ -14,6 +14,7 @@ from pathlib import Path
 from composer.fast_dataclass import dataclass
 from composer.interfaces import DefinitionError, Message, parse_definition
 from composer.interfaces.definitions import parts
+from composer.interfaces.sources import Bundle
 from composer.resources import interfaces_folder
 
 FOLDERS = ("msg", "srv", "action")
@@ -26,6 +27,8 @@ _IMPLIED: Mapping[str, tuple[str, ...]] = {
 _CMAKE_MODULE = "cmake/ros_wheels.cmake"
 #: What only the interfaces of the composer need.
 _OWN_TYPES = ("ros-geometry-msgs", "ros-nav-msgs")
+#: In a source, a type is named without its folder: geometry_msgs/Pose.
+_FULL_TYPE = re.compile(r"(?m)^([a-z]\w*)/msg/")
 _WHEEL = re.compile(r"ros-([a-z0-9-]+)==")
 
 
@@ -35,10 +38,9 @@ class InvalidPackage(Exception):
 
 @dataclass(frozen=True, slots=True)
 class InterfacePackage:
-    """An interface package: its name, its folder, and the definitions by their relative paths."""
+    """An interface package: its name, and the definitions by their relative paths."""
 
     name: str
-    folder: Path
     definitions: Mapping[str, str]
     dependencies: tuple[str, ...]
 
@@ -160,25 +162,45 @@ BUILD_TESTING = "OFF"
 
 def read_package(name: str, folder: Path) -> InterfacePackage:
     """Read the definitions of a package. Raises InvalidPackage, OSError."""
-    definitions: dict[str, str] = {}
-    used: dict[str, None] = {}
-    for kind in FOLDERS:
-        for path in sorted((folder / kind).glob(f"*.{kind}")):
-            text = path.read_text(encoding="utf-8")
-            full_name = f"{name}/{kind}/{path.stem}"
-            try:
-                interface = parse_definition(full_name, text)
-            except DefinitionError as error:
-                raise InvalidPackage(f"{path}:{error.line}: {error}") from error
-            definitions[f"{kind}/{path.name}"] = text
-            used |= dict.fromkeys(_IMPLIED[kind])
-            for part in parts(interface).values():
-                used |= dict.fromkeys(_packages_of(part))
+    definitions = {
+        f"{kind}/{path.name}": path.read_text(encoding="utf-8")
+        for kind in FOLDERS
+        for path in sorted((folder / kind).glob(f"*.{kind}"))
+    }
     if not definitions:
         raise InvalidPackage(f"'{name}' has no .msg, .srv or .action file in {folder}")
-    return InterfacePackage(
-        name, folder, definitions, tuple(sorted(item for item in used if item != name))
-    )
+    return _package(name, definitions, folder)
+
+
+def bundled_package(name: str) -> InterfacePackage:
+    """Return a package of ROS from the definitions that come with the composer."""
+    bundle = Bundle()
+    definitions = {
+        f"{kind}/{full_name.rpartition('/')[2]}.{kind}": _source_text(found.text)
+        for kind in FOLDERS
+        for full_name in bundle.names(kind)
+        if full_name.startswith(f"{name}/") and (found := bundle.read(full_name)) is not None
+    }
+    return _package(name, definitions, Path(name))
+
+
+def _source_text(bundled: str) -> str:
+    """Return a definition as sources write it."""
+    return _FULL_TYPE.sub(r"\1/", bundled).rstrip("\n") + "\n"
+
+
+def _package(name: str, definitions: Mapping[str, str], folder: Path) -> InterfacePackage:
+    used: dict[str, None] = {}
+    for path, text in definitions.items():
+        kind, _, file = path.partition("/")
+        try:
+            interface = parse_definition(f"{name}/{kind}/{Path(file).stem}", text)
+        except DefinitionError as error:
+            raise InvalidPackage(f"{folder / path}:{error.line}: {error}") from error
+        used |= dict.fromkeys(_IMPLIED[kind])
+        for part in parts(interface).values():
+            used |= dict.fromkeys(_packages_of(part))
+    return InterfacePackage(name, definitions, tuple(sorted(item for item in used if item != name)))
 
 
 def _packages_of(message: Message) -> Iterable[str]:

@@ -1,1 +1,1 @@
-"""One command, one file."""
+"""The commands, one per file, in the groups of the help."""

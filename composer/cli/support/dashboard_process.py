@@ -13,8 +13,8 @@ from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 
 from composer.cli.support.errors import CommandError
+from composer.cli.support.output.terminal import say
 from composer.cli.support.process import compose_command, is_in_background
-from composer.cli.support.terminal import say
 
 #: Holds the file descriptor on which a dashboard reports its address to ``compose run``.
 _VARIABLE = "COMPOSE_DASHBOARD_FD"
@@ -72,12 +72,23 @@ class DashboardProcess:
         os.close(self._reading)
 
 
+def foxglove_line(url: str) -> str:
+    """Return the line with the address for Foxglove, given that of the page."""
+    address = url.replace("http://", "ws://", 1).replace("/?", "/foxglove?", 1)
+    return f"Foxglove and Lichtblick: {address}"
+
+
+def address_lines(url: str) -> str:
+    """Return the lines with the addresses of a dashboard among those of other things."""
+    return f"dashboard: {url}\n{foxglove_line(url)}"
+
+
 @contextmanager
 def shown_address(arguments: Sequence[str]) -> Iterator[Callable[[], str | None]]:
     """Run a dashboard for the length of a ``with`` block, and print its address when it is ready.
 
-    Yield a function that returns the address, for a process in the background: its output is a
-    file that others may read, so the address is not printed there.
+    Yield a function that returns the lines with the address, for a process in the background: its
+    output is a file that others may read, so the address is not printed there.
     """
     process = DashboardProcess(arguments)
     found: list[str] = []
@@ -87,7 +98,7 @@ def shown_address(arguments: Sequence[str]) -> Iterator[Callable[[], str | None]
         if url is not None:
             found.append(url)
         if not in_background:
-            say(f"dashboard: {url or 'it has not started, see above'}")
+            say(address_lines(url) if url else "dashboard: it has not started, see above")
 
     in_background = is_in_background()
     thread = threading.Thread(target=announce, name="dashboard", daemon=True)
@@ -95,7 +106,7 @@ def shown_address(arguments: Sequence[str]) -> Iterator[Callable[[], str | None]
 
     def address() -> str | None:
         thread.join(_ADDRESS_WITHIN_S)
-        return found[0] if found else None
+        return address_lines(found[0]) if found else None
 
     try:
         yield address

@@ -5,12 +5,15 @@ from __future__ import annotations
 #: Exit codes; 0 is success and 3 an internal error.
 FAILED = 1
 USAGE = 2
+#: For ``compose run``: its files have to change first, so that service managers do not try again.
+#: The number is EX_CONFIG of sysexits.h, by which systemd names it.
+CONFIG = 78
 
 
 class CommandError(Exception):
     """An error that the user can fix.
 
-    ``hint`` says how, in the imperative; ``exit_code`` is FAILED or USAGE.
+    ``hint`` says how, in the imperative; ``exit_code`` is FAILED, USAGE or CONFIG.
     """
 
     def __init__(self, message: str, *, hint: str | None = None, exit_code: int = FAILED) -> None:

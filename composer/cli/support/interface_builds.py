@@ -9,8 +9,8 @@ from importlib.metadata import distributions
 from pathlib import Path
 
 from composer.cli.support.errors import CommandError
-from composer.cli.support.terminal import say
-from composer.scaffolding.interface_package import InvalidPackage, read_package
+from composer.cli.support.output.terminal import say
+from composer.scaffolding.interface_package import InvalidPackage, bundled_package, read_package
 
 _WHEEL_PREFIX = "ros-"
 
@@ -25,10 +25,14 @@ def wheel_versions() -> dict[str, str]:
     return found
 
 
-def complete_package(name: str, folder: Path, target: Path) -> None:
-    """Write the complete package to ``target``, which is replaced. Raises CommandError."""
+def complete_package(name: str, folder: Path | None, target: Path) -> None:
+    """Write the complete package to ``target``, which is replaced. Raises CommandError.
+
+    Without a folder, it is a package of ROS whose definitions come with the composer.
+    """
     try:
-        files = read_package(name, folder).files(wheel_versions())
+        package = bundled_package(name) if folder is None else read_package(name, folder)
+        files = package.files(wheel_versions())
         shutil.rmtree(target, ignore_errors=True)
         for path, text in files.items():
             file = target / path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -80,6 +81,59 @@ class Autostart(StrEnum):
     ACTIVE = "active"
     INACTIVE = "inactive"
     UNCONFIGURED = "unconfigured"
+
+
+class LogSeverity(StrEnum):
+    """The log severities of ROS."""
+
+    DEBUG = "debug"
+    INFO = "info"
+    WARN = "warn"
+    ERROR = "error"
+    FATAL = "fatal"
+
+
+# How to start a system.
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NODE.PARAMETER=VALUE",
+        help="Override a parameter. Repeatable.",
+        show_default=False,
+    ),
+]
+UseSimTime = Annotated[
+    bool, typer.Option("--use-sim-time", help="Use /clock unless a node sets use_sim_time.")
+]
+AutostartTo = Annotated[
+    Autostart | None,
+    typer.Option(
+        "--autostart",
+        help="Bring nodes up to this state.",
+        show_default="as declared in the system",
+    ),
+]
+LogLevelOption = Annotated[
+    LogSeverity | None,
+    typer.Option("--log-level", help="Minimum severity of log messages.", show_default="info"),
+]
+
+
+def options_of_run(
+    settings: Sequence[str],
+    namespace: str | None,
+    autostart: Autostart | None,
+    level: LogSeverity | None,
+    *,
+    use_sim_time: bool,
+) -> list[str]:
+    """Return the options of ``compose run`` that say how a system is started."""
+    words = [word for text in settings for word in ("--set", text)]
+    words += [] if namespace is None else ["--namespace", namespace]
+    words += [] if autostart is None else ["--autostart", autostart.value]
+    words += [] if level is None else ["--log-level", level.value]
+    return [*words, "--use-sim-time"] if use_sim_time else words
 
 
 # How a system was started, for commands that compare its file with the running system.

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.terminal import keep_stdout_for_data, say
+from composer.cli.support.errors import CONFIG, CommandError, UsageError
+from composer.cli.support.output.terminal import keep_stdout_for_data, say
 
 if TYPE_CHECKING:
     from composer.model import Node, System
@@ -17,10 +18,12 @@ if TYPE_CHECKING:
     from composer.runtime.process.query_socket import NameAndTypes
 
 
-def require_ros(command: str) -> None:
+def require_ros(command: str, system: System | None = None) -> None:
     """Raise CommandError if rclpy is not installed or the environment does not let ROS start.
 
-    Call it before anything imports rclpy, which may end the process.
+    Call it before anything imports rclpy, which may end the process. It sets what this process
+    needs to discover other nodes: as ``system`` declares it, or else as the systems that run on
+    this computer do.
     """
     if find_spec("rclpy") is None:
         raise CommandError(
@@ -29,12 +32,30 @@ def require_ros(command: str) -> None:
         )
     keep_stdout_for_data()
     from composer.runtime.process import StartRefused
+    from composer.runtime.process.discovery import adopt_discovery
     from composer.runtime.process.environment import prepare_environment
 
     try:
-        prepare_environment()
+        prepare_environment(None if system is None else system.discovery)
     except StartRefused as refusal:
         raise CommandError(str(refusal), hint=refusal.hint) from refusal
+    warning = adopt_discovery(os.environ) if system is None else None
+    if warning is not None:
+        say(f"warning: {warning}")
+
+
+def announce_discovery(system: System) -> None:
+    """Print what other tools of ROS need to discover the system, if that is not the default."""
+    from composer.runtime.process.discovery import as_assignments, discovery_conflict
+
+    if system.discovery is None:
+        return
+    conflict = discovery_conflict(system.discovery, os.environ)
+    variables = system.discovery.variables
+    if conflict is not None:
+        say(f"warning: {conflict}")
+    elif variables:
+        say(f"to discover this system with other tools: export {as_assignments(variables)}")
 
 
 def require_launch(command: str) -> None:
@@ -57,7 +78,7 @@ def require_interfaces(system: System) -> None:
 
     users: dict[str, Node] = {}  # the first node that uses each package
     for node in system.nodes:
-        for port in node.ports:
+        for port in node.all_ports if node.implementation.in_process else node.ports:
             users.setdefault(port.interface.value.partition("/")[0], node)
     for package, node in users.items():
         if find_spec(package) is None:
@@ -66,6 +87,7 @@ def require_interfaces(system: System) -> None:
                 f"interface package '{package}' of node '{node.name}' is not installed for"
                 " this Python",
                 hint=how_to_build(package, find_packages(folders).folders.get(package)),
+                exit_code=CONFIG,
             )
 
 
@@ -104,7 +126,7 @@ def graph_names(
     A running system on this computer answers at once; without one, join the ROS graph.
     """
     require_ros(command)
-    from composer.remote.local_graph import local_names
+    from composer.remote.systems.local_graph import local_names
 
     found = local_names(kind, timeout_s, hidden=hidden)
     if found is not None:
@@ -118,7 +140,7 @@ def graph_names(
 def types_of(command: str, kind: str, name: str, timeout_s: float) -> tuple[str, ...]:
     """Return the types of a topic, service or action. Raises CommandError if there is none."""
     require_ros(command)
-    from composer.remote.local_graph import local_names
+    from composer.remote.systems.local_graph import local_names
 
     known = dict(local_names(kind, timeout_s, hidden=True) or ())
     absolute = name if name.startswith("/") else f"/{name}"

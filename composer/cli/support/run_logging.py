@@ -7,9 +7,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from composer.cli.support.output_queue import OutputQueue
-from composer.cli.support.progress import logger_and_text, severity_of
-from composer.cli.support.terminal import say
+from composer.cli.support.output.output_queue import OutputQueue
+from composer.cli.support.output.progress import logger_and_text, severity_of
+from composer.cli.support.output.terminal import say
 from composer.run_log import Record, RotatingFile, RunFolder
 from composer.runtime.process.environment import log_folder
 from composer.runtime.supervision.events import CallbackFailed, Event, Logged
@@ -22,10 +22,13 @@ class RunLog:
     folder, the run has no log, and a warning says so.
     """
 
-    def __init__(self, system: str, *, part: bool = False) -> None:
-        """``system`` is the full name of the system, or of a process of it, a ``part``."""
+    def __init__(self, system: str, *, part: bool = False, forwarded: bool = False) -> None:
+        """``system`` is the full name of the system, or of a process of it, a ``part``.
+
+        The lines of a process are ``forwarded`` if the one that coordinates it logs them as well.
+        """
         self._system = system
-        self._part = part
+        self._kind = {"part": part, "forwarded": forwarded}
         self._folder: RunFolder | None = None
         self._queue: OutputQueue | None = None
         self._is_started = False
@@ -51,7 +54,7 @@ class RunLog:
         logs = log_folder(os.environ)
         problem = "neither ROS_LOG_DIR nor HOME is set"
         try:
-            self._folder = None if logs is None else RunFolder(logs, self._system, part=self._part)
+            self._folder = None if logs is None else RunFolder(logs, self._system, **self._kind)
         except OSError as error:
             problem = f"{error.strerror}: '{error.filename}'"
         if self._folder is None:
@@ -61,9 +64,9 @@ class RunLog:
 
 
 @contextmanager
-def run_log(system: str, *, part: bool = False) -> Iterator[RunLog]:
+def run_log(system: str, *, part: bool = False, forwarded: bool = False) -> Iterator[RunLog]:
     """Keep the log of a run within the block."""
-    log = RunLog(system, part=part)
+    log = RunLog(system, part=part, forwarded=forwarded)
     try:
         yield log
     finally:

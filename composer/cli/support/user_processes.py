@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from composer.cli.support.errors import CommandError
-from composer.cli.support.terminal import say
+from composer.cli.support.output.terminal import say
 
 #: The name of an exception of the composer at the end of a traceback; its text says it all.
 _OWN_EXCEPTION = re.compile(r"^composer\.[\w.]+: ")

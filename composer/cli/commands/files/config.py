@@ -1,0 +1,57 @@
+"""``compose config``: print a system with everything resolved."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from composer.cli.support.errors import FAILED
+from composer.cli.support.options import examples
+from composer.cli.support.output.results import as_json
+from composer.cli.support.output.terminal import say, write, write_raw
+from composer.cli.support.system_arguments import SystemName, load_system
+
+EPILOGS = {
+    "config": examples(
+        "compose config systems/fleet.yaml",
+        "compose config systems/fleet.yaml --json | jq .nodes",
+        "compose config nodes/watchdog.yaml",
+    )
+}
+
+
+def config(
+    system: SystemName,
+    *,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of YAML.")] = False,
+) -> None:
+    """Print a system as a single resolved file.
+
+    Includes, copies (for_each) and variables are replaced by their results. The output is a system
+    in canonical YAML, equivalent to the original if saved in the same folder. For a node type, the
+    output contains everything that it extends. ROS is not needed.
+
+    Exit code 1 if the system has errors; then nothing is printed.
+    """
+    from composer.assembly.canonical import canonical
+    from composer.cli.support.system_arguments import system_file
+    from composer.document.writer import write_document
+    from composer.loading import gives_same_model
+    from composer.tree import plain
+
+    path = system_file(system)
+    result = load_system(path, shown=system)
+    if result.tree is None or not result.is_valid:
+        raise typer.Exit(FAILED)
+    whole = canonical(result.tree)
+    text = write_document(whole)
+    if not gives_same_model(result, text):
+        say(
+            "note: node types, behaviors and parameter files next to an included file are not found"
+            " from this file"
+        )
+    if json:
+        write(as_json(plain(whole), indent=2))
+    else:
+        write_raw(text)

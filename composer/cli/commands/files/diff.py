@@ -1,0 +1,215 @@
+"""``compose diff``: compare a system with the running ROS graph."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from composer.cli.support.errors import FAILED, CommandError
+from composer.cli.support.options import (
+    Autostart,
+    AutostartOfRun,
+    Json,
+    Namespace,
+    SettingsOfRun,
+    Timeout,
+    examples,
+    finite,
+)
+from composer.cli.support.output.results import as_json
+from composer.cli.support.output.terminal import lines, say, write
+from composer.cli.support.ros import ros_session
+from composer.cli.support.system_arguments import SystemName, load_system, system_file
+
+if TYPE_CHECKING:
+    from composer.drift import Drift, Snapshot
+    from composer.model import System
+    from composer.remote.snapshot import GraphObserver
+
+EPILOGS = {
+    "diff": examples(
+        "compose diff pipeline                         exit with 1 if there are differences",
+        "compose diff systems/pipeline.yaml --json     print JSON",
+        "compose diff pipeline --watch                 print changes until Ctrl-C",
+        "compose diff pipeline --ignore '/rviz*'       ignore undeclared nodes",
+        "compose diff pipeline --autostart inactive    as given to compose run",
+    )
+}
+
+_TIMEOUT_S = 10.0
+_GRACE_S = 2.0
+#: The pause between two snapshots of --watch, each of which takes about half a second.
+_PAUSE_S = 0.5
+
+Compare = Callable[["Snapshot"], tuple["Drift", ...]]
+
+
+def diff(
+    system: SystemName,
+    *,
+    settings: SettingsOfRun = None,
+    namespace: Namespace = None,
+    autostart: AutostartOfRun = None,
+    ignore: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PATTERN",
+            help="Ignore undeclared nodes whose full names match (* is any text). Repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    json: Json = False,
+    watch: Annotated[
+        bool,
+        typer.Option(
+            "--watch", "-w", help="Keep comparing; print differences as they appear and resolve."
+        ),
+    ] = False,
+    watch_for: Annotated[
+        float | None,
+        typer.Option(
+            "--for",
+            metavar="SECONDS",
+            min=0.0,
+            callback=finite,
+            help="Stop --watch after this time.",
+            show_default="until Ctrl-C",
+        ),
+    ] = None,
+    grace: Annotated[
+        float,
+        typer.Option(
+            metavar="SECONDS",
+            min=0.0,
+            callback=finite,
+            help="Ignore differences that last no longer than this.",
+        ),
+    ] = _GRACE_S,
+    timeout: Timeout = _TIMEOUT_S,
+) -> None:
+    """Compare a system with the running ROS graph.
+
+    The command compares nodes, endpoints, types, QoS policies, parameters and lifecycle states. A
+    difference counts only after the grace time, so a system that is still starting is not reported.
+
+    Exit code 1 if there are differences.
+    """
+    declared = _load(system, settings or [], namespace)
+    compare = _comparison(declared, autostart, ignore or [])
+    with ros_session("compose diff", timeout) as (session, deadline):
+        from composer.remote.snapshot import GraphObserver
+
+        with GraphObserver(session) as observer:
+            if watch:
+                remaining = _watched(observer, compare, (timeout, grace, watch_for), json=json)
+            else:
+                remaining = _settled(observer, compare, deadline.left_s, grace)
+                _print(declared, remaining, json=json)
+    if remaining:
+        raise typer.Exit(FAILED)
+
+
+def _load(text: str, settings: list[str], namespace: str | None) -> System:
+    path = system_file(text)
+    result = load_system(path, shown=text, settings=settings, namespace=namespace)
+    if result.system is not None and result.system.node_type:
+        raise CommandError(f"'{text}' is a node type, not a system")
+    if result.system is None or not result.is_runnable:
+        raise CommandError(f"'{text}' has errors, so it cannot be compared")
+    return result.system
+
+
+def _comparison(system: System, autostart: Autostart | None, ignored: list[str]) -> Compare:
+    from composer.drift import compare
+    from composer.model import PrimaryState
+
+    goal = PrimaryState(autostart.value) if autostart is not None else None
+    return lambda snapshot: compare(system, snapshot, autostart=goal, ignored=ignored)
+
+
+def _settled(
+    observer: GraphObserver, compare: Compare, timeout_s: float, grace_s: float
+) -> tuple[Drift, ...]:
+    """Return the differences: none as soon as there are none, else those that persist."""
+    from composer.drift import Debouncer
+    from composer.remote.session import Deadline
+
+    deadline = Deadline(timeout_s)
+    debouncer = Debouncer(grace_s)
+    while True:
+        drifts = compare(observer.snapshot(deadline))
+        debouncer.update(time.monotonic(), drifts)
+        if debouncer.is_settled(drifts) or deadline.passed:
+            return drifts
+
+
+def _watched(
+    observer: GraphObserver,
+    compare: Compare,
+    seconds: tuple[float, float, float | None],
+    *,
+    json: bool,
+) -> tuple[Drift, ...]:
+    """Print changes until Ctrl-C or the end of the time; return the remaining differences."""
+    from composer.drift import Debouncer
+    from composer.remote.session import Deadline
+
+    timeout_s, grace_s, watch_for_s = seconds
+    end = Deadline(watch_for_s if watch_for_s is not None else float("inf"))
+    debouncer = Debouncer(grace_s)
+    try:
+        while not end.passed:
+            drifts = compare(observer.snapshot(Deadline(min(timeout_s, end.left_s))))
+            change = debouncer.update(time.monotonic(), drifts)
+            for drift in change.resolved:
+                write(_event("resolved", drift, json=json))
+            for drift in change.appeared:
+                write(_event("drift", drift, json=json))
+            time.sleep(min(_PAUSE_S, end.left_s))
+    except KeyboardInterrupt:
+        pass  # the normal way to stop
+    return debouncer.reported
+
+
+def _print(system: System, drifts: tuple[Drift, ...], *, json: bool) -> None:
+    if json:
+        found = [_as_data(drift) for drift in drifts]
+        data = {"system": system.name.value, "clean": not drifts, "drift": found}
+        write(as_json(data, indent=2))
+    elif drifts:
+        write(lines(line for drift in drifts for line in _lines(drift)))
+    count = len(drifts)
+    differences = f"{count} difference{'s' if count != 1 else ''}"
+    say(f"{system.name.value}: {differences if count else 'runs as declared'}")
+
+
+def _event(what: str, drift: Drift, *, json: bool) -> str:
+    if json:
+        return as_json({"event": what, **_as_data(drift)})
+    return lines(
+        f"{what}: {line}" if number == 0 else line for number, line in enumerate(_lines(drift))
+    )
+
+
+def _lines(drift: Drift) -> Iterator[str]:
+    yield drift.message
+    if drift.hint:
+        yield f"  {drift.hint}"
+    if drift.span is not None:
+        yield f"  declared at {drift.span}"
+
+
+def _as_data(drift: Drift) -> dict[str, Any]:
+    return {
+        "kind": drift.kind.value,
+        "node": drift.node,
+        "subject": drift.subject or None,
+        "declared": drift.declared or None,
+        "live": drift.live or None,
+        "message": drift.message,
+        "hint": drift.hint or None,
+        "declared_at": None if drift.span is None else str(drift.span),
+    }

@@ -1,0 +1,335 @@
+"""``compose export``: files with which other tools run a system."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.errors import FAILED, CommandError
+from composer.cli.support.options import Namespace, NewFile, examples
+from composer.cli.support.output.terminal import say, write_raw
+from composer.cli.support.system_arguments import SystemName, load_system, system_file
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from composer.export.container_image import Contents
+    from composer.export.deployment import Service
+    from composer.loading import LoadResult
+    from composer.model import Host, System
+
+app = typer.Typer(
+    help="""Write files with which other tools run a system.
+
+    The files are derived from the system: export again after changes.
+    """,
+    epilog=examples(
+        "compose export launch systems/robot.yaml -o launch/robot.launch.py",
+        "compose export systemd systems/robot.yaml -o robot.service",
+        "compose export docker-compose systems/robot.yaml -o deploy",
+        "compose export kubernetes systems/robot.yaml -o deploy",
+        "compose export sros2 systems/robot.yaml -o policies/robot.xml",
+    ),
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+NewFolder = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FOLDER",
+        help="Write to files in this folder instead of stdout.",
+        show_default=False,
+    ),
+]
+NewPath = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="PATH",
+        help="Write to a new file instead of stdout; to a folder if there are several files.",
+        show_default=False,
+    ),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
+Image = Annotated[
+    str | None,
+    typer.Option(
+        "--image",
+        metavar="NAME",
+        help="The name of the image, as in registry.local/robot:1.2.",
+        show_default="that of the system",
+    ),
+]
+
+
+@app.callback()
+def export() -> None:
+    """Write files with which other tools run a system.
+
+    The files are derived from the system: export again after changes.
+    """
+
+
+@app.command(
+    "launch", epilog=examples("compose export launch pipeline -o launch/pipeline.launch.py")
+)
+def export_launch(system: SystemName, *, output: NewFile = None, force: Force = False) -> None:
+    """Write a launch file that runs a system.
+
+    It has launch arguments for the namespace, simulated time and the log level, and ends with the
+    system. To run a system from a launch file of your own, use its action ComposeSystem.
+    """
+    from composer.export.launch_file import launch_file
+
+    path = system_file(system)
+    _write(launch_file(_load(system, path)[0], path, output), output, replace=force)
+
+
+@app.command(
+    "systemd",
+    epilog=examples(
+        "compose export systemd systems/robot.yaml -o robot.service",
+        "compose export systemd robot --user -o ~/.config/systemd/user/robot.service",
+        "compose export systemd robot -o units       a system with several processes",
+    ),
+)
+def export_systemd(
+    system: SystemName,
+    *,
+    user: Annotated[
+        bool, typer.Option("--user", help="For the service manager of a user, not of the system.")
+    ] = False,
+    output: NewPath = None,
+    force: Force = False,
+) -> None:
+    """Write the systemd units that run a system.
+
+    There is a service for each of its processes, in this Python environment, with the variables of
+    ROS that are set now. A process that fails is started again as the system declares it. The
+    services of several processes belong to a target.
+    """
+    import os
+    import sys
+
+    from composer.export.systemd import Installation, units
+    from composer.hosts.remote_command import python_words
+
+    path = system_file(system)
+    declared, result = _load(system, path)
+    python = (sys.executable, "-P", "-m", "composer")
+    file = os.path.relpath(path.resolve(), result.project.root)
+
+    def remote(host: Host, service: Service) -> list[str]:
+        return python_words(host, ("-m", "composer", *service.command(file)), os.environ)
+
+    installation = Installation(python, os.environ, remote)
+    found = units(declared, path, installation, user=user)
+    if len(found) == 1:
+        _write(next(iter(found.values())), output, replace=force)
+        return
+    if output is None:
+        raise CommandError(
+            f"there are {len(found)} units: {', '.join(map(str, found))}",
+            hint="name a folder for them with --output",
+        )
+    _write_all(output, {str(name): text for name, text in found.items()}, replace=force)
+
+
+@app.command(
+    "docker-compose",
+    epilog=examples(
+        "compose export docker-compose systems/robot.yaml -o deploy",
+        "compose export docker-compose robot --image registry.local/robot:1 -o deploy --force",
+    ),
+)
+def export_docker_compose(
+    system: SystemName, *, image: Image = None, output: NewFolder = None, force: Force = False
+) -> None:
+    """Write a file for docker compose, and a Containerfile.
+
+    Each process of the system is a service, with a health check, the limits that the system
+    declares, and the variables of ROS that are set now. All of them use one image with the project.
+    On stdout, there is only the compose file.
+    """
+    import os
+
+    from composer.export.docker_compose import compose_file
+
+    path = system_file(system)
+    declared, result = _load(system, path)
+    contents, name = _image(declared, result, path, image)
+    build: dict[str, str] = {}
+    if output is not None:
+        root, folder = result.project.root, output.resolve()
+        build["context"] = os.path.relpath(root, folder)
+        build["dockerfile"] = os.path.relpath(folder / "Containerfile", root)
+    text = compose_file(declared, contents, name, build, os.environ)
+    _write_image_and(output, "compose.yaml", text, contents, replace=force)
+
+
+@app.command(
+    "kubernetes",
+    epilog=examples(
+        "compose export kubernetes systems/robot.yaml --image registry.local/robot:1 -o deploy",
+        "compose export kubernetes systems/robot.yaml | kubectl apply -f -",
+    ),
+)
+def export_kubernetes(
+    system: SystemName, *, image: Image = None, output: NewFolder = None, force: Force = False
+) -> None:
+    """Write manifests for Kubernetes, and a Containerfile.
+
+    A pod has the processes of one computer as containers, with probes, the limits that the system
+    declares, and the variables of ROS that are set now. On stdout, there are only the manifests.
+    """
+    import os
+
+    from composer.export.kubernetes import manifests
+
+    path = system_file(system)
+    declared, result = _load(system, path)
+    contents, name = _image(declared, result, path, image)
+    text = manifests(declared, contents, name, os.environ)
+    _write_image_and(output, "kubernetes.yaml", text, contents, replace=force)
+
+
+@app.command(
+    "sros2",
+    epilog=examples(
+        "compose export sros2 pipeline -o policies/pipeline.xml",
+        "compose export sros2 pipeline --permissions -o keystore/enclaves",
+    ),
+)
+def export_sros2(
+    system: SystemName,
+    *,
+    namespace: Namespace = None,
+    permissions: Annotated[
+        bool,
+        typer.Option(
+            "--permissions",
+            help="Write the permissions of DDS instead, a file for each process, to a folder.",
+        ),
+    ] = False,
+    output: NewPath = None,
+    force: Force = False,
+) -> None:
+    """Write the access control policy that a system implies.
+
+    Each process may publish, subscribe, serve and call exactly what its nodes declare, and what ROS
+    and the manager node need. The policy is for 'ros2 security create_permission'; the enclave of a
+    process is its full name, such as /robot1/pipeline.
+
+    With --permissions, write what that command makes of the policy: FOLDER/robot1/pipeline/
+    permissions.xml, for the ROS domain of ROS_DOMAIN_ID. These files have to be signed.
+    """
+    declared, _ = _load(system, system_file(system), namespace)
+    if not permissions:
+        from composer.export.sros2 import policy
+
+        _write(policy(declared), output, replace=force)
+        return
+    from composer.export.dds_permissions import permissions as dds_permissions
+
+    texts = dds_permissions(declared, _domain_id())
+    if output is None and len(texts) == 1:
+        write_raw(next(iter(texts.values())))
+    elif output is None:
+        raise CommandError(
+            f"there are {len(texts)} processes: {', '.join(texts)}",
+            hint="name a folder for their files with --output",
+        )
+    else:
+        files = {f"{path.strip('/')}/permissions.xml": text for path, text in texts.items()}
+        _write_all(output, files, replace=force)
+
+
+def _domain_id() -> int:
+    """Return the ROS domain. Raises CommandError."""
+    import os
+
+    text = os.environ.get("ROS_DOMAIN_ID") or "0"
+    if not (text.isascii() and text.isdigit()):
+        raise CommandError(f"ROS_DOMAIN_ID is '{text}', which is not a domain id")
+    return int(text)
+
+
+def _load(text: str, path: Path, namespace: str | None = None) -> tuple[System, LoadResult]:
+    """Return a system without errors. Raises CommandError, typer.Exit."""
+    result = load_system(path, shown=text, namespace=namespace)
+    if result.system is not None and result.system.node_type:
+        raise CommandError(f"'{text}' is a node type, not a system")
+    if result.system is None or not result.is_runnable:
+        raise typer.Exit(FAILED)
+    return result.system, result
+
+
+def _image(
+    system: System, result: LoadResult, path: Path, name: str | None
+) -> tuple[Contents, str]:
+    """Return what the image of a system contains, and its name."""
+    from pathlib import PurePosixPath
+
+    from composer.export.container_image import Contents
+    from composer.export.deployment import services
+    from composer.interfaces.sources import find_packages
+    from composer.report.tool import NAME, tool_version
+
+    root = result.project.root
+    used = {port.interface.value.partition("/")[0] for node in system.nodes for port in node.ports}
+    contents = Contents(
+        system=system.name.value,
+        file=PurePosixPath(path.resolve().relative_to(root).as_posix()),
+        composer=f"{NAME}[ros]=={tool_version()}",
+        has_requirements=(root / "requirements.txt").is_file(),
+        has_interfaces=not used.isdisjoint(find_packages(result.project.interface_folders).folders),
+    )
+    return contents, name or f"{services(system)[0].label}:latest"
+
+
+def _write(text: str, output: Path | None, *, replace: bool) -> None:
+    """Write to stdout, or to a file. Raises CommandError."""
+    if output is None:
+        write_raw(text)
+        return
+    _write_all(output.parent, {output.name: text}, replace=replace)
+
+
+def _write_image_and(
+    folder: Path | None, name: str, text: str, contents: Contents, *, replace: bool
+) -> None:
+    """Write a file and what builds its image to a folder, or only the text of the file to stdout.
+
+    Two formats may share the image. Raises CommandError.
+    """
+    from composer.export.container_image import (
+        CONTAINERFILE,
+        IGNORED_FILES,
+        containerfile,
+        ignored_files,
+    )
+
+    if folder is None:
+        write_raw(text)
+        return
+    files = {
+        name: text,
+        str(CONTAINERFILE): containerfile(contents),
+        str(IGNORED_FILES): ignored_files(),
+    }
+    _write_all(folder, files, replace=replace)
+
+
+def _write_all(folder: Path, files: Mapping[str, str], *, replace: bool) -> None:
+    from composer.cli.support.new_files import write_exports
+
+    written = write_exports(folder, files, replace=replace)
+    for name in files:
+        path = folder / name
+        say(f"wrote {path}" if path in written else f"{path} is up to date")

@@ -1,0 +1,227 @@
+"""``compose import``: describe existing nodes in YAML."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.completion import complete_node
+from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.options import NewFile, Timeout, examples
+from composer.cli.support.output.terminal import lines, say, write_raw
+from composer.cli.support.ros import require_launch, require_ros, ros_session
+
+if TYPE_CHECKING:
+    from composer.importing import FoundNode
+
+app = typer.Typer(
+    help="""Describe existing nodes in YAML.
+
+    The result is a valid file to start from: edit it, and compare it with the running nodes with
+    'compose diff'.
+    """,
+    epilog=examples(
+        "compose import live -o systems/robot.yaml                   the nodes that run now",
+        "compose import class driver:Driver -o nodes/driver.yaml     an rclpy class",
+        "compose import launch robot.launch.py                       a launch file",
+    ),
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+SystemToWrite = Annotated[
+    str, typer.Option("--system", metavar="NAME", help="Name of the system that is written.")
+]
+
+
+@app.command(
+    "live",
+    epilog=examples(
+        "compose import live",
+        "compose import live --node talker --node '/perception/*'",
+        "compose import live --system robot -o systems/robot.yaml",
+    ),
+)
+def live(
+    *,
+    nodes: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--node",
+            metavar="NODE",
+            help="Only this node: a full name, the last part of a name, or a pattern. Repeatable.",
+            show_default=False,
+            autocompletion=complete_node,
+        ),
+    ] = None,
+    system: SystemToWrite = "imported",
+    output: NewFile = None,
+    timeout: Timeout = 10.0,
+) -> None:
+    """Describe the nodes of the running ROS graph as a system.
+
+    For each node: its name and namespace, topics, services and actions with types and QoS, and its
+    parameters with their descriptions. The nodes are external: 'compose run' waits for them and
+    observes them, but does not start or move them. Replace 'external' by 'class' or 'executable' to
+    start a node with the system.
+
+    The ROS graph does not show the depth of queues. It is that of the most similar QoS preset.
+    """
+    with ros_session("compose import live", timeout) as (session, deadline):
+        from composer.importing.live import describe_graph
+        from composer.remote.parameter_descriptions import parameter_settings
+        from composer.remote.snapshot import GraphObserver
+
+        with GraphObserver(session) as observer:
+            snapshot = observer.snapshot(deadline)
+        names = {node.full_name: tuple(node.parameters or ()) for node in snapshot.nodes}
+        settings = parameter_settings(session, deadline, names)
+    found = describe_graph(system, snapshot, settings, _known_types(), nodes or ())
+    if not found.nodes:
+        matching = f" matches {', '.join(nodes)}" if nodes else " was found"
+        raise CommandError(
+            f"no node{matching}", hint="'compose node list' lists the nodes of the ROS graph"
+        )
+    from composer.importing import write_system
+
+    _write(write_system(found), output)
+    _report_left_out(found.left_out)
+
+
+@app.command(
+    "class",
+    epilog=examples(
+        "compose import class demo_nodes_py.topics.talker:Talker -o nodes/talker.yaml",
+        "compose import class driver:Driver --construct        run its constructor once",
+    ),
+)
+def import_class(
+    reference: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODULE:CLASS", help="A class derived from rclpy's Node or LifecycleNode."
+        ),
+    ],
+    *,
+    construct: Annotated[
+        bool,
+        typer.Option(
+            "--construct",
+            help="Construct the class once, in a process of its own; do not read its source.",
+        ),
+    ] = False,
+    output: NewFile = None,
+    timeout: Timeout = 30.0,
+) -> None:
+    """Describe an rclpy node class as a node type.
+
+    The source is read, and no code of it runs: the topics, services, actions and parameters that it
+    creates with literal names are declared. What only running would show is listed. With
+    --construct, the constructor runs, and all that it creates is declared.
+
+    The module is searched for in this folder, among the node types of the project, and on
+    Python's module search path.
+    """
+    from composer.importing import write_node_type
+    from composer.importing.python_class import ClassNotFound, describe_class
+
+    unknown: tuple[str, ...] = ()
+    if construct:
+        found = _constructed(reference, timeout)
+    else:
+        try:
+            found, unknown = describe_class(reference, Path.cwd())
+        except ClassNotFound as error:
+            raise CommandError(str(error), hint=error.hint) from error
+    type_name = found.name if output is None else output.stem
+    _write(write_node_type(type_name, found), output)
+    if unknown:
+        say(lines(["the source does not show:", *(f"  {text}" for text in unknown)]))
+
+
+def _constructed(reference: str, timeout_s: float) -> FoundNode:
+    """Construct a class in a process of its own. Raises CommandError."""
+    require_ros("compose import class --construct")
+    from composer.cli.support.user_processes import run_user_process
+    from composer.importing.constructed import describe_constructed
+
+    module = "composer.remote.constructed_class"
+    text = run_user_process(module, [reference, str(Path.cwd())], timeout_s)
+    return describe_constructed(reference, json.loads(text))
+
+
+@app.command(
+    "launch",
+    epilog=examples(
+        "compose import launch robot.launch.py -o systems/robot.yaml",
+        "compose import launch robot.launch.xml use_sim_time:=true --system robot",
+    ),
+)
+def import_launch(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A launch file.")],
+    arguments: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME:=VALUE]...", help="Launch arguments.", show_default=False),
+    ] = None,
+    *,
+    system: SystemToWrite = "imported",
+    output: NewFile = None,
+    timeout: Timeout = 30.0,
+) -> None:
+    """Describe the nodes of a launch file as a system.
+
+    The file is evaluated with these arguments in a process of its own, like 'ros2 launch' does, but
+    nothing is started: nodes become executables with their names, namespaces, parameters,
+    remappings and environment. Includes, groups and conditions are resolved. Components, processes
+    that are not nodes and event handlers are listed and left out.
+
+    Launch files do not show topics, services and actions: see 'compose import live'. The packages
+    launch and launch_ros must be installed.
+    """
+    given = arguments or []
+    for argument in given:
+        if ":=" not in argument:
+            raise UsageError(f"'{argument}' is not a launch argument", hint="write NAME:=VALUE")
+    if not file.is_file():
+        raise UsageError(f"there is no file '{file}'")
+    require_launch("compose import launch")
+    from composer.cli.support.user_processes import run_user_process
+    from composer.importing import write_system
+    from composer.importing.launch_file import describe_launch_file
+
+    arguments_of_process = [str(file.absolute()), *given]
+    text = run_user_process("composer.launch.visitor", arguments_of_process, timeout)
+    found = describe_launch_file(system, str(file), given, json.loads(text))
+    if not found.nodes:
+        _report_left_out(found.left_out)
+        raise CommandError(f"'{file}' starts no node with these arguments")
+    _write(write_system(found), output)
+    _report_left_out(found.left_out)
+
+
+def _known_types() -> set[str]:
+    from composer.interfaces import Interfaces
+    from composer.node_types import interface_folders
+    from composer.project import Project
+
+    types = Interfaces.load(interface_folders(Project.at(Path.cwd())))
+    return {name for kind in ("msg", "srv", "action") for name in types.names(kind)}
+
+
+def _write(text: str, output: Path | None) -> None:
+    """Write a new file, or to stdout. Raises CommandError; then there is no incomplete file."""
+    if output is None:
+        write_raw(text)
+        return
+    from composer.cli.support.new_files import write_new_file
+
+    write_new_file(output, text)
+    say(f"wrote {output}")
+
+
+def _report_left_out(left_out: tuple[str, ...]) -> None:
+    if left_out:
+        say(lines(["left out:", *(f"  {text}" for text in left_out)]))

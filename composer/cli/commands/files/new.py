@@ -1,0 +1,114 @@
+"""``compose new``: create a project, and files in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.new_files import write_new_files
+from composer.cli.support.options import examples
+from composer.cli.support.output.terminal import lines, say, write
+
+app = typer.Typer(
+    help="""Create a project, or files in it.
+
+    Systems, node types and interface packages that are created are valid and have a test. Existing
+    files are not replaced.
+    """,
+    epilog=examples(
+        "compose new project my_robot        a project in the folder my_robot",
+        "compose new node planner            nodes/planner.yaml and nodes/planner.py",
+        "compose new system arm              systems/arm.yaml",
+        "compose new interfaces my_msgs      interfaces/my_msgs",
+    ),
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+_RESERVED = frozenset({"test", "composer", "launch", "std_msgs"})
+
+Name = Annotated[
+    str,
+    typer.Argument(
+        metavar="NAME", help="Lower-case letters, digits and underscores, such as my_robot."
+    ),
+]
+
+
+@app.command("project", epilog=examples("compose new project my_robot"))
+def project(name: Name) -> None:
+    """Create a project in a new folder.
+
+    It has a system, a node type with a behavior, tests, and what colcon needs to build it.
+    """
+    from composer.scaffolding import new_project
+
+    folder = Path(_checked(name))
+    if folder.exists():
+        raise CommandError(f"'{folder}' exists already", hint="choose another name")
+    _create(folder, new_project(name))
+    say(f"try: cd {name} && compose run systems/{name}.yaml")
+
+
+@app.command("system", epilog=examples("compose new system arm"))
+def system(name: Name) -> None:
+    """Create a system and its test."""
+    from composer.scaffolding import new_system
+
+    _create(_root(), new_system(_checked(name)))
+
+
+@app.command("node", epilog=examples("compose new node planner"))
+def node(name: Name) -> None:
+    """Create a node type with a behavior, and its test."""
+    from composer.scaffolding import new_node
+
+    _create(_root(), new_node(_checked(name)))
+
+
+@app.command("interfaces", epilog=examples("compose new interfaces my_msgs"))
+def interfaces(name: Name) -> None:
+    """Create a package of messages, services and actions.
+
+    Only its definitions and a short package.xml are needed: see 'compose interfaces build'.
+    """
+    from composer.scaffolding import new_interfaces
+
+    _create(_root(), new_interfaces(_checked(name)))
+    say("next: compose interfaces build")
+
+
+def _checked(name: str) -> str:
+    """Return a name that ROS, Python and colcon accept. Raises UsageError."""
+    if not _NAME.fullmatch(name):
+        raise UsageError(
+            f"'{name}' is not a valid name",
+            hint="names have lower-case letters, digits and single underscores, such as my_robot",
+        )
+    if name in _RESERVED:
+        raise UsageError(f"the name '{name}' is in use", hint="choose another one")
+    return name
+
+
+def _root() -> Path:
+    from composer.project import Project
+
+    return Project.at(Path.cwd()).root
+
+
+def _create(root: Path, files: Mapping[str, str]) -> None:
+    write_new_files(root, files)
+    write(lines(_shown(root / path) for path in files))
+
+
+def _shown(path: Path) -> str:
+    try:
+        return str(path.absolute().relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)

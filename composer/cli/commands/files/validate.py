@@ -1,0 +1,213 @@
+"""``compose validate``: report all diagnostics of all files in one run."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from enum import StrEnum
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.errors import FAILED, UsageError
+from composer.cli.support.options import examples
+from composer.cli.support.output.terminal import say, use_color, write_raw
+from composer.cli.support.system_arguments import example_systems, nearest_path, path_exists
+from composer.fast_dataclass import dataclass
+
+if TYPE_CHECKING:
+    from composer.diagnostics import Diagnostic
+
+EPILOGS = {
+    "validate": examples(
+        "compose validate systems nodes",
+        "compose validate systems/pipeline.yaml --strict",
+        "compose validate systems --format sarif > report.sarif",
+        "compose validate systems --ignore qos-implicit --ignore RC5",
+        "cat pipeline.yaml | compose validate -",
+    )
+}
+
+
+_STDIN = Path("-")
+_MAX_LISTED = 3
+
+
+class ReportFormat(StrEnum):
+    """The formats of reports."""
+
+    TEXT = "text"
+    JSON = "json"
+    SARIF = "sarif"
+    GITHUB = "github"
+
+
+Rules = list[str] | None
+_RULE = "a code (RC301), a code prefix (RC3) or a name. Repeatable."
+
+
+def validate(
+    paths: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="PATH...",
+            help="Files, folders to search for systems and node types, or - for stdin.",
+            show_default=False,
+        ),
+    ],
+    *,
+    output_format: Annotated[
+        ReportFormat | None,
+        typer.Option(
+            "--format",
+            "-f",
+            help="Output format. Default: text, or github in GitHub Actions.",
+            show_default=False,
+        ),
+    ] = None,
+    strict: Annotated[
+        bool | None,
+        typer.Option(
+            "--strict/--no-strict",
+            help="Treat warnings as errors. Default: as set in the project, else no.",
+            show_default=False,
+        ),
+    ] = None,
+    select: Annotated[
+        Rules, typer.Option(metavar="RULE", help=f"Report only this rule: {_RULE}")
+    ] = None,
+    ignore: Annotated[
+        Rules, typer.Option(metavar="RULE", help=f"Do not report this rule: {_RULE}")
+    ] = None,
+    max_diagnostics: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=0,
+            help="Show at most N diagnostics as text, errors first; 0 for all. Default: 200.",
+            show_default=False,
+        ),
+    ] = None,
+    stdin_name: Annotated[
+        str,
+        typer.Option(
+            metavar="PATH", help="The file name of stdin, used in reports and to find node types."
+        ),
+    ] = "<stdin>",
+) -> None:
+    """Check systems and node types.
+
+    Nothing is started, and ROS is not needed. Settings for a whole project can be set in its
+    composer.yaml or in the [tool.composer] table of its pyproject.toml: strict, select, ignore,
+    severity, nodes and interfaces.
+
+    The formats json, sarif and github always have all diagnostics.
+
+    Exit code 1 if there are errors, or warnings with --strict, also if they are not shown.
+    """
+    checked = _check(paths, stdin_name)
+    diagnostics = _selected(checked.diagnostics, select or [], ignore or [])
+    _print(diagnostics, output_format or _default_format(), max_diagnostics)
+    suffix = "" if diagnostics else ": no problems found"
+    say(f"{checked.files} file{'' if checked.files == 1 else 's'} checked{suffix}")
+    if checked.foreign:
+        say(f"skipped, without 'system:' or 'node:': {_listed(checked.foreign)}")
+    is_strict = checked.strict if strict is None else strict
+    if any(_is_error(item, is_strict) for item in diagnostics):
+        raise typer.Exit(FAILED)
+
+
+@dataclass(frozen=True, slots=True)
+class _Checked:
+    files: int
+    diagnostics: list[Diagnostic]
+    strict: bool
+    foreign: tuple[Path, ...]
+
+
+def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
+    from composer.document.limits import MAX_BYTES
+    from composer.files import find_files
+    from composer.loading import collect_diagnostics, load_bytes, load_files
+
+    for path in paths:
+        if path != _STDIN and not path_exists(path):
+            raise UsageError(f"there is no file or folder '{path}'", hint=_path_hint(path))
+    found = find_files(path for path in paths if path != _STDIN)
+    results = load_files(found.files)
+    if _STDIN in paths:
+        content = sys.stdin.buffer.read(MAX_BYTES + 1)
+        results.insert(0, load_bytes(content, Path.cwd(), shown=stdin_name))
+    diagnostics = [*found.diagnostics, *collect_diagnostics(results)]
+    if not results and not diagnostics:
+        raise UsageError("there is no system and no node type in " + ", ".join(map(str, paths)))
+    return _Checked(
+        files=len(results),
+        diagnostics=diagnostics,
+        strict=any(result.project.settings.strict for result in results),
+        foreign=found.foreign,
+    )
+
+
+def _path_hint(path: Path) -> str | None:
+    """Return a hint with a similar path, or with the path of the example system."""
+    examples = example_systems()
+    close = examples.get(str(path)) or nearest_path(path)
+    return None if close is None else f"did you mean '{close}'?"
+
+
+def _listed(paths: Sequence[Path]) -> str:
+    """Return the first paths, and how many more there are."""
+    from composer.report.display import visible
+
+    named = ", ".join(visible(str(path)) for path in paths[:_MAX_LISTED])
+    return named if len(paths) <= _MAX_LISTED else f"{named} and {len(paths) - _MAX_LISTED} more"
+
+
+def _selected(
+    diagnostics: list[Diagnostic], select: list[str], ignore: list[str]
+) -> list[Diagnostic]:
+    if not select and not ignore:
+        return diagnostics
+    from composer.report.rule_page import all_rules
+    from composer.report.selection import UnknownRule, select_diagnostics
+
+    try:
+        return select_diagnostics(diagnostics, all_rules(), select, ignore)
+    except UnknownRule as error:
+        raise UsageError(str(error), hint=error.hint) from error
+
+
+def _default_format() -> ReportFormat:
+    return ReportFormat.GITHUB if os.environ.get("GITHUB_ACTIONS") == "true" else ReportFormat.TEXT
+
+
+def _print(
+    diagnostics: list[Diagnostic], output_format: ReportFormat, max_diagnostics: int | None
+) -> None:
+    if output_format is ReportFormat.TEXT:
+        if diagnostics:
+            _print_text(diagnostics, max_diagnostics)
+        return
+    # Imported on demand: the other formats are rarely used and slow to import.
+    render = import_module(f"composer.report.{output_format}").render
+    write_raw(render(diagnostics))
+
+
+def _print_text(diagnostics: list[Diagnostic], max_diagnostics: int | None) -> None:
+    from composer.report.text import MAX_DIAGNOSTICS, render
+
+    maximum = MAX_DIAGNOSTICS if max_diagnostics is None else max_diagnostics or None
+    write_raw(render(diagnostics, color=use_color(sys.stdout), maximum=maximum))
+    if maximum is not None and len(diagnostics) > maximum:
+        say("use --max-diagnostics 0 to show all diagnostics")
+
+
+def _is_error(diagnostic: Diagnostic, strict: bool) -> bool:
+    from composer.diagnostics import Severity
+
+    severity = diagnostic.severity
+    return severity is Severity.ERROR or (strict and severity is Severity.WARNING)

@@ -1,0 +1,219 @@
+"""``compose doctor``: check the ROS 2 setup of this computer."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict
+from importlib.util import find_spec
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.errors import FAILED, CommandError, UsageError
+from composer.cli.support.hosts import (
+    check_workspaces,
+    load_for_hosts,
+    reported_problems,
+    require_hosts,
+)
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
+from composer.cli.support.output.results import as_json
+from composer.cli.support.output.terminal import lines, say, write
+from composer.cli.support.ros import ros_session
+from composer.cli.support.system_arguments import complete_system, load_system, system_file
+
+if TYPE_CHECKING:
+    from composer.doctor.result import CheckResult, Level
+    from composer.model import System
+
+EPILOGS = {
+    "doctor": examples(
+        "compose doctor",
+        "compose doctor robot.yaml   check the discovery of a system as well",
+        "compose doctor robot.yaml --hosts   from each computer of the system",
+        "compose doctor --json",
+        "compose doctor --strict     treat warnings as errors, for CI",
+    )
+}
+_RETRY = "fix the errors above, then run 'compose doctor' again"
+_LEVEL_WIDTH, _AREA_WIDTH = 7, 11
+
+
+def doctor(
+    system: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SYSTEM]",
+            help="Check the discovery of this system too: its file or name.",
+            show_default=False,
+            autocompletion=complete_system,
+        ),
+    ] = None,
+    *,
+    hosts: Annotated[
+        bool,
+        typer.Option("--hosts", help="Check the other computers of the system as well, by ssh."),
+    ] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Treat warnings as errors.")] = False,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Check the ROS 2 setup and the ROS graph.
+
+    The command checks versions, environment variables, the network, discovery, interface packages,
+    and the types and QoS policies of running nodes. Each problem is reported with a remedy. Without
+    ROS, the ROS graph is not checked.
+
+    With a system, its 'discovery' is used and checked: addresses, interfaces, and whether nodes
+    discover each other through its server, which is started for that if necessary.
+
+    Exit code 1 if there are errors, or warnings with --strict.
+    """
+    from composer.doctor.result import Level
+
+    if hosts:
+        if system is None:
+            raise UsageError("--hosts needs a system", hint="compose doctor robot.yaml --hosts")
+        require_hosts("compose doctor --hosts")
+    results = []
+    declared = None if system is None else _load(system)
+    elsewhere = _check_hosts(system, timeout) if hosts and system is not None else ()
+    for result in chain(_check_all(declared, timeout), elsewhere):
+        results.append(result)
+        if not json:
+            write(_text(result))
+    if json:
+        write(as_json([asdict(result) for result in results], indent=2))
+    errors, warnings = (_count(results, level) for level in (Level.ERROR, Level.WARNING))
+    say(f"{_counted(errors, 'error')}, {_counted(warnings, 'warning')}")
+    if errors or (strict and warnings):
+        raise typer.Exit(FAILED)
+
+
+def _load(text: str) -> System:
+    result = load_system(system_file(text), shown=text, only_errors=True)
+    if result.system is None or not result.is_runnable:
+        raise typer.Exit(FAILED)
+    return result.system
+
+
+def _check_hosts(text: str, timeout: float) -> Iterator[CheckResult]:
+    """Check the other computers of a system, while its discovery server runs."""
+    result, system, relative = load_for_hosts(text)
+    from composer.doctor.hosts import check_hosts
+    from composer.hosts.start import remote_processes
+
+    used = {item.host.name.value: item.host for item in remote_processes(system)}
+    others = list(used.values())
+    check_workspaces(others)
+    with reported_problems(), _started_server(system):
+        yield from check_hosts(others, result.project.root, relative, timeout)
+
+
+def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
+    from composer.doctor.environment import check_environment, discovery_range
+    from composer.doctor.network import check_network
+    from composer.doctor.result import Level, note
+    from composer.doctor.versions import check_versions
+    from composer.report.tool import tool_version
+    from composer.runtime.process.environment import complete_environment
+    from composer.runtime.process.shared_memory import SHARED_MEMORY
+
+    yield from check_versions(tool_version())
+    if system is not None and system.discovery is not None:
+        from composer.doctor.discovery import check_declared_discovery
+        from composer.runtime.process.discovery import use_discovery
+
+        yield from check_declared_discovery(system.discovery, os.environ)
+        use_discovery(system.discovery, os.environ)
+    variables = dict(os.environ)
+    complete_environment(variables)
+    environment = list(check_environment(variables))
+    yield from environment
+    reach = discovery_range(os.environ)
+    # With LOCALHOST, rmw_fastrtps selects the transports itself, including shared memory.
+    transports = os.environ.get("FASTDDS_BUILTIN_TRANSPORTS")
+    uses_shared_memory = reach == "LOCALHOST" or transports != "UDPv4"
+    if os.environ.get("ROS_DISCOVERY_SERVER"):
+        reach = "server"  # neither multicast nor interfaces matter
+    yield from check_network(reach, shared_memory=SHARED_MEMORY if uses_shared_memory else None)
+    yield from _check_interfaces()
+    if any(result.level is Level.ERROR for result in environment):
+        yield note("graph", "not checked: the environment does not let ROS start", _RETRY)
+    elif find_spec("rclpy") is None:
+        yield note("graph", "not checked: rclpy is not installed", _RETRY)
+    else:
+        from composer.doctor.security import check_security
+
+        with _started_server(system):
+            yield from _check_live_graph(timeout)
+        yield check_security(variables)
+
+
+def _started_server(system: System | None) -> AbstractContextManager[None]:
+    """Return a block with the discovery server that 'compose run' would start."""
+    from composer.doctor.discovery import starts_server
+    from composer.runtime.children.discovery_server import discovery_servers
+
+    discovery = None if system is None else system.discovery
+    if discovery is None or not starts_server(discovery, os.environ):
+        return nullcontext()
+    return discovery_servers(discovery, os.environ, lambda *_: None)
+
+
+def _check_interfaces() -> Iterator[CheckResult]:
+    from composer.doctor.interfaces import check_interfaces
+    from composer.interfaces import Interfaces
+    from composer.interfaces.sources import find_packages
+    from composer.node_types import interface_folders
+    from composer.project import Project
+
+    folders = interface_folders(Project.at(Path.cwd()))
+    yield from check_interfaces(
+        find_packages(folders).packages(), Interfaces.load(folders), Interfaces.load()
+    )
+
+
+def _check_live_graph(timeout: float) -> Iterator[CheckResult]:
+    from composer.doctor.result import error
+
+    try:
+        with ros_session("compose doctor", timeout, carries_messages=True) as (session, deadline):
+            from composer.doctor.graph import (
+                check_delivery,
+                check_discovery,
+                check_graph,
+                check_middleware,
+            )
+
+            yield check_middleware()
+            yield check_delivery(session)
+            yield check_discovery(session, deadline)
+            yield from check_graph(session, deadline)
+    except CommandError as problem:
+        yield error("middleware", problem.message, problem.hint or _RETRY)
+    except (ImportError, RuntimeError) as problem:  # rclpy's own errors are RuntimeErrors
+        yield error(
+            "middleware",
+            f"ROS does not start: {problem}",
+            'reinstall it (pip install --force-reinstall "ros2-composer[ros]"), or source'
+            " /opt/ros/jazzy/setup.bash in a new terminal, but not both",
+        )
+
+
+def _text(result: CheckResult) -> str:
+    head = f"{result.level.value:<{_LEVEL_WIDTH}}  {result.area:<{_AREA_WIDTH}}  "
+    remedy = () if result.remedy is None else (f"{' ' * len(head)}-> {result.remedy}",)
+    return lines([head + result.message, *remedy])
+
+
+def _count(results: list[CheckResult], level: Level) -> int:
+    return sum(result.level is level for result in results)
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

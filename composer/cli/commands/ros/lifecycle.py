@@ -1,0 +1,252 @@
+"""``compose lifecycle``: lifecycle states and transitions of running nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.completion import complete_node, complete_running_system
+from composer.cli.support.errors import FAILED, CommandError, UsageError
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
+from composer.cli.support.output.results import as_json, say_none_found
+from composer.cli.support.output.terminal import columns, lines, say, write
+from composer.cli.support.ros import require_ros, ros_session
+
+if TYPE_CHECKING:
+    from composer.remote.lifecycle import LifecycleClient
+    from composer.remote.systems.lifecycle_batch import LifecycleBatch
+
+app = typer.Typer(
+    help="""Show and change lifecycle states of running nodes.
+
+    Works with every lifecycle node in the ROS graph.
+    """,
+    epilog=examples(
+        "compose lifecycle nodes",
+        "compose lifecycle get planner",
+        "compose lifecycle list planner",
+        "compose lifecycle set planner deactivate",
+        "compose lifecycle set --system pipeline --to inactive",
+    ),
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+NodeName = Annotated[
+    str,
+    typer.Argument(
+        metavar="NODE",
+        help="The full name (/planning/planner), or its last part (planner) if unambiguous.",
+        show_default=False,
+        autocompletion=complete_node,
+    ),
+]
+_TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
+_EXAMPLE = "for example: compose lifecycle set planner deactivate"
+
+
+def _complete_word(incomplete: str) -> list[str]:
+    transitions = [name for name in _TRANSITIONS if incomplete and name.startswith(incomplete)]
+    return [*complete_node(incomplete), *transitions]
+
+
+@contextmanager
+def _client(timeout_s: float) -> Iterator[LifecycleClient]:
+    with ros_session("compose lifecycle", timeout_s) as (session, deadline):
+        from composer.remote.lifecycle import LifecycleClient
+
+        yield LifecycleClient(session, deadline)
+
+
+@app.command("nodes", epilog=examples("compose lifecycle nodes", "compose lifecycle nodes --json"))
+def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False) -> None:
+    """List lifecycle nodes and their states.
+
+    Exit code 1 if a system on this computer does not respond, because its nodes are missing then.
+    """
+    known = _local_states(timeout)
+    if known is not None:
+        _write_states(known, json=json)
+        return
+    with ros_session("compose lifecycle", timeout) as (session, deadline):
+        from composer.remote.lifecycle import LifecycleClient
+        from composer.remote.name_matching import check_all_respond
+
+        client = LifecycleClient(session, deadline)
+        states = client.states(client.nodes())
+        _write_states(states, json=json)
+        check_all_respond(session)
+    if not states and not json:
+        say_none_found("lifecycle node")
+
+
+def _write_states(states: Mapping[str, str | None], *, json: bool) -> None:
+    if json:
+        write(as_json(states, indent=2))
+    elif states:
+        write(columns([(name, state or "(no response)") for name, state in states.items()]))
+
+
+def _local_states(timeout: float) -> dict[str, str] | None:
+    require_ros("compose lifecycle")
+    from composer.remote.systems.local_queries import local_states
+
+    return local_states(timeout)
+
+
+@app.command(
+    "get",
+    epilog=examples(
+        "compose lifecycle get planner", "compose lifecycle get /planning/planner --timeout 1"
+    ),
+)
+def get(node: NodeName, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
+    """Print the lifecycle state of a node."""
+    require_ros("compose lifecycle")
+    from composer.remote.systems.local_queries import local_state
+
+    state = local_state(node, timeout)
+    if state is None:
+        with _client(timeout) as client:
+            state = client.state(client.find(node))
+    write(lines([state]))
+
+
+@app.command("list", epilog=examples("compose lifecycle list planner"))
+def list_transitions(
+    node: NodeName, timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False
+) -> None:
+    """List the available transitions of a node."""
+    with _client(timeout) as client:
+        transitions = client.transitions(client.find(node))
+    if json:
+        found = [{"id": item.id, "label": item.label, "goal": item.goal} for item in transitions]
+        write(as_json(found, indent=2))
+    elif transitions:
+        write(lines(item.label for item in transitions))
+
+
+class GoalState(StrEnum):
+    """The primary states."""
+
+    UNCONFIGURED = "unconfigured"
+    INACTIVE = "inactive"
+    ACTIVE = "active"
+    FINALIZED = "finalized"
+
+
+@app.command(
+    "set",
+    epilog=examples(
+        "compose lifecycle set planner deactivate",
+        "compose lifecycle set planner motor_controller activate   several nodes",
+        "compose lifecycle set '/perception/*' deactivate           all nodes that match",
+        "compose lifecycle set planner --to active                  as many transitions as needed",
+        "compose lifecycle set planner deactivate --dependents",
+        "compose lifecycle set --system pipeline --to inactive",
+    ),
+)
+def set_state(
+    words: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="TARGET... TRANSITION",
+            help="Nodes (names or patterns), followed by configure, activate, deactivate, cleanup "
+            "or shutdown. With --to, no transition is given.",
+            show_default=False,
+            autocompletion=_complete_word,
+        ),
+    ] = None,
+    *,
+    to: Annotated[
+        GoalState | None,
+        typer.Option(
+            "--to",
+            metavar="STATE",
+            help="Go to this state: unconfigured, inactive, active or finalized.",
+            show_default=False,
+        ),
+    ] = None,
+    system: Annotated[
+        str | None,
+        typer.Option(
+            "--system",
+            metavar="SYSTEM",
+            help="Change all nodes of a running system, in order.",
+            show_default=False,
+            autocompletion=complete_running_system,
+        ),
+    ] = None,
+    dependents: Annotated[
+        bool,
+        typer.Option(
+            "--dependents",
+            help="Also deactivate the active nodes that depend on nodes that go down, before them, "
+            "and activate the inactive ones that depend on nodes that come up, after them.",
+        ),
+    ] = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Change the lifecycle state of nodes.
+
+    Only the given nodes are moved: nodes that depend on them stay active, and are named. The nodes
+    of a system are brought up in its bring-up order and taken down in reverse order. A transition
+    that is not available in the state of a node is not requested; the command continues with the
+    other nodes.
+
+    Exit code 1 if a transition is not available or fails.
+    """
+    targets, transition = _split(list(words or ()), to, system)
+    with ros_session("compose lifecycle set", timeout) as (session, deadline):
+        from composer.remote.systems.lifecycle_batch import (
+            LifecycleBatch,
+            LifecycleRequest,
+            nodes_of_system,
+        )
+
+        request = LifecycleRequest(transition, None if to is None else to.value)
+        nodes = None if system is None else nodes_of_system(session, deadline, system, request)
+        batch = LifecycleBatch(session, deadline, targets if nodes is None else nodes, request)
+        _check_dependents(batch, dependents=dependents)
+        failed = False
+        for outcome in batch.run(dependents=dependents):
+            if outcome.error is None:
+                write(lines([str(outcome.result)]))
+            else:
+                failed = True
+                say(CommandError(str(outcome.error), hint=outcome.error.hint).text())
+    if failed:
+        raise typer.Exit(FAILED)
+
+
+def _check_dependents(batch: LifecycleBatch, *, dependents: bool) -> None:
+    """Name the dependents that stay active. Raises CommandError if unknown ones should move."""
+    if dependents and batch.silent_systems:
+        silent = ", ".join(batch.silent_systems)
+        raise CommandError(
+            f"cannot find the dependents: {silent} does not respond",
+            hint="without --dependents, only the given nodes are moved",
+        )
+    if batch.active_dependents and not dependents:
+        names = ", ".join(batch.active_dependents)
+        say(f"note: active nodes depend on this: {names}; --dependents deactivates them first")
+
+
+def _split(
+    words: list[str], to: GoalState | None, system: str | None
+) -> tuple[list[str], str | None]:
+    """Return targets and transition. Raises UsageError."""
+    transition = None
+    if to is None:
+        if not words:
+            raise UsageError("specify a transition, or a state with --to", hint=_EXAMPLE)
+        transition = words.pop()
+    if system is None and not words:
+        raise UsageError("specify nodes, or a system with --system", hint=_EXAMPLE)
+    if system is not None and words:
+        raise UsageError(f"specify nodes or --system, not both (got '{words[0]}')", hint=_EXAMPLE)
+    return words, transition

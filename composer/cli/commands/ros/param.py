@@ -1,0 +1,313 @@
+"""``compose param``: the parameters of running nodes."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from composer.cli.support.completion import complete_node
+from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, HiddenNodes, Json, Timeout, examples
+from composer.cli.support.output.results import as_json, as_yaml, say_none_found
+from composer.cli.support.output.terminal import columns, lines, say, say_raw, use_color, write
+from composer.cli.support.ros import require_ros, ros_session
+
+if TYPE_CHECKING:
+    from composer.remote.parameters import ParameterClient
+    from composer.remote.systems.local_queries import LocalParameters
+    from composer.resolve.parameter_files import ParameterFiles
+    from composer.runtime.ros.parameter_description import ParameterDescription
+
+app = typer.Typer(
+    help="List, get and set parameters of running nodes.",
+    epilog=examples(
+        "compose param list planner",
+        "compose param get planner max_velocity",
+        "compose param set planner max_velocity 0.5",
+        "compose param dump planner > planner.yaml",
+    ),
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+Node = Annotated[
+    str,
+    typer.Argument(
+        metavar="NODE",
+        help="The full name of a node, or its last part if unambiguous.",
+        autocompletion=complete_node,
+    ),
+]
+Name = Annotated[str, typer.Argument(metavar="PARAMETER")]
+
+
+@contextmanager
+def _parameters(node: str, timeout: float) -> Iterator[ParameterClient]:
+    with ros_session("compose param", timeout) as (session, deadline):
+        from composer.remote.parameters import ParameterClient
+
+        yield ParameterClient(session, deadline, node)
+
+
+@contextmanager
+def _readable(
+    node: str, timeout: float, names: Iterable[str] = ()
+) -> Iterator[ParameterClient | LocalParameters]:
+    """Yield the parameters of a node: from a running system, or else from the node itself.
+
+    Only the latter reports errors, so the former has all of ``names``.
+    """
+    require_ros("compose param")
+    from composer.remote.systems.local_queries import local_parameters
+
+    local = local_parameters(node, timeout)
+    if local is not None and local.described.keys() >= set(names):
+        yield local
+        return
+    with _parameters(node, timeout) as parameters:
+        yield parameters
+
+
+@app.command("list", epilog=examples("compose param list planner", "compose param list"))
+def list_parameters(
+    node: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[NODE]",
+            help="The full name of a node, or its last part. Default: all nodes.",
+            show_default=False,
+            autocompletion=complete_node,
+        ),
+    ] = None,
+    *,
+    types: Annotated[bool, typer.Option("--param-type", help="Print the types as well.")] = False,
+    hidden: HiddenNodes = False,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """List the parameters of a node or of all nodes."""
+    if node is None:
+        _list_all(timeout, types=types, hidden=hidden, json=json)
+        return
+    with _readable(node, timeout) as parameters:
+        names = _listed(parameters, parameters.names(), types=types, json=json)
+    if json:
+        write(as_json(names, indent=2))
+    elif names:
+        write(lines(names))
+
+
+def _listed(
+    parameters: ParameterClient | LocalParameters, names: Sequence[str], *, types: bool, json: bool
+) -> list[Any]:
+    """Return the names as they are printed: text, or objects if the JSON has types."""
+    if not types:
+        return list(names)
+    described = parameters.describe(names)
+    if json:
+        return [{"name": item.name, "type": item.type} for item in described]
+    return [f"{item.name} (type: {item.type})" for item in described]
+
+
+def _list_all(timeout: float, *, types: bool, hidden: bool, json: bool) -> None:
+    found = _ask_all(timeout, types=types, hidden=hidden, json=json)
+    if found is None:
+        found = _discover_all(timeout, types=types, hidden=hidden, json=json)
+    if json:
+        write(as_json(found, indent=2))
+        return
+    if not found:
+        say_none_found("node")
+    for node, names in found.items():
+        if names is None:
+            say(
+                f"{node} did not respond: its parameter services may be disabled, or it may be busy"
+            )
+        else:
+            write(lines([f"{node}:", *(f"  {name}" for name in names)]))
+
+
+def _ask_all(
+    timeout: float, *, types: bool, hidden: bool, json: bool
+) -> dict[str, list[Any] | None] | None:
+    """Return the parameters of all nodes if the systems on this computer have them all."""
+    require_ros("compose param")
+    from composer.remote.systems.local_queries import all_local_parameters
+
+    known = all_local_parameters(timeout, hidden=hidden)
+    if known is None:
+        return None
+    return {item.node: _listed(item, item.names(), types=types, json=json) for item in known}
+
+
+def _discover_all(
+    timeout: float, *, types: bool, hidden: bool, json: bool
+) -> dict[str, list[Any] | None]:
+    with ros_session("compose param", timeout) as (session, deadline):
+        from composer.remote.parameters import ParameterClient, names_by_node
+
+        found: dict[str, list[Any] | None] = dict(names_by_node(session, deadline, hidden=hidden))
+        if types:
+            for node, known in found.items():
+                if known is not None:
+                    client = ParameterClient(session, deadline, node)
+                    found[node] = _listed(client, known, types=True, json=json)
+    return found
+
+
+@app.command("get", epilog=examples("compose param get planner max_velocity"))
+def get(
+    node: Node, name: Name, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
+) -> None:
+    """Print the value of a parameter."""
+    with _readable(node, timeout, [name]) as parameters:
+        value = parameters.values([name])[name]
+    write(as_json(value) if json else as_yaml(value))
+
+
+@app.command("set", epilog=examples("compose param set planner max_velocity 0.5"))
+def set_value(
+    node: Node,
+    name: Name,
+    value: Annotated[str, typer.Argument(metavar="VALUE", help="The value, as YAML.")],
+    *,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Set a parameter.
+
+    Exit code 1 if the node rejects the value; the reason is printed.
+    """
+    with _parameters(node, timeout) as parameters:
+        (described,) = parameters.describe([name])
+        values_set = parameters.set({name: value if described.type == "string" else _yaml(value)})
+    _print_values(parameters.node, values_set, json)
+
+
+@app.command("delete", epilog=examples("compose param delete planner max_velocity"))
+def delete(
+    node: Node, name: Name, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
+) -> None:
+    """Delete a parameter.
+
+    Exit code 1 if the node rejects that: only a parameter that was declared without a type can be
+    deleted.
+    """
+    with _parameters(node, timeout) as parameters:
+        parameters.delete(name)
+    if json:
+        write(as_json({"node": parameters.node, "deleted": name}))
+    else:
+        write("Deleted parameter successfully")
+
+
+@app.command("describe", epilog=examples("compose param describe planner max_velocity"))
+def describe(
+    node: Node,
+    names: Annotated[list[str], typer.Argument(metavar="PARAMETER...")],
+    *,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Print the type, range and description of parameters.
+
+    With --json, the output is an object for one parameter and an array for several.
+    """
+    with _readable(node, timeout, names) as parameters:
+        described = [_facts(found) for found in parameters.describe(names)]
+    if json:
+        write(as_json(described[0] if len(described) == 1 else described, indent=2))
+        return
+    tables = (columns([(f"{key}:", str(facts[key])) for key in facts]) for facts in described)
+    write("\n\n".join(tables))
+
+
+@app.command("dump", epilog=examples("compose param dump planner > planner.yaml"))
+def dump(node: Node, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
+    """Print the parameters of a node as a parameter file."""
+    with _readable(node, timeout) as parameters:
+        values = parameters.values(parameters.names())
+    content = {parameters.node: {"ros__parameters": values}}
+    write(as_json(content, indent=2) if json else as_yaml(content))
+
+
+@app.command("load", epilog=examples("compose param load planner planner.yaml"))
+def load(
+    node: Node,
+    file: Annotated[Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False)],
+    *,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Set the parameters of a node from a parameter file.
+
+    The file can name the node in full or with wildcards.
+    """
+    sections = _read(file)
+    with _parameters(node, timeout) as parameters:
+        values = _values_for(parameters.node, sections, parameters.names())
+        if not values:
+            raise CommandError(
+                f"'{file}' has no parameters for {parameters.node}",
+                hint=f"add them under '{parameters.node}: ros__parameters:'",
+            )
+        values_set = parameters.load(values)
+    _print_values(parameters.node, values_set, json)
+
+
+def _print_values(node: str, values: dict[str, Any], json: bool) -> None:
+    """Print the values that were set; the JSON is a ROS parameter file, as with ``dump``."""
+    if json:
+        write(as_json({node: {"ros__parameters": values}}, indent=2))
+    else:
+        write(lines(f"{node} {name}: {as_json(value)}" for name, value in values.items()))
+
+
+def _yaml(text: str) -> Any:
+    import yaml
+
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        problem = getattr(error, "problem", None) or "it cannot be parsed"
+        raise UsageError(f"'{text:.40}' is not YAML: {problem}") from error
+
+
+def _read(file: Path) -> ParameterFiles:
+    from composer.diagnostics import has_errors
+    from composer.report.text import render
+    from composer.resolve.parameter_files import ParameterFiles, read_parameter_file
+
+    sections = ParameterFiles()
+    diagnostics = read_parameter_file(file, sections)
+    if diagnostics:
+        say_raw(render(diagnostics, color=use_color(sys.stderr)))
+    if has_errors(diagnostics):
+        raise CommandError(f"'{file}' is not a ROS parameter file")
+    return sections
+
+
+def _values_for(node: str, sections: ParameterFiles, declared: Iterable[str]) -> dict[str, Any]:
+    from composer.tree import plain
+
+    given = sections.given(node, frozenset(declared))
+    return {name: plain(entry.value) for name, entry in given.items()}
+
+
+def _facts(found: ParameterDescription) -> dict[str, Any]:
+    facts = {
+        "name": found.name,
+        "type": found.type,
+        "description": found.description,
+        "constraints": found.constraints,
+        "minimum": found.minimum,
+        "maximum": found.maximum,
+        "step": found.step,
+        "read_only": found.read_only or None,
+    }
+    return {name: value for name, value in facts.items() if value not in (None, "")}

@@ -1,0 +1,161 @@
+"""``compose dashboard``: show and control running systems in the browser."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.dashboard_process import (
+    follow_parent,
+    foxglove_line,
+    report_address,
+    require_dashboard,
+)
+from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.options import (
+    Autostart,
+    AutostartOfRun,
+    Namespace,
+    SettingsOfRun,
+    examples,
+)
+from composer.cli.support.output.terminal import write
+from composer.cli.support.process import end_now
+from composer.cli.support.ros import require_ros
+from composer.cli.support.system_arguments import (
+    complete_system,
+    example_systems,
+    load_system,
+    path_exists,
+    project_systems,
+    system_file,
+)
+
+if TYPE_CHECKING:
+    from composer.dashboard.declared import Declared
+
+EPILOGS = {
+    "dashboard": examples(
+        "compose dashboard                            the whole ROS graph",
+        "compose dashboard systems/pipeline.yaml      with source lines, plan and drift",
+        "compose dashboard --open                     open the browser",
+        "compose dashboard --read-only                change nothing",
+        "compose dashboard --host 0.0.0.0 --token-file token    for other computers",
+    )
+}
+_HIGHEST_PORT = 65535
+
+
+def dashboard(
+    system: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SYSTEM]",
+            help="The file of a system, or the name of a running or an example system.",
+            show_default=False,
+            autocompletion=complete_system,
+        ),
+    ] = None,
+    *,
+    host: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="The address to listen on.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=_HIGHEST_PORT,
+            help="The port to listen on; 0 is any free port.",
+            show_default="8800, or the next free one",
+        ),
+    ] = None,
+    open_browser: Annotated[
+        bool, typer.Option("--open", help="Open the page in the browser.")
+    ] = False,
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Read the token from a private FILE instead of generating one.",
+            show_default=False,
+        ),
+    ] = None,
+    read_only: Annotated[
+        bool, typer.Option("--read-only", help="Refuse every request that changes something.")
+    ] = False,
+    foxglove: Annotated[
+        bool,
+        typer.Option("--foxglove/--no-foxglove", help="Serve Foxglove and Lichtblick as well."),
+    ] = True,
+    settings: SettingsOfRun = None,
+    namespace: Namespace = None,
+    autostart: AutostartOfRun = None,
+) -> None:
+    """Show and control running systems in the browser.
+
+    Prints the address of the page, and that for Foxglove and Lichtblick, with a token that is new
+    for each start. Press Ctrl-C to stop.
+    The dashboard shows the whole ROS graph. With the file of a system, it also shows source lines,
+    the plan, and the differences between the file and the running system.
+
+    It joins the ROS graph only while a browser is connected, and subscribes to what is on the
+    screen.
+    """
+    descriptor = follow_parent()
+    require_dashboard("compose dashboard")
+    declared = None if system is None else _declared(system, settings or [], namespace, autostart)
+    require_ros("compose dashboard", None if declared is None else declared.system)
+    from composer.dashboard.access import InvalidTokenFileError
+    from composer.dashboard.context import Options
+    from composer.dashboard.server import PortInUseError
+    from composer.dashboard.start import Address, NotPrivateError, run_dashboard
+
+    def on_ready(url: str) -> None:
+        if descriptor is not None:
+            report_address(descriptor, url)
+            return
+        write(url)
+        if foxglove:
+            write(foxglove_line(url))
+        if open_browser:
+            import webbrowser
+
+            webbrowser.open(url)
+
+    try:
+        run_dashboard(
+            Address(host, port, token_file),
+            Options(system or "", read_only, foxglove),
+            declared,
+            int(os.environ.get("ROS_DOMAIN_ID") or 0),
+            on_ready,
+        )
+    except NotPrivateError as error:
+        hint = "it protects the dashboard from other computers: openssl rand -hex 32 > token"
+        raise UsageError(str(error), hint=hint) from error
+    except (InvalidTokenFileError, PortInUseError) as error:
+        raise CommandError(str(error)) from error
+    end_now(0)  # threads of ROS may hang
+
+
+def _declared(
+    text: str, settings: list[str], namespace: str | None, autostart: Autostart | None
+) -> Declared | None:
+    """Return the system of a file; None for the name of a running system without a known file."""
+    from composer.dashboard.declared import Declared
+    from composer.model import PrimaryState
+
+    is_file = path_exists(Path(text)) or text.endswith((".yaml", ".yml"))
+    if not is_file and text.rpartition("/")[2] not in {**project_systems(), **example_systems()}:
+        return None
+    path = system_file(text if is_file else text.rpartition("/")[2])
+    result = load_system(path, shown=text, settings=settings, namespace=namespace)
+    if result.system is not None and result.system.node_type:
+        raise CommandError(f"'{text}' is a node type, not a system")
+    if result.system is None or not result.is_runnable:
+        raise CommandError(f"'{text}' has errors, so it cannot be shown")
+    goal = PrimaryState(autostart.value) if autostart is not None else None
+    return Declared(result.system, str(path), tuple(result.diagnostics), goal)

@@ -1,0 +1,167 @@
+"""``compose ps``: the running systems and their nodes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+import typer
+
+from composer.cli.support.errors import FAILED
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
+from composer.cli.support.output.results import as_json
+from composer.cli.support.output.terminal import columns, lines, write
+from composer.cli.support.ros import require_ros, ros_session
+from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
+
+if TYPE_CHECKING:
+    from composer.remote.systems.system_reports import NodeReport, PartialReport, SystemReport
+
+EPILOGS = {
+    "ps": examples(
+        "compose ps                 all running systems and other lifecycle nodes",
+        "compose ps pipeline        a single system",
+        "compose ps --json          print JSON",
+        "compose ps pipeline --ready    check that all of its nodes are up, as containers do",
+    )
+}
+
+#: None stands for a system that did not respond.
+_Systems: TypeAlias = "Mapping[str, SystemReport | PartialReport | None]"
+#: The reports of systems by their names, and the states of other lifecycle nodes. None stands for a
+#: node that did not respond.
+_Listed: TypeAlias = "tuple[_Systems, Mapping[str, str | None]]"
+
+_HEAD = ("node", "state", "since", "restarts", "errors", "out Hz", "in Hz", "last error")
+
+
+def ps(
+    system: AnyRunningSystem = None,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+    json: Json = False,
+    ready: Annotated[
+        bool,
+        typer.Option(
+            "--ready", help="Exit with 1 unless every node is in the state that it should have."
+        ),
+    ] = False,
+) -> None:
+    """List running systems and their nodes.
+
+    For each node, the list has the state and its duration, the number of restarts and errors, the
+    message rates over the last second, and the last error. Lifecycle nodes that do not belong to a
+    system are listed with their states. If a system is of another version of ros2-composer, only
+    the states of its nodes are listed. With --json, the output includes callback timings, which
+    'compose top' shows as a table.
+
+    With --ready, the exit code is 1 if a system is being started or shut down, or is paused, if a
+    node has failed, or if no system runs. A process of a system, such as robot/perception, is ready
+    once the coordinating process has brought up its nodes.
+    """
+    name = None if system is None else running_system_name(system)
+    listed = _ask(name, timeout, callbacks=json) or _discover(name, timeout, callbacks=json)
+    write(_as_json(*listed) if json else _as_text(*listed))
+    reports = listed[0].values()
+    if ready and not (reports and all(report and report.is_ready for report in reports)):
+        raise typer.Exit(FAILED)
+
+
+def _ask(name: str | None, timeout: float, *, callbacks: bool) -> _Listed | None:
+    """Return what runs if the systems on this computer know that."""
+    require_ros("compose ps")
+    from composer.remote.systems.local_queries import local_report, local_reports
+
+    if name is None:
+        reports = local_reports(timeout, callbacks=callbacks)
+        return None if reports is None else (reports, {})
+    report = local_report(name, timeout, callbacks=callbacks)
+    return None if report is None else ({report.name: report}, {})
+
+
+def _discover(name: str | None, timeout: float, *, callbacks: bool) -> _Listed:
+    with ros_session("compose ps", timeout) as (session, deadline):
+        from composer.remote.systems.process_list import list_one, list_processes
+
+        if name is None:
+            listed = list_processes(session, deadline, callbacks=callbacks)
+        else:
+            listed = list_one(session, deadline, name, callbacks=callbacks)
+    return listed.systems, listed.others
+
+
+def _as_json(systems: _Systems, others: Mapping[str, str | None]) -> str:
+    content: dict[str, Any] = {
+        "systems": [
+            {"name": name} | ({"answered": False} if report is None else _report(report))
+            for name, report in systems.items()
+        ],
+        "nodes": [{"node": node, "state": state} for node, state in others.items()],
+    }
+    return as_json(content, indent=2)
+
+
+def _report(report: SystemReport | PartialReport) -> dict[str, Any]:
+    """Return the report with the callbacks below their nodes."""
+    from composer.remote.systems.system_reports import PartialReport
+
+    content = asdict(report)
+    if isinstance(report, PartialReport):
+        states = content.pop("states").items()
+        nodes = [{"node": node, "state": state} for node, state in states]
+        return content | {"another_version": True, "nodes": nodes}
+    for time_of_report in ("at_s", "callbacks_at_s", "processes_at_s"):
+        content.pop(time_of_report)
+    callbacks = content.pop("callbacks")
+    for node in content["nodes"]:
+        node["callbacks"] = [
+            {key: callback[key] for key in callback if key not in ("node", "histogram")}
+            for callback in callbacks
+            if callback["node"] == node["node"]
+        ]
+    return content
+
+
+def _as_text(systems: _Systems, others: Mapping[str, str | None]) -> str:
+    parts = [_system(name, report) for name, report in systems.items()]
+    if others:
+        rows = [(node, state or "(no response)") for node, state in others.items()]
+        title = "other lifecycle nodes" if parts else "lifecycle nodes"
+        parts.append(f"{title}\n{columns(rows)}")
+    return "\n\n".join(parts) or "no system is running"
+
+
+def _system(name: str, report: SystemReport | PartialReport | None) -> str:
+    from composer.remote.systems.system_reports import PartialReport
+
+    if report is None:
+        return lines([f"{name}: no response, its process may be busy or gone"])
+    where = f"host {report.host}, process {report.pid}"
+    if isinstance(report, PartialReport):
+        title = lines([f"{name}: of another version of ros2-composer, only states known ({where})"])
+        return f"{title}\n{columns([_HEAD[:2], *report.states.items()])}"
+    rows = [_HEAD, *(_row(node) for node in report.nodes)]
+    title = lines([f"{name}: {report.activity}, {report.message} ({where})"])
+    return f"{title}\n{columns(rows)}"
+
+
+def _row(node: NodeReport) -> tuple[str, ...]:
+    return (
+        node.node,
+        f"{node.state} (failed)" if node.held_down else node.state,
+        _duration(time.time() - node.since_s),
+        str(node.restarts),
+        str(node.errors),
+        f"{node.sent_hz:.1f}",
+        f"{node.received_hz:.1f}",
+        node.last_error,
+    )
+
+
+def _duration(seconds: float) -> str:
+    """Return a duration in its largest fitting unit: ``12 s``, ``3 min``, ``5 h``, ``2 d``."""
+    for limit_s, unit_s, unit in ((120, 1, "s"), (7200, 60, "min"), (172_800, 3600, "h")):
+        if seconds < limit_s:
+            return f"{max(0, int(seconds / unit_s))} {unit}"
+    return f"{int(seconds / 86_400)} d"

@@ -1,0 +1,361 @@
+"""``compose run``: validate, bring up, supervise and shut down a system."""
+
+from __future__ import annotations
+
+import gc
+import math
+import os
+import signal
+import sys
+from contextlib import ExitStack
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.dashboard_process import require_dashboard
+from composer.cli.support.errors import CONFIG, CommandError, UsageError
+from composer.cli.support.options import (
+    Autostart,
+    AutostartTo,
+    LogLevelOption,
+    LogSeverity,
+    Namespace,
+    Settings,
+    UseSimTime,
+    examples,
+    finite,
+    options_of_run,
+)
+from composer.cli.support.output.terminal import say, write
+from composer.cli.support.ros import announce_discovery, require_interfaces, require_ros
+from composer.cli.support.system_arguments import SystemName, load_system, system_file
+
+if TYPE_CHECKING:
+    from composer.model import Process, System
+    from composer.plan import Plan
+    from composer.runtime.host_options import HostOptions
+    from composer.runtime.supervision.events import Outcome
+
+EPILOGS = {
+    "run": examples(
+        "compose run pipeline                                  run an example system until Ctrl-C",
+        "compose run systems/pipeline.yaml --for 10            run for ten seconds",
+        "compose run pipeline --dry-run                        print the plan; needs no ROS",
+        "compose run pipeline --set planner.max_velocity=0.5   set a parameter",
+        "compose run pipeline --namespace /robot1              use another namespace",
+        "compose run pipeline --for 10 --fail-on-error         test that no handler fails",
+        "compose run pipeline --use-sim-time                   use the time of a simulator",
+        "compose run pipeline --autostart inactive             configure nodes, do not activate",
+        "compose run pipeline --wait --timeout 10              run in the background",
+        "compose run robot.yaml --process perception           run one of its processes alone",
+        "compose run pipeline --dashboard                      watch and control it in the browser",
+    )
+}
+
+#: The default of ``--timeout`` with ``--wait``.
+_WAIT_S = 60.0
+#: How long the process may take to start, on a busy machine, before its own limits apply.
+_START_S = 20.0
+
+
+def run(
+    system: SystemName,
+    *,
+    run_for: Annotated[
+        float | None,
+        typer.Option(
+            "--for",
+            metavar="SECONDS",
+            min=0.0,
+            callback=finite,
+            help="Shut down after this time.",
+            show_default=False,
+        ),
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print the plan with its causes and exit.")
+    ] = False,
+    settings: Settings = None,
+    namespace: Namespace = None,
+    use_sim_time: UseSimTime = False,
+    autostart: AutostartTo = None,
+    log_level: LogLevelOption = None,
+    tracing: Annotated[
+        bool,
+        typer.Option(
+            "--tracing/--no-tracing",
+            help="Record callback timings for 'compose top'.",
+        ),
+    ] = True,
+    check_mutation: Annotated[
+        bool,
+        typer.Option(
+            "--check-mutation",
+            help="Report callbacks that modify published or received messages. Slow.",
+        ),
+    ] = False,
+    fail_on_error: Annotated[
+        bool,
+        typer.Option(
+            "--fail-on-error",
+            help="Exit with code 1 if a handler has raised an error or a call has failed.",
+        ),
+    ] = False,
+    dashboard: Annotated[
+        bool,
+        typer.Option(
+            "--dashboard",
+            help="Start 'compose dashboard' as well, and print the address of its page.",
+        ),
+    ] = False,
+    wait: Annotated[
+        bool,
+        typer.Option("--wait", help="Run in the background; return once the system is up."),
+    ] = False,
+    timeout: Annotated[
+        float | None,
+        typer.Option(
+            "--timeout",
+            metavar="SECONDS",
+            min=0.0,
+            callback=finite,
+            help="Maximum time for the bring-up; then the system is shut down.",
+            show_default="no limit; 60 with --wait",
+        ),
+    ] = None,
+    process: Annotated[
+        str | None,
+        typer.Option(
+            "--process",
+            metavar="NAME",
+            help="Run only this process of the system; 'compose run' without it moves its nodes.",
+            show_default=False,
+        ),
+    ] = None,
+    await_processes: Annotated[
+        bool,
+        typer.Option(
+            "--await-processes",
+            help="Start no other process of the system; wait for those that are started elsewhere.",
+        ),
+    ] = False,
+    grace: Annotated[
+        float,
+        typer.Option(
+            "--grace",
+            metavar="SECONDS",
+            min=0.0,
+            callback=finite,
+            help="Maximum time for shutdown.",
+        ),
+    ] = 10.0,
+) -> None:
+    """Run a system.
+
+    The system is validated first, and nothing is started if it has errors. All nodes run in this
+    process, except for executables and the nodes of other processes, which it starts. They are
+    brought up in dependency order and shut down in reverse order. If the bring-up fails, it is
+    rolled back. Press Ctrl-C to shut down.
+
+    Exit code 1 if the bring-up fails or a node fails permanently, 78 if the system has errors or
+    lacks an interface package. Errors of handlers are reported in the summary; use --fail-on-error
+    in tests.
+    """
+    declared = _load(
+        system,
+        settings or [],
+        namespace,
+        use_sim_time=use_sim_time,
+        only_errors=process is not None,  # the coordinating process prints the warnings
+    )
+    from composer.model import PrimaryState, member_system
+    from composer.plan import bring_up, start_goals, tear_down
+    from composer.runtime.process.instance_lock import STARTED_BY_VARIABLE
+
+    member = None if process is None else _member(declared, process)
+    down = tear_down(declared, process)
+    started_by = os.environ.pop(STARTED_BY_VARIABLE, "")  # not for its own children
+    if member is not None:
+        os.environ.update({name.value: value for name, value in member.environment})
+        goals = start_goals(declared, PrimaryState.ACTIVE)
+        declared = member_system(declared, member.name.value, goals)
+        autostart = Autostart.UNCONFIGURED
+    plan = bring_up(declared, PrimaryState(autostart.value) if autostart is not None else None)
+    if dry_run:
+        if plan.steps:
+            write(str(plan))
+        return
+    if not wait:
+        # Let Ctrl-C end the process at once until the host handles it: while ROS is being imported,
+        # a KeyboardInterrupt can be lost or become an ImportError.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if await_processes and member is not None:
+        raise UsageError("--await-processes cannot be used with --process, which starts no other")
+    require_ros("compose run", declared)
+    require_interfaces(declared)
+    if process is None:
+        announce_discovery(declared)
+    switches = [] if tracing else ["--no-tracing"]
+    switches += ["--check-mutation"] if check_mutation else []
+    start = options_of_run(
+        settings or (), namespace, autostart, log_level, use_sim_time=use_sim_time
+    )
+    if dashboard:
+        require_dashboard("compose run --dashboard")
+    if wait:
+        from composer.cli.support.process import run_in_background
+
+        up_s = _WAIT_S if timeout is None else timeout
+        given = [system, *start, *switches]
+        given += ["--fail-on-error"] if fail_on_error else []
+        given += [] if process is None else ["--process", process]
+        given += ["--await-processes"] if await_processes else []
+        given += ["--dashboard"] if dashboard else []
+        limits = _numbers({"--for": run_for, "--timeout": up_s, "--grace": grace})
+        limit_s = up_s + grace + _START_S
+        write(run_in_background(declared.name.value, [*given, *limits], limit_s))
+        return
+    options = _options(run_for, timeout, grace, log_level)
+    from composer.cli.support.process import compose_command
+
+    options = replace(
+        options,
+        tracing=tracing,
+        check_mutation=check_mutation,
+        fail_on_error=fail_on_error,
+        process=member,
+        started_by=started_by,
+        member_command=()
+        if await_processes
+        else (*compose_command(), "run", system, *start, *switches),
+    )
+    shown = _dashboard_arguments(system, settings or [], namespace, autostart)
+    outcome = _run(declared, (plan, down), options, shown if dashboard else None)
+    if outcome.exit_code:
+        raise typer.Exit(outcome.exit_code)
+
+
+def _load(
+    text: str,
+    settings: list[str],
+    namespace: str | None,
+    *,
+    use_sim_time: bool,
+    only_errors: bool,
+) -> System:
+    path = system_file(text)
+    result = load_system(
+        path,
+        shown=text,
+        settings=settings,
+        namespace=namespace,
+        use_sim_time=use_sim_time,
+        only_errors=only_errors,
+    )
+    if result.system is not None and result.system.node_type:
+        raise CommandError(
+            f"'{text}' is a node type, not a system",
+            hint="use it in a system under 'nodes:'; 'compose validate' checks it on its own",
+            exit_code=CONFIG,
+        )
+    if result.system is None or not result.is_runnable:
+        raise typer.Exit(CONFIG)
+    return result.system
+
+
+def _member(system: System, name: str) -> Process:
+    """Return a process of the system by its name."""
+    from composer.diagnostics import suggestion
+
+    found = {process.name.value: process for process in system.processes}
+    if name not in found:
+        hint = suggestion(name, list(found)) or "the system has no 'processes'"
+        raise UsageError(f"'{name}' is not a process of system '{system.name}'", hint=hint)
+    return found[name]
+
+
+def _dashboard_arguments(
+    system: str, settings: list[str], namespace: str | None, autostart: Autostart | None
+) -> list[str]:
+    """Return the arguments of the dashboard that shows this system."""
+    given = options_of_run(settings, namespace, autostart, None, use_sim_time=False)
+    return [*given, "--", system]
+
+
+def _numbers(options: dict[str, float | None]) -> list[str]:
+    given = {name: value for name, value in options.items() if value is not None}
+    return [text for name, value in given.items() for text in (name, repr(value))]
+
+
+def _run(
+    system: System, plans: tuple[Plan, Plan], options: HostOptions, dashboard: list[str] | None
+) -> Outcome:
+    """Run the system, with its plans up and down, and a dashboard if its arguments are given."""
+    gc.disable()  # until the host has its nodes
+    from composer.cli.support.dashboard_process import shown_address
+    from composer.cli.support.output.console import queued_output
+    from composer.cli.support.output.line_format import console_format
+    from composer.cli.support.output.progress import Progress, severity_of, summary
+    from composer.cli.support.process import end_now
+    from composer.cli.support.run_logging import run_log
+    from composer.names import join
+    from composer.runtime.host import Host
+    from composer.runtime.process import StartRefused
+    from composer.runtime.process.instance_lock import ALREADY_RUNS, AlreadyRunning
+    from composer.runtime.process.service_manager import ALIVE, READY, STOPPING, ServiceManager
+    from composer.runtime.supervision.events import BroughtUp, Event, Logged, Stopping
+
+    with ExitStack() as stack:
+        stack.enter_context(queued_output())
+        is_part = "/" in system.name.value  # a process of a system: robot/perception
+        name = join(system.namespace, system.name.value)
+        is_child = bool(options.started_by)  # its lines go to the process that has started it
+        log = stack.enter_context(run_log(name, part=is_part, forwarded=is_child))
+        address = None if dashboard is None else stack.enter_context(shown_address(dashboard))
+        progress = Progress(sys.stderr, console_format(), address)
+
+        service_manager = ServiceManager()
+
+        def report(event: Event) -> None:
+            # The process that has started this one prints the states of its nodes.
+            is_known = options.started_by and not isinstance(event, Logged)
+            if not is_known or severity_of(event) != "INFO":
+                progress.show(event)
+            log.show(event)
+            if isinstance(event, BroughtUp | Stopping):
+                state = READY if isinstance(event, BroughtUp) else STOPPING
+                service_manager.send(state, f"STATUS={event}")
+
+        options = replace(options, on_alive=partial(service_manager.send, ALIVE))
+        up, down = plans
+        host = Host(system, up, down, options, report)
+        try:
+            outcome = host.run()
+        except StartRefused as refusal:
+            if options.started_by and isinstance(refusal, AlreadyRunning):
+                raise typer.Exit(ALREADY_RUNS) from refusal
+            raise CommandError(str(refusal), hint=refusal.hint) from refusal
+        if options.process is None or sys.stderr.isatty():
+            say(summary(outcome))
+    if outcome.hung:
+        end_now(outcome.exit_code)
+    return outcome
+
+
+def _options(
+    run_for: float | None, timeout: float | None, grace: float, level: LogSeverity | None
+) -> HostOptions:
+    from composer.cli.support.process import end_within
+    from composer.model import LogLevel
+    from composer.runtime.host_options import HostOptions
+
+    return HostOptions(
+        run_for_s=run_for,
+        bring_up_within_s=math.inf if timeout is None else timeout,
+        grace_s=grace,
+        log_level=LogLevel.INFO if level is None else LogLevel(level.value),
+        end_within=end_within,
+        ends_process=True,
+    )

@@ -1,0 +1,138 @@
+"""``compose top``: the callbacks of a running system, live."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Timeout, examples, finite
+from composer.cli.support.output.results import as_json
+from composer.cli.support.output.screen import Screen
+from composer.cli.support.output.terminal import write
+from composer.cli.support.ros import ros_session
+from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
+
+if TYPE_CHECKING:
+    from composer.cli.support.output.callback_tables import SortKey
+    from composer.remote.session import Session
+    from composer.remote.systems.managers import Systems
+    from composer.remote.systems.system_reports import SystemReport
+
+EPILOGS = {
+    "top": examples(
+        "compose top                   show the running system; press q to quit",
+        "compose top pipeline          show one of several systems",
+        "compose top --sort late       show the most delayed timers first",
+        "compose top --once            print one table and exit",
+        "compose top --json            print a line of JSON every second",
+    )
+}
+_SORT_KEYS = "busy, calls, mean, p99, max, late, dropped or node"
+#: Managers report about every second; accept a report that is this much early.
+_EARLY_S = 0.5
+#: A system without a report for this long, beyond the interval, may have ended.
+_NO_REPORT_S = 5.0
+#: The other processes of a system report in the same period, at times of their own.
+_OTHERS_WITHIN_S = 1.5
+
+
+def top(
+    system: AnyRunningSystem = None,
+    *,
+    sort: Annotated[
+        str, typer.Option("--sort", metavar="KEY", help=f"Sort by {_SORT_KEYS}.")
+    ] = "busy",
+    once: Annotated[bool, typer.Option("--once", help="Print one table and exit.")] = False,
+    interval: Annotated[
+        float,
+        typer.Option(
+            "--interval",
+            metavar="SECONDS",
+            min=1.0,
+            callback=finite,
+            help="Time between updates.",
+        ),
+    ] = 1.0,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print one line of JSON per update.")
+    ] = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Show the timings of callbacks in a running system.
+
+    'calls/s' and 'busy' (the share of a thread) refer to the last interval. All other values are
+    since the start: 'late' is how late a timer is called (99th percentile), 'over' counts calls
+    that took longer than their budget_ms, and 'dropped' counts messages dropped from full queues.
+    """
+    name = None if system is None else running_system_name(system)
+    with ros_session("compose top", timeout) as (session, deadline):
+        from composer.cli.support.output.callback_tables import SortKey
+        from composer.remote.systems.managers import Systems
+
+        if sort not in list(SortKey):
+            raise UsageError(f"cannot sort by '{sort}'", hint=f"expected {_SORT_KEYS}")
+        systems = Systems(session, deadline, callbacks=True)
+        found = systems.only() if name is None else systems.find(name)
+        follower = _Follower(session, systems, systems.report(found))
+        key = SortKey(sort)
+        with Screen(full=not (once or json)) as screen:
+            while follower.wait(interval, screen.quit_requested):
+                text = follower.json(key) if json else follower.table(key, screen.lines)
+                if once:
+                    write(text)
+                    return
+                screen.draw(text)
+
+
+class _Follower:
+    """Follows the reports of a system."""
+
+    def __init__(self, session: Session, systems: Systems, report: SystemReport) -> None:
+        self._session = session
+        self._systems = systems
+        self._before = self._now = systems.whole(report)
+        self._silent: set[str] = set()  # processes that did not report during the last interval
+
+    def wait(self, interval_s: float, quit_requested: Callable[[], bool]) -> bool:
+        """Wait for the next report; return False if ``quit_requested`` is true first.
+
+        Raises CommandError if the system stops reporting.
+        """
+        from composer.remote.session import Deadline
+
+        due_s = self._now.callbacks_at_s + interval_s - _EARLY_S
+        deadline = Deadline(interval_s + _NO_REPORT_S)
+        others = Deadline(interval_s + _OTHERS_WITHIN_S)
+        while not quit_requested():
+            report = self._systems.newer(self._now.name, due_s)
+            if report is not None:
+                now = self._systems.whole(report)
+                silent = {
+                    process
+                    for process in now.processes
+                    if now.callbacks_at(process) <= self._now.callbacks_at(process)
+                }
+                if silent <= self._silent or others.passed:
+                    self._before, self._now, self._silent = self._now, now, silent
+                    return True
+            if deadline.passed:
+                raise CommandError(
+                    f"{self._now.name} stopped publishing its status, it may have ended"
+                )
+            self._session.spin_once(deadline)
+        return False
+
+    def table(self, key: SortKey, max_lines: int | None) -> str:
+        """Return a table of at most ``max_lines`` lines."""
+        from composer.cli.support.output.callback_tables import sorted_rates, top_table
+
+        return top_table(self._now, sorted_rates(self._before, self._now, key), max_lines)
+
+    def json(self, key: SortKey) -> str:
+        """Return the same as one line of JSON."""
+        from composer.cli.support.output.callback_tables import sorted_rates, top_data
+
+        return as_json(top_data(self._now, sorted_rates(self._before, self._now, key)))

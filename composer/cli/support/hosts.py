@@ -1,0 +1,101 @@
+"""What the commands for hosts share: the hosts of a system, and errors about them."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from composer.cli.support.errors import CONFIG, FAILED, CommandError
+from composer.cli.support.output.terminal import say
+from composer.cli.support.system_arguments import load_system, system_file
+
+if TYPE_CHECKING:
+    from composer.hosts.deployment import RemoteProcess
+    from composer.loading import LoadResult
+    from composer.model import Host, LogLevel, System
+
+
+def require_hosts(command: str, *programs: str) -> None:
+    """Raise CommandError if the package of the extra ``hosts``, or a program, is not installed."""
+    if find_spec("asyncssh") is None:
+        raise CommandError(
+            f"'{command}' needs asyncssh, which this Python does not have",
+            hint='pip install "ros2-composer[hosts]"',
+        )
+    for program in programs:
+        if shutil.which(program) is None:
+            raise CommandError(f"'{command}' needs {program}, which is not installed")
+
+
+def load_for_hosts(
+    text: str,
+    settings: Sequence[str] = (),
+    namespace: str | None = None,
+    *,
+    use_sim_time: bool = False,
+) -> tuple[LoadResult, System, Path]:
+    """Return a system without errors, and its file relative to the project. Raises CommandError."""
+    path = system_file(text)
+    result = load_system(
+        path, shown=text, settings=settings, namespace=namespace, use_sim_time=use_sim_time
+    )
+    system = result.system
+    if system is None or not result.is_runnable:
+        raise typer.Exit(CONFIG)
+    if not system.hosts:
+        raise CommandError(
+            f"system '{system.name}' has no 'hosts'", hint="see docs/guides/several-computers.md"
+        )
+    absolute = path.resolve()
+    if not absolute.is_relative_to(result.project.root):
+        raise CommandError(f"'{text}' is not in the project '{result.project.root}'")
+    return result, system, absolute.relative_to(result.project.root)
+
+
+def check_workspaces(hosts: list[Host]) -> None:
+    """Raise CommandError if a host has no workspace."""
+    for host in hosts:
+        if host.workspace is None:
+            raise CommandError(
+                f"{host.span}: host '{host.name}' has no workspace",
+                hint="set 'workspace' to the folder of the project there, such as ~/robot",
+            )
+
+
+@contextmanager
+def reported_problems() -> Iterator[None]:
+    """Print what is wrong with hosts, and end the command."""
+    from composer.hosts.check import HostsDiffer
+
+    try:
+        yield
+    except HostsDiffer as error:
+        for text, hint in error.problems:
+            say(CommandError(text, hint=hint).text())
+        raise typer.Exit(FAILED) from error
+
+
+@contextmanager
+def process_logs(
+    system: System, processes: Sequence[RemoteProcess]
+) -> Iterator[Callable[[RemoteProcess, LogLevel, str, str], None]]:
+    """Keep the lines of processes on other computers in log files here, for 'compose logs'."""
+    from composer.cli.support.run_logging import run_log
+    from composer.names import join
+    from composer.runtime.supervision.events import Logged
+
+    with ExitStack() as stack:
+        names = [item.process.name.value for item in processes]
+        whole = join(system.namespace, system.name.value)
+        logs = {name: stack.enter_context(run_log(f"{whole}/{name}", part=True)) for name in names}
+
+        def log(item: RemoteProcess, level: LogLevel, logger: str, message: str) -> None:
+            logs[item.process.name.value].show(Logged(0.0, logger, level, message))
+
+        yield log

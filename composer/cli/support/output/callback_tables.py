@@ -1,0 +1,129 @@
+"""Callbacks as tables: how long they took, how late they were called, and what was dropped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from composer.cli.support.output.terminal import columns, lines
+from composer.runtime.metrics.figures import CallbackFigures, CallbackRates, rates
+
+if TYPE_CHECKING:
+    from composer.remote.systems.system_reports import SystemReport
+
+_DURATION_COLUMNS = ("mean ms", "p99 ms", "max ms", "late ms", "over", "dropped")
+_SUMMARY_HEAD = ("node", "callback", "calls", *_DURATION_COLUMNS)
+_TOP_HEAD = ("node", "callback", "calls/s", "busy %", *_DURATION_COLUMNS)
+
+
+class SortKey(StrEnum):
+    """What ``compose top`` sorts by: the largest value first, nodes by name."""
+
+    BUSY = "busy"
+    CALLS = "calls"
+    MEAN = "mean"
+    P99 = "p99"
+    MAX = "max"
+    LATE = "late"
+    DROPPED = "dropped"
+    NODE = "node"
+
+
+def summary_table(callbacks: Sequence[CallbackFigures], limit: int) -> str:
+    """Return the ``limit`` callbacks with the highest total time; a last line counts the others.
+
+    ``late`` is the 99th percentile of how late a timer is called, ``over`` the number of calls that
+    took longer than the budget.
+    """
+    busiest = sorted(callbacks, key=lambda item: -item.total_ms)
+    rows = [_SUMMARY_HEAD, *map(_summary_row, busiest[:limit])]
+    table = columns(rows, numbers_from=2)
+    left = len(busiest) - limit
+    return f"{table}\n{left} more callbacks took less time" if left > 0 else table
+
+
+def sorted_rates(before: SystemReport, now: SystemReport, key: SortKey) -> list[CallbackRates]:
+    """Return the callbacks with their rates between two reports, sorted."""
+    process_of = {node.node: node.process for node in now.nodes}
+    found: list[CallbackRates] = []
+    for process in ("", *now.processes):  # each reports at times of its own
+        of_process = [item for item in now.callbacks if process_of.get(item.node, "") == process]
+        elapsed_s = now.callbacks_at(process) - before.callbacks_at(process)
+        found += rates(before.callbacks, of_process, elapsed_s)
+    return sorted(found, key=lambda item: (_rank(item, key), item.figures.node))
+
+
+def top_table(
+    report: SystemReport, callbacks: list[CallbackRates], max_lines: int | None = None
+) -> str:
+    """Return a report as text of at most ``max_lines`` lines."""
+    busy = sum(item.busy for item in callbacks)
+    title = (
+        f"{report.name}: {report.activity}, {report.message} "
+        f"(host {report.host}, process {report.pid}), callbacks {busy * 100:.1f} % busy"
+    )
+    text = columns([_TOP_HEAD, *map(_top_row, callbacks)], numbers_from=2)
+    chains = [f"chain {chain.chain}: {chain.text}" for chain in report.chains]
+    shown = [*lines([title, *chains]).split("\n"), *text.split("\n")]
+    if max_lines is not None and len(shown) > max_lines:
+        shown = [*shown[: max_lines - 1], f"{len(shown) - max_lines + 1} more"]
+    return "\n".join(shown)
+
+
+def top_data(report: SystemReport, callbacks: list[CallbackRates]) -> dict[str, Any]:
+    """Return a report for JSON. Durations are since the start, rates since the last report."""
+    return {
+        "system": report.name,
+        "time": report.callbacks_at_s,
+        "activity": report.activity,
+        "chains": [asdict(chain) for chain in report.chains],
+        "callbacks": [
+            _without_histogram(item.figures) | {"calls_hz": item.calls_hz, "busy": item.busy}
+            for item in callbacks
+        ],
+    }
+
+
+def _without_histogram(figures: CallbackFigures) -> dict[str, Any]:
+    values = asdict(figures)
+    values.pop("histogram")
+    return values
+
+
+def _summary_row(item: CallbackFigures) -> tuple[str, ...]:
+    return (item.node, item.callback, str(item.count), *_durations(item))
+
+
+def _top_row(item: CallbackRates) -> tuple[str, ...]:
+    figures = item.figures
+    rate = (f"{item.calls_hz:.1f}", f"{item.busy * 100:.2f}")
+    return (figures.node, figures.callback, *rate, *_durations(figures))
+
+
+def _durations(item: CallbackFigures) -> tuple[str, ...]:
+    """Return the cells below ``_DURATION_COLUMNS``."""
+    return (
+        f"{item.mean_ms:.3f}",
+        f"{item.p99_ms:.3f}",
+        f"{item.longest_ms:.3f}",
+        f"{item.late_p99_ms:.3f}" if item.kind == "timer" else "",
+        str(item.overruns or ""),
+        str(item.dropped or ""),
+    )
+
+
+def _rank(item: CallbackRates, key: SortKey) -> float:
+    """Return an ascending sort key."""
+    figures = item.figures
+    ranks = {
+        SortKey.BUSY: item.busy,
+        SortKey.CALLS: item.calls_hz,
+        SortKey.MEAN: figures.mean_ms,
+        SortKey.P99: figures.p99_ms,
+        SortKey.MAX: figures.longest_ms,
+        SortKey.LATE: figures.late_p99_ms,
+        SortKey.DROPPED: figures.dropped,
+    }
+    return -ranks.get(key, 0.0)

@@ -1,0 +1,74 @@
+"""Results of commands on stdout: YAML, JSON and lists of names."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from composer.characters import escape_json, is_safe
+from composer.cli.support.output.terminal import columns, lines, say, write
+
+
+def as_yaml(value: Any, *, one_line: bool = False) -> str:
+    """Return plain data as YAML, keys in their order."""
+    import yaml
+
+    def dump(*, allow_unicode: bool) -> str:
+        text: str = yaml.safe_dump(
+            value,
+            sort_keys=False,
+            allow_unicode=allow_unicode,
+            width=float("inf") if one_line else 120,
+            default_flow_style=one_line,
+        )
+        return text
+
+    text = dump(allow_unicode=True)
+    if not is_safe(text):  # PyYAML does not escape characters that change the direction of text
+        text = dump(allow_unicode=False)
+    return text.removesuffix("\n...\n").rstrip("\n")  # the dots end a document of one scalar
+
+
+def as_json(value: Any, *, indent: int | None = None) -> str:
+    """Return plain data as JSON; one line unless ``indent`` is given."""
+    return escape_json(json.dumps(value, ensure_ascii=False, indent=indent))
+
+
+def print_names(
+    kind: str, named: Sequence[tuple[str, tuple[str, ...]]], *, types: bool, count: bool, json: bool
+) -> None:
+    """Print names, optionally with their types, or the number of names."""
+    if count:
+        write(str(len(named)))
+    elif json:
+        write(as_json([{"name": name, "types": list(found)} for name, found in named], indent=2))
+    elif named:
+        rows = [(name, ", ".join(found)) if types else (name,) for name, found in named]
+        write(columns(rows))
+    else:
+        say_none_found(kind)
+
+
+def print_found(
+    kind: str, type_name: str, names: Sequence[str], *, count: bool, json: bool
+) -> None:
+    """Print the names that have a type, or their number."""
+    if count:
+        write(str(len(names)))
+    elif json:
+        write(as_json(list(names), indent=2))
+    elif names:
+        write(lines(names))
+    else:
+        say(f"no {kind} has the type {type_name}")
+
+
+def print_types(types: Sequence[str], *, json: bool) -> None:
+    """Print the types of a name, one per line."""
+    write(as_json(list(types), indent=2) if json else lines(types))
+
+
+def say_none_found(kind: str) -> None:
+    """Explain an empty list on stderr."""
+    say(f"no {kind} found: check that the system is running and that ROS_DOMAIN_ID is the same")

@@ -1,0 +1,113 @@
+"""Output streams: data to stdout, messages to stderr, colors only on terminals.
+
+Names, messages and parameters come from other processes and may contain anything. What would
+control the terminal is escaped here, so that no command has to. Only the command knows what belongs
+on one line: :func:`lines` and :func:`columns` escape line breaks too.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from typing import NoReturn, TextIO
+
+from composer.characters import escape_line, escape_lines
+from composer.cli.support.output.streams import drop
+from composer.report.display import visible, width
+
+#: The exit code that shells report after a write to a closed pipe (128 + SIGPIPE).
+CLOSED_PIPE = 141
+
+
+def write(text: str) -> None:
+    """Print ``text`` and a newline to stdout. Ends the process quietly if the pipe is closed."""
+    try:
+        print(escape_lines(text), flush=True)
+    except BrokenPipeError:
+        _end_quietly()
+
+
+def write_raw(text: str) -> None:
+    """Write exactly ``text`` to stdout, like :func:`write`, with its colors and controls."""
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _end_quietly()
+
+
+def write_bytes(data: bytes) -> None:
+    """Write binary data to stdout, like :func:`write_raw`."""
+    try:
+        sys.stdout.flush()
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        _end_quietly()
+
+
+def say(text: str) -> None:
+    """Print ``text``, a message for the user, to stderr."""
+    say_raw(escape_lines(text))
+
+
+def say_raw(text: str) -> None:
+    """Print exactly ``text`` to stderr, like :func:`say`, with its colors and controls."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def lines(texts: Iterable[str]) -> str:
+    """Return texts as one line each."""
+    return "\n".join(map(escape_line, texts))
+
+
+def columns(rows: Sequence[Sequence[str]], numbers_from: int | None = None) -> str:
+    """Return the rows as lines with their cells aligned, two spaces apart.
+
+    Columns from ``numbers_from`` on (counted from 0) are right-aligned. A line break in a cell is
+    escaped; wide characters take two columns of the terminal.
+    """
+    safe_rows = [[visible(cell) for cell in row] for row in rows]
+    widths = [max(map(width, column)) for column in zip(*safe_rows, strict=True)]
+    numbers = len(widths) if numbers_from is None else numbers_from
+
+    def padded(cell: str, index: int) -> str:
+        space = " " * (widths[index] - width(cell))
+        return f"{cell}{space}" if index < numbers else f"{space}{cell}"
+
+    return "\n".join(
+        "  ".join(padded(cell, index) for index, cell in enumerate(row)).rstrip()
+        for row in safe_rows
+    )
+
+
+def use_color(stream: TextIO) -> bool:
+    """Say whether to use colors: NO_COLOR and FORCE_COLOR decide, else whether it is a terminal.
+
+    See https://no-color.org and https://force-color.org.
+    """
+    if os.environ.get("NO_COLOR"):
+        return False
+    if os.environ.get("FORCE_COLOR"):
+        return True
+    return stream.isatty() and os.environ.get("TERM") != "dumb"
+
+
+def keep_stdout_for_data() -> None:
+    """Redirect what libraries print to file descriptor 1 to stderr.
+
+    Fast DDS prints errors there, which would corrupt the data that another program reads.
+    """
+    stdout = sys.__stdout__
+    if stdout is None or sys.stdout is not stdout:  # done already, or captured by a test
+        return
+    stdout.flush()
+    ours = os.dup(stdout.fileno())
+    os.dup2(sys.stderr.fileno(), stdout.fileno())
+    sys.stdout = os.fdopen(ours, "w", encoding=stdout.encoding, errors=stdout.errors)
+
+
+def _end_quietly() -> NoReturn:
+    drop(sys.stdout)
+    raise SystemExit(CLOSED_PIPE)
